@@ -1,8 +1,9 @@
 //! Echolume turns the polar frames of a mechanically wobbling ultrasound probe into rendered volumes, on bare Vulkan.
 //!
-//! A frame travels from a [`Recording`] or a [`Live`] source, whose [`Geometry`] says where its samples lie in space, through the [`Plan`] of a
-//! [`Scene`] on the device of a [`Context`]. A [`Renderer`] draws a volume, a [`Stream`] frames while they arrive. [`Layers`] read the settings of a
-//! scene from presets, files and `key=value`. Those names are at the root of this crate, with what they take, return and refuse.
+//! A [`Recording`] or a [`Live`] source delivers frames, and its [`Geometry`] states where their samples lie in space. The [`Plan`] of a
+//! [`Scene`] lists the passes that process them on the device of a [`Context`]. A [`Renderer`] draws a volume, and a [`Stream`] draws frames
+//! while they arrive. [`Layers`] read the settings of a scene from presets, files and `key=value`. These names are at the root of this
+//! crate, together with the types that they take and return, and their errors.
 //!
 //! [`low_level`] holds the modules that the program itself is made of, without a promise of stability.
 //!
@@ -160,9 +161,9 @@ pub use low_level::scene::{Input, Scene, SceneError, Settings};
 pub use low_level::source::live::{Event, Live};
 pub use low_level::source::{Header, Recording, open};
 
-/// The modules of the program, for its own tests, benches and tools. Any of it may change with any version.
+/// The modules of the program, for its own tests, benches and tools. Each of them may change with any version.
 ///
-/// In the order in which a frame travels:
+/// In the order in which a frame is processed:
 ///
 /// - [`source`] reads recordings and live sources into frames. [`probe`] defines where their samples lie in space and drives the probe's
 ///   motor.

@@ -1,4 +1,4 @@
-//! The command line, and nothing else.
+//! The `echolume` program: it runs the command line of the library.
 
 #![forbid(unsafe_code)]
 

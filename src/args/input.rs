@@ -23,7 +23,7 @@ use std::sync::Arc;
 /// A flag as it was typed, and the assignment of a setting that it stands for.
 type Assigned = (String, String);
 
-/// A recording that was opened, and the scene of a volume of it.
+/// An open recording, and the scene of one of its volumes.
 #[cfg_attr(not(feature = "lab"), expect(dead_code, reason = "only reports read all of it"))]
 pub struct Opened {
     pub source: Box<dyn Source>,
@@ -51,24 +51,25 @@ pub struct InputArgs {
 }
 
 impl InputArgs {
-    /// Opens the recording and builds the scene of the chosen volume: settings that nobody chose follow from the recording.
+    /// Opens the recording and builds the scene of the chosen volume. Settings that were not chosen are derived from the recording.
     pub fn open(&self) -> Result<(Box<dyn Source>, Scene), Failure> {
         self.open_with(&[])
     }
 
-    /// Like [`InputArgs::open`]. `chosen` assignments are a layer below the flags and `--set`.
+    /// As [`InputArgs::open`]. `chosen`: assignments that form a layer below the flags and `--set`.
     pub fn open_with(&self, chosen: &[Assigned]) -> Result<(Box<dyn Source>, Scene), Failure> {
         let opened = self.open_recorded(chosen, None)?;
         Ok((opened.source, opened.scene))
     }
 
-    /// Like [`InputArgs::open`], for the first of several volumes that are shown.
+    /// As [`InputArgs::open`], for the first of several volumes that are shown.
     pub fn open_volumes(&self, first: usize) -> Result<(Box<dyn Source>, Scene), Failure> {
         let opened = self.open_recorded(&[], Some(first))?;
         Ok((opened.source, opened.scene))
     }
 
-    /// Like [`InputArgs::open_with`], with all that other scenes of the same volume are made from. `asked`: the volume, if the arguments do not say it.
+    /// As [`InputArgs::open_with`], with everything that other scenes of the same volume are made from. `asked`: the volume, if the
+    /// arguments do not state it.
     pub fn open_recorded(&self, chosen: &[Assigned], asked: Option<usize>) -> Result<Opened, Failure> {
         let mut source = self.source()?;
         let volume = asked.map_or_else(|| self.volume(), Ok)?;
@@ -107,7 +108,8 @@ impl InputArgs {
         }
     }
 
-    /// Refuses `--volumes` beside `--volume`, and volumes among which that of the workspace is not: what it measures belongs to that one.
+    /// Refuses `--volumes` together with `--volume`, and volumes that do not include that of the workspace, because its measurements belong
+    /// to that volume.
     pub fn check_volumes(&self, flag: &str, is_among: impl Fn(usize) -> bool) -> Result<(), Failure> {
         if self.volume.is_some() {
             return Err(input("--volume and --volumes: give one of them"));
@@ -122,7 +124,7 @@ impl InputArgs {
         }
     }
 
-    /// True if the recording comes by standard input, which is read once.
+    /// True if the recording is read from standard input, which is possible only once.
     pub fn is_standard(&self) -> bool {
         self.input.as_deref().is_some_and(|file| file.as_os_str() == STANDARD)
     }
@@ -141,13 +143,14 @@ impl InputArgs {
         check_outputs(outputs, self.read_files(source).iter().map(PathBuf::as_path))
     }
 
-    /// If the volumes are of the phantom: when pictures say so. A workspace is of the viewer, whose pictures always do.
+    /// When pictures state that they are of the phantom. None if the volumes are not. Pictures of a workspace always state it, as in the
+    /// viewer.
     pub fn demo(&self, source: &dyn Source) -> Option<Demo> {
         let is_workspace = self.input.as_deref().is_some_and(workspace::is_named);
         source.is_synthetic().then_some(if is_workspace { Demo::Always } else { Demo::WithOthers })
     }
 
-    /// Every file that is read: of the source and of the settings.
+    /// Every file that is read, of the source and of the settings.
     pub fn read_files(&self, source: &dyn Source) -> Vec<PathBuf> {
         let mut read = source.files();
         read.extend(self.geometry.probe.clone());
@@ -181,7 +184,7 @@ impl InputArgs {
         }
     }
 
-    /// The scene with the format of its volume that the device of these flags would have. Opens no device.
+    /// The scene with the volume format that the device of these flags would use. Opens no device.
     #[cfg(feature = "lab")]
     pub fn resolve_format(&self, scene: Scene) -> Scene {
         match self.candidate() {
@@ -217,7 +220,7 @@ impl InputArgs {
         }
     }
 
-    /// The device that was asked for.
+    /// The requested device. None for the best one.
     #[cfg(feature = "lab")]
     pub fn device(&self) -> Option<DeviceChoice> {
         self.scene.device.clone()
@@ -348,13 +351,13 @@ impl SceneArgs {
         Ok(set)
     }
 
-    /// True if a device or a limit of its time was given.
+    /// True if a device or its time-out was given.
     #[cfg(feature = "verify")]
     pub fn has_device(&self) -> bool {
         self.device.is_some() || self.device_timeout.is_some()
     }
 
-    /// When a device that does not finish is given up.
+    /// The time after which a device that does not finish is given up.
     pub fn deadline(&self) -> Result<Deadline, Failure> {
         match self.device_timeout.as_deref() {
             None => Ok(Deadline::ByDevice),
@@ -366,7 +369,7 @@ impl SceneArgs {
         }
     }
 
-    /// Opens the chosen device and prints its name. A signal that is held ends its waits.
+    /// Opens the chosen device and prints its name. A signal that is held ends waits for the device.
     pub fn open_device(&self, validation: bool) -> Result<Arc<Context>, Failure> {
         let (device, deadline) = (self.device.clone().unwrap_or_default(), self.deadline()?);
         open(&ContextOptions {
@@ -412,7 +415,7 @@ pub fn check_volume(
     }
 }
 
-/// What the scenes of a volume of a recording have in common, but for the levels of its echoes.
+/// The common data of all scenes of a volume of a recording, except for the levels of its echoes.
 pub fn recorded(source: &dyn Source, volume: usize) -> Recorded {
     Recorded {
         geometry: source.geometry(volume),
@@ -477,7 +480,7 @@ pub fn open_device(choice: Option<DeviceChoice>, validation: bool) -> Result<Arc
     })
 }
 
-/// Opens a device whose waits end when `stop` says so. Prints nothing.
+/// Opens a device. Waits for it end once `stop` returns true. Prints nothing.
 #[cfg(feature = "verify")]
 pub fn open_device_until(
     choice: Option<DeviceChoice>,
@@ -493,7 +496,7 @@ pub fn open_device_until(
     })
 }
 
-/// Like [`open_device`], for statistics of the compilation of pipelines: none of them comes from an earlier run.
+/// As [`open_device`], for statistics on the compilation of pipelines: no pipeline comes from an earlier run.
 #[cfg(feature = "lab")]
 pub fn open_device_for_statistics(choice: Option<DeviceChoice>) -> Result<Arc<Context>, Failure> {
     let device = choice.unwrap_or_default();
@@ -512,7 +515,7 @@ fn open(options: &ContextOptions) -> Result<Arc<Context>, Failure> {
     Ok(context)
 }
 
-/// The failure of opening a device or of listing them. One that is missing has an exit code of its own.
+/// The failure for an error while a device is opened or devices are listed. A missing device has its own exit code.
 pub fn device_failure(error: GpuError) -> Failure {
     match error {
         GpuError::NoLoader(_) | GpuError::NoDevice | GpuError::NoneFits(_) | GpuError::NoSuchDevice { .. } => {
@@ -545,7 +548,7 @@ pub fn check_outputs<'a>(outputs: &[Output], read: impl IntoIterator<Item = &'a 
     Ok(())
 }
 
-/// Writes a report that tells nothing about patients, and says where: completely, or not at all.
+/// Writes a report that contains no patient data completely or not at all, and prints its path.
 #[cfg(feature = "lab")]
 pub fn write_report(file: &Path, text: &str) -> Result<(), Failure> {
     crate::files::replace_shared(file, text.as_bytes()).map_err(failed)?;

@@ -58,8 +58,8 @@ impl MotorArgs {
         }
     }
 
-    /// The sweep that the arguments ask for, or None without `--motor`. `recording`: the recording that is played; its probe file is used
-    /// if `probe` is None. `fan`: the angle of the frames in degrees, if the probe file does not state it.
+    /// The requested sweep, or None without `--motor`. `recording`: the recording that is played, whose probe file is used if `probe` is
+    /// None. `fan`: the angle of the frames, degrees, for a probe file that does not state it.
     pub fn plan(
         &self,
         probe: Option<&Path>,
@@ -92,7 +92,7 @@ impl PlannedSweep<'_> {
         BackgroundSweep::start(drive, self.sweep, self.arguments.homed).map_err(failed)
     }
 
-    /// Wraps `source` so that each frame gets its place from the motor. `holds`: see [`MotorTrackingOptions::holds`].
+    /// Wraps `source` so that each frame gets its position from the motor. `holds`: see [`MotorTrackingOptions::holds`].
     pub fn track(&self, source: Box<dyn Live>, motor: BackgroundSweep, holds: bool) -> Box<dyn Live> {
         let clock = match self.arguments.stamps {
             true => Clock::Stamp,

@@ -1,4 +1,4 @@
-//! Where a command writes its picture: a file, whose ending decides the format, or `-` for a PNG on standard output.
+//! The output of a picture: a file, whose ending decides the format, or `-` for a PNG on standard output.
 
 use crate::files::replace;
 use crate::picture::PictureFormat;
@@ -13,15 +13,15 @@ pub const STANDARD: &str = "-";
 pub enum PictureFile<'a> {
     /// A file and its format.
     File(&'a Path, PictureFormat),
-    /// A PNG, and nothing else, on standard output.
+    /// A PNG on standard output, which then gets nothing else.
     StandardOutput,
 }
 
 impl<'a> PictureFile<'a> {
-    /// The target that a flag names. For standard output, lines go to standard error from here on.
+    /// The target that a flag names. With standard output, messages go to standard error from now on.
     ///
     /// # Errors
-    /// An ending of no known format, standard output that is a terminal.
+    /// The ending belongs to no known format, or standard output is a terminal.
     pub fn new(flag: &str, path: &'a Path) -> Result<PictureFile<'a>, Failure> {
         if path.as_os_str() == STANDARD {
             terminal::keep_standard_output().map_err(|fault| input(format!("{flag} -: {fault}")))?;
@@ -44,7 +44,7 @@ impl<'a> PictureFile<'a> {
         self.path().map_or("standard output".into(), |path| path.display().to_string())
     }
 
-    /// Writes a picture, and says where. `encode`: the bytes of the picture in a format.
+    /// Writes a picture, and prints its path. `encode`: returns the bytes of the picture in a format.
     pub fn write(&self, encode: impl Fn(PictureFormat) -> Result<Vec<u8>, String>) -> Result<(), Failure> {
         let unwritable = |e: String| failed(format!("{}: cannot be written: {e}", self.name()));
         match self {

@@ -1,4 +1,4 @@
-//! Where a command writes several pictures: a folder, names with a number, or a film (.mp4).
+//! The output of several pictures: a folder, names with a number, or a film (.mp4).
 
 use super::input::check_inputs;
 use super::picture_file::STANDARD;
@@ -16,17 +16,18 @@ const MAX_DIGITS: usize = 9;
 /// The target of a series of pictures.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SeriesTarget {
-    /// Numbered files: what stands before and after the number, its least number of digits, and the folder to make, if one was named.
+    /// Numbered files: the name before and after the number, its least number of digits, and the folder to create, if one was named.
     Files { before: OsString, digits: usize, after: String, format: PictureFormat, folder: Option<PathBuf> },
     /// A film in one file.
     Film(PathBuf),
 }
 
 impl SeriesTarget {
-    /// The target that `-o` names. `name`: of the pictures in a folder, as in `picture-000000.png`.
+    /// The target that `-o` names. `name`: base name of the pictures in a folder, as in `picture-000000.png`.
     ///
     /// # Errors
-    /// One line: a name for a single picture, a pattern of another kind, an ending of no known format, a film in a program without them.
+    /// One line: the name is that of a single picture, the pattern is not valid, the ending belongs to no known format, or the program was
+    /// built without films.
     pub fn of(path: &Path, name: &str) -> Result<SeriesTarget, Failure> {
         let text = path.to_string_lossy();
         let refuse = |why: &str| Err(input(format!("-o {text}: {why}")));
@@ -87,7 +88,7 @@ impl SeriesTarget {
         }
     }
 
-    /// Refuses targets that cannot be written or would replace an input (`read`), and makes the folder that was named.
+    /// Refuses targets that cannot be written or would replace an input (`read`), and creates the folder that was named.
     pub fn check(&self, numbers: impl Iterator<Item = usize>, read: &[PathBuf]) -> Result<(), Failure> {
         let files: Vec<PathBuf> = match self {
             SeriesTarget::Files { .. } => numbers.map(|n| self.file(n)).collect(),
@@ -102,7 +103,7 @@ impl SeriesTarget {
     }
 }
 
-/// A series of pictures that is being written. Each file is whole or does not exist.
+/// A series of pictures that is being written. Each file is complete or does not exist.
 pub struct PictureSeries<'a> {
     target: &'a SeriesTarget,
     /// Pictures of a film in a second.
@@ -124,7 +125,7 @@ impl<'a> PictureSeries<'a> {
         }
     }
 
-    /// Writes a picture: to its file, or to the end of the film. It counts from then on.
+    /// Writes a picture to its file, or to the end of the film, and counts it.
     pub fn write(&mut self, number: usize, picture: &Picture) -> Result<(), Failure> {
         let file = self.target.file(number);
         let unwritable = |e: String| failed(format!("{}: cannot be written: {e}", file.display()));
@@ -151,12 +152,12 @@ impl<'a> PictureSeries<'a> {
         Err("this program was built without films".into())
     }
 
-    /// Number of pictures that are written.
+    /// Number of written pictures.
     pub fn count(&self) -> usize {
         self.count
     }
 
-    /// Ends the series: a film is put in its place.
+    /// Ends the series. A film gets its final name.
     pub fn finish(self) -> Result<(), Failure> {
         #[cfg(feature = "video")]
         if let Some(film) = self.film {

@@ -1,4 +1,4 @@
-//! Recordings as commands open them: the probe file that was taken is said on one line.
+//! Opens the recordings of commands, and prints on one line which probe file was used.
 
 use crate::source::formats::described;
 use crate::source::{self, Calibration, DepthAxis, OpenOptions, Source};
@@ -54,7 +54,7 @@ impl GeometryArgs {
         given.iter().find(|(_, is_given)| *is_given).map(|(flag, _)| *flag)
     }
 
-    /// What a workspace keeps of a recording with this geometry.
+    /// The description of a recording with this geometry that a workspace stores.
     #[cfg(feature = "view")]
     pub fn origin(&self, recording: Option<PathBuf>) -> Origin {
         let absolute = |path: &PathBuf| std::path::absolute(path).unwrap_or_else(|_| path.clone());
@@ -65,10 +65,10 @@ impl GeometryArgs {
         origin
     }
 
-    /// These arguments, with those of a workspace where none is given.
+    /// These arguments, completed with those of a workspace.
     ///
     /// # Errors
-    /// An axis that is none.
+    /// The axis of the workspace is not valid.
     pub fn or(&self, origin: &Origin) -> Result<GeometryArgs, Failure> {
         let kept = origin.depth_axis.as_deref().map(str::parse).transpose();
         let kept = kept.map_err(|e: String| input(format!("workspace.depth_axis: {e}")))?;
@@ -80,7 +80,7 @@ impl GeometryArgs {
         })
     }
 
-    /// The same for the library.
+    /// The same options for the library.
     pub fn options(&self) -> OpenOptions<'_> {
         OpenOptions {
             probe: self.probe.as_deref(),
@@ -94,14 +94,14 @@ impl GeometryArgs {
     }
 }
 
-/// Opens a recording and says which probe file its geometry is from, if any.
+/// Opens a recording and prints which probe file its geometry is from, if any.
 pub fn open_recording(path: &Path, options: OpenOptions) -> Result<Box<dyn Source>, Failure> {
     let source = source::open_with(path, options).map_err(input)?;
     say_probe_file(source.probe_file());
     Ok(source)
 }
 
-/// Says on one line which probe file is used.
+/// Prints on one line which probe file is used.
 pub fn say_probe_file(file: Option<&Path>) {
     let mut said = SAID.lock().unwrap_or_else(|e| e.into_inner());
     if let Some(file) = file.filter(|file| said.as_deref() != Some(*file)) {

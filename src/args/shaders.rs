@@ -14,10 +14,10 @@ pub struct ShaderArgs {
 }
 
 impl ShaderArgs {
-    /// The shaders of the folder, or the embedded ones. A shader is compiled when a pipeline asks for it.
+    /// The shaders of the folder, or the embedded ones. A shader is compiled when a pipeline needs it.
     ///
     /// # Errors
-    /// No compiler, a folder that cannot be read or holds no shader.
+    /// There is no compiler, or the folder cannot be read or holds no shader.
     pub fn open(&self) -> Result<Arc<Shaders>, Failure> {
         Ok(match &self.glsl {
             Some(folder) => ShaderFolder::open(folder).map_err(input)?.shaders(),
@@ -25,7 +25,7 @@ impl ShaderArgs {
         })
     }
 
-    /// True if the shaders are the user's.
+    /// True if shaders of the user were given.
     pub fn are_given(&self) -> bool {
         self.glsl.is_some()
     }
@@ -37,7 +37,7 @@ impl ShaderArgs {
     }
 }
 
-/// The failure that ends a command. With shaders of the user one that does not compile is a fault of the input.
+/// The failure that ends a command. With shaders of the user, a shader that does not compile is a fault of the input.
 pub fn gpu_failure(fault: GpuError, own_shaders: bool) -> Failure {
     match fault {
         fault @ GpuError::Shader { .. } if own_shaders => input(fault),

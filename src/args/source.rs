@@ -110,13 +110,13 @@ impl SourceArgs {
         self.motor.check()
     }
 
-    /// The same arguments, with the geometry of the flags, for a file.
+    /// The same arguments, with the geometry of the flags, for another file.
     #[cfg(feature = "view")]
     pub fn at_file(&self, file: &Path) -> SourceArgs {
         SourceArgs { source: file.to_string_lossy().into_owned(), ..self.clone() }
     }
 
-    /// The same arguments for another file, whose geometry follows from it alone.
+    /// The same arguments for another file, whose geometry is derived from the file alone.
     #[cfg(feature = "view")]
     pub fn of_file(&self, file: &Path) -> SourceArgs {
         let geometry = GeometryArgs::default();
@@ -134,14 +134,14 @@ impl SourceArgs {
     /// The same arguments with the recording of a workspace.
     ///
     /// # Errors
-    /// The workspace names none.
+    /// The workspace names no recording.
     #[cfg(feature = "view")]
     pub fn of_workspace(&self, file: &Path, workspace: &Workspace) -> Result<SourceArgs, Failure> {
         let source = workspace.recording(file).map_err(input)?.to_string_lossy().into_owned();
         Ok(SourceArgs { source, geometry: self.geometry.or(&workspace.origin)?, ..self.clone() })
     }
 
-    /// What a workspace keeps of the source.
+    /// The description of the source that a workspace stores.
     #[cfg(feature = "view")]
     pub fn origin(&self) -> Origin {
         match self.kind() {
@@ -162,7 +162,7 @@ impl SourceArgs {
         self.source == "phantom"
     }
 
-    /// Where the frames come from.
+    /// The kind of the source.
     #[cfg(feature = "view")]
     pub fn kind(&self) -> SourceKind {
         match self.source.as_str() {
@@ -181,7 +181,7 @@ impl SourceArgs {
         }
     }
 
-    /// The source as a path. Meaningful only if it is a file.
+    /// The source as a path, for a source that is a file.
     pub fn path(&self) -> &Path {
         Path::new(&self.source)
     }
@@ -343,7 +343,7 @@ impl StreamArgs {
         }
     }
 
-    /// What is timed on the device.
+    /// The operations that are timed on the device.
     pub fn time_stamps(&self) -> TimeStamps {
         if self.timings { TimeStamps::EachPass } else { TimeStamps::Ends }
     }

@@ -1,4 +1,4 @@
-//! What the program keeps for a user between runs: compiled pipelines, presets, and the list of recent files.
+//! Files that the program keeps for a user between runs: compiled pipelines, presets, and the list of recent files.
 
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -39,8 +39,8 @@ pub fn recent_list() -> Option<PathBuf> {
     RECENT.path(|name| std::env::var_os(name))
 }
 
-/// The file that keeps that the hints of the first start were shown, if this is that start: neither it, nor a list of recent files beside it, nor
-/// presets of the user exist. None too where no list of recent files is kept.
+/// The file that marks that the hints of the first start were shown. None unless this is the first start: the mark, a list of recent files
+/// beside it, and presets of the user must all be missing. Also None if no list of recent files is kept.
 #[cfg(feature = "view")]
 pub fn first_steps() -> Option<PathBuf> {
     first_steps_beside(recent_list()?, presets_file())

@@ -1,4 +1,4 @@
-//! `echolume completions` and `echolume man`: what the program says about itself to shells and to `man`.
+//! `echolume completions` and `echolume man`: completion scripts for shells, and manual pages.
 
 use crate::files;
 use crate::terminal::{self, Failure, failed, say};

@@ -1,5 +1,5 @@
-//! `profile --against`: two runs in turn, volume by volume, so that other load on the machine and its clocks affect both alike; each block of them
-//! is a pair of processes of its own, so that where memory lies does too.
+//! `profile --against`: two runs that alternate volume by volume, so that other load on the machine and its clocks affect both alike. Each
+//! block of volumes is measured by a new pair of processes, so that the layout of memory varies, too.
 
 use crate::baselines::Stored;
 use crate::files::WorkFolder;
@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::str::FromStr;
 
-/// What a run is measured against.
+/// The other side of a comparison.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Other {
     Program(PathBuf),
@@ -141,8 +141,9 @@ impl Block {
 /// What a process says when a volume is done.
 const DONE: &str = "in turn: done";
 
-/// Keeps this process, which measures a block, on the last core that it may run on. Where the threads of a software device and of other load lie on
-/// several cores differs between two processes, and stays so for seconds: volumes in turn would not share it, and more of them not even it out.
+/// Keeps this process, which measures a block, on the last core that it may run on. The distribution of the threads of a software device
+/// and of other load over several cores differs between two processes and stays the same for seconds. Alternate volumes would not share it,
+/// and more volumes would not average it out.
 pub fn keep_to_one_core() {
     #[cfg(target_os = "linux")]
     if let Ok(cores) = rustix::thread::sched_getaffinity(None)
@@ -156,7 +157,7 @@ pub fn keep_to_one_core() {
     }
 }
 
-/// In a process that measures a block: waits until a volume is asked for, by a line of standard input.
+/// In a process that measures a block: waits for a line of standard input, which requests a volume.
 pub fn await_turn() -> Result<(), Failure> {
     match std::io::stdin().read_line(&mut String::new()) {
         Ok(length) if length > 0 => Ok(()),
@@ -164,13 +165,13 @@ pub fn await_turn() -> Result<(), Failure> {
     }
 }
 
-/// Says that the volume is done.
+/// Reports that the volume is done.
 pub fn end_turn() {
     say!("{DONE}");
 }
 
-/// Measures this program with its own arguments and `other` in turn, A B B A, and compares them. `repeats` in all for each, in blocks that are a
-/// pair of processes; each block has `warm_up` before its own.
+/// Measures this program with its own arguments and `other` alternately, A B B A, and compares them. `repeats`: number of volumes for each,
+/// in blocks; each block is a pair of processes with `warm_up` additional volumes at its beginning.
 pub fn compared(other: &Other, repeats: u32, warm_up: u32, options: &CompareOptions) -> Result<Comparison, Failure> {
     let mut sides = sides(other)?;
     let folder = WorkFolder::new(&std::env::temp_dir(), "echolume-profile-").map_err(failed)?;

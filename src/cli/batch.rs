@@ -1,4 +1,4 @@
-//! `echolume batch`.
+//! `echolume batch`: renders, converts, measures or verifies many recordings.
 
 use crate::args::write_report;
 use crate::batch::make::{self, Found};
@@ -207,8 +207,8 @@ fn is_grace_over() -> bool {
     signals::received().is_some() && SIGNALLED.get_or_init(Instant::now).elapsed() >= grace
 }
 
-/// Does `work`. Says at once that a signal arrived, and ends the process if the running unit does not end within the grace time: everything is
-/// written aside, so that nothing is half-written.
+/// Does `work`. Reports a signal at once, and ends the process if the running unit does not end within the grace time. Files are first
+/// written under other names, so that none is incomplete.
 fn watching<T>(held: &Held, grace: Duration, work: impl FnOnce() -> T) -> T {
     let (working, works) = mpsc::channel::<()>();
     std::thread::scope(|scope| {

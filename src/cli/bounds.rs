@@ -1,4 +1,4 @@
-//! `echolume report bounds`.
+//! `echolume report bounds`: proven bounds of a picture.
 
 use crate::args::InputArgs;
 use crate::bounds::{Effort, PictureBounds, Proof, fault, picture, proven};

@@ -33,7 +33,7 @@ pub(super) fn chosen(
     Ok(choice.set.clone())
 }
 
-/// Says whether the picture kept the budget.
+/// Prints whether the picture kept the budget.
 pub(super) fn judge(budget: &str, times: &[PassTime]) -> Result<(), Failure> {
     let (time, taken) = (parse_nanoseconds("--budget", budget)?, times.iter().map(|t| t.total).sum::<f64>());
     let kept = if taken <= time { "within" } else { "over" };

@@ -1,4 +1,4 @@
-//! What the commands that draw pictures of a recording share: how frames are sent, and another try after the device was lost.
+//! Shared code of the commands that draw pictures of a recording: sending frames, and repeating after a loss of the device.
 
 use crate::args::{frames_of, gpu_failure};
 use crate::gpu::{Context, GpuError, Losses, Renderer, RendererOptions};
@@ -6,7 +6,7 @@ use crate::source::{Frame, Source};
 use crate::terminal::{Failure, failed};
 use std::sync::Arc;
 
-/// Why a picture could not be drawn.
+/// The reason why a picture could not be drawn.
 pub enum DrawFault {
     Gpu(GpuError),
     Source(Failure),
@@ -19,7 +19,7 @@ impl From<GpuError> for DrawFault {
 }
 
 impl DrawFault {
-    /// The failure of what is drawn to be measured.
+    /// The failure of a command that draws in order to measure, for which a loss of the device is final.
     pub fn failed(self) -> Failure {
         self.failure(false)
     }
@@ -32,11 +32,12 @@ impl DrawFault {
     }
 }
 
-/// Draws on the device of `context`. If it is lost, `reopen` opens it again and `draw` is called again, with smaller bands in `options`, until
-/// it was lost too often in a row ([`Losses`]): `progress` says how many of several pictures are finished. `draw` gets true if it is called again: the source may have been read in part by then.
+/// Draws on the device of `context`. If it is lost, `reopen` opens it again and `draw` is called again, with smaller bands in `options`,
+/// until it was lost too often in a row ([`Losses`]). `progress` describes how many of several pictures are finished. The argument of
+/// `draw` is true if it is called again: a part of the source may then have been read.
 ///
 /// # Errors
-/// What `draw` or `reopen` failed with.
+/// The error of `draw` or `reopen`.
 pub fn draw_despite_losses<T>(
     context: &mut Arc<Context>,
     options: &mut RendererOptions,
@@ -62,10 +63,11 @@ pub fn draw_despite_losses<T>(
     }
 }
 
-/// Sends every frame of a volume to volume image 0. `each` takes the frame before it is sent.
+/// Sends every frame of a volume to volume image 0. `each` receives the frame before it is sent.
 ///
 /// # Errors
-/// A source that cannot be read, what `each` failed with, or a device that failed: a loss is told apart, so that it can be tried again.
+/// The source cannot be read, `each` fails, or the device fails. A loss of the device is a case of its own, so that the caller can try
+/// again.
 pub fn send_volume(
     renderer: &mut Renderer,
     source: &mut dyn Source,

@@ -1,4 +1,4 @@
-//! `echolume report error`.
+//! `echolume report error`: error against run time.
 
 use crate::args::{InputArgs, Opened, parse_nanoseconds};
 use crate::error_report::choose::Bound;

@@ -1,4 +1,4 @@
-//! `echolume report filters`.
+//! `echolume report filters`: compares the 2D filters.
 
 use crate::args::{Output, check_outputs, open_device, open_recording, write_report};
 use crate::filter_report::candidate_runs::{MeasureError, MeasureOptions, count, phantom, recording};
@@ -60,7 +60,11 @@ impl FilterReport {
         if count(&self.filter) < 2 {
             let mut names: Vec<&str> = candidates([1.0; 2], "").iter().map(|c| c.filter).collect();
             names.dedup();
-            return Err(input(format!("--filter {}: is in no name; there are: {}", self.filter, names.join("; "))));
+            return Err(input(format!(
+                "--filter {}: no filter has this in its name; there are: {}",
+                self.filter,
+                names.join("; ")
+            )));
         }
         let names: Vec<String> =
             std::iter::once("phantom".to_string()).chain(self.recordings.iter().map(|f| stem(f))).collect();

@@ -1,4 +1,4 @@
-//! How the command line is shown: its flags in groups, a help of one screen (`-h`), and the values that shells complete.
+//! The appearance of the command line: flags in groups, a help of one screen (`-h`), and the values that shells complete.
 
 use crate::scene::load::PRESETS;
 use crate::scene::numbers;
@@ -198,7 +198,7 @@ const SHORT: [(&str, &str); 16] = [
 /// Most characters of a line of help behind the flag.
 const LINE: usize = 64;
 
-/// The command line with its flags in groups.
+/// Sorts the flags of the command line into groups.
 pub fn grouped(program: Command) -> Command {
     let of_all = ["verbose", "log_file", "max_memory"];
     let program =
@@ -218,7 +218,7 @@ fn in_group(arg: Arg, own: &[(&str, &'static str)]) -> Arg {
     }
 }
 
-/// The same for `-h`: the usual flags, a line each.
+/// Reduces the command line for `-h` to the usual flags, one line each.
 pub fn short(program: Command) -> Command {
     let is_rare = |arg: &Arg| ["log_file", "max_memory"].contains(&arg.get_id().as_str());
     let program = program.mut_args(|arg| short_line(arg.clone()).hide(is_rare(&arg)));
@@ -257,7 +257,7 @@ fn first_part(help: &str) -> String {
     line.to_string()
 }
 
-/// The same with the values that a shell completes. It parses less than the program does: modes have synonyms, and presets may be a user's own.
+/// Adds the values that a shell completes. They are fewer than the program accepts: modes have synonyms, and presets may be a user's own.
 pub fn completed(program: Command) -> Command {
     program.mut_subcommands(|command| command.mut_args(with_values))
 }

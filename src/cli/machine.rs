@@ -1,4 +1,4 @@
-//! `echolume devices` and `echolume support-bundle`: what this machine has.
+//! `echolume devices` and `echolume support-bundle`: a description of this machine.
 
 use crate::args::{SourceArgs, device_failure};
 use crate::gpu::{DeviceChoice, context, device_selection};
@@ -48,7 +48,9 @@ impl Devices {
             }
             match &picked {
                 Ok(n) if *n == i && device.is_software() => {
-                    say!("    picked: no other device fits. It is a software device: the same pictures, slowly");
+                    say!(
+                        "    picked: no other device fits. It is a software device, which draws the same pictures slowly"
+                    );
                 }
                 Ok(n) if *n == i => say!("    picked: the best device that lacks nothing"),
                 _ if !device.missing.is_empty() => {}

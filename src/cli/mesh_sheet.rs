@@ -1,4 +1,4 @@
-//! The surface that a picture shows as a file: `render --mesh`.
+//! `render --mesh`: writes the surface that a picture shows to a file.
 
 use crate::gpu::Renderer;
 use crate::mesh::files::{Colours, MeshFile};
@@ -12,8 +12,8 @@ use crate::terminal::{Failure, failed, input, say};
 use glam::DVec3;
 use std::path::Path;
 
-/// Writes the sheet of the distance map that a renderer drew last, in the colours of its picture. `world`: where the voxels of a Cartesian volume
-/// lie.
+/// Writes the sheet of the distance map that a renderer drew last, in the colours of its picture. `world`: position of the voxels of a
+/// Cartesian volume in the world.
 pub(super) fn write(
     renderer: &mut Renderer,
     picture: &Picture,

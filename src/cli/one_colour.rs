@@ -1,5 +1,5 @@
-//! The line about a picture in which there is nothing: it is wholly one colour, or the ground alone. Each cause is tested on what the rays meet, in the order
-//! in which a picture comes about.
+//! The message about a picture in which nothing is visible: it has a single colour, or shows the ground alone. Each possible cause is
+//! tested on the data that the rays meet, in the order of the stages of a picture.
 
 use crate::passes::Texels;
 use crate::passes::light_volume::bare_ground;
@@ -9,7 +9,7 @@ use crate::picture::Picture;
 use crate::scene::{Layout, Mode, Scene, transfer};
 use crate::source::StoredType;
 
-/// What a picture without anything in it shows.
+/// The content of a picture in which nothing is visible.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Nothing {
     /// One colour: red, green, blue.
@@ -18,7 +18,7 @@ pub enum Nothing {
     Ground,
 }
 
-/// What a picture of two pixels and more shows that has nothing in it; none for another picture.
+/// The content of a picture of at least two pixels in which nothing is visible. None for any other picture.
 pub fn of(scene: &Scene, picture: &Picture) -> Option<Nothing> {
     let mut pixels = picture.rgba.chunks_exact(4).map(|p| [p[0], p[1], p[2]]);
     let first = pixels.next().filter(|_| picture.rgba.len() > 4)?;
@@ -43,7 +43,7 @@ fn is_ground(scene: &Scene, picture: &Picture) -> bool {
     })
 }
 
-/// The line for standard error.
+/// The message for standard error.
 pub fn line(file: &str, nothing: Nothing, why: Option<&str>) -> String {
     let shown = match nothing {
         Nothing::Ground => "the ground alone (light.volume.ground)".into(),
@@ -54,7 +54,7 @@ pub fn line(file: &str, nothing: Nothing, why: Option<&str>) -> String {
     format!("{file}: is {shown}: {}", why.unwrap_or("the scene has no volume"))
 }
 
-/// The cause, in words. `volume`: the texels of the scene's volume. `shift`: stored sample minus the file's value.
+/// The cause in words. `volume`: the texels of the scene's volume. `shift`: stored sample minus the value of the file.
 pub fn cause(scene: &Scene, volume: &Texels, shift: f64) -> String {
     let seen = survey(scene, volume);
     if seen.met == 0 {

@@ -1,4 +1,4 @@
-//! `echolume profile --pipelines`.
+//! `echolume profile --pipelines`: statistics of the compiled pipelines.
 
 use crate::args::{InputArgs, Output, ShaderArgs, check_outputs, open_device_for_statistics, write_report};
 use crate::baselines::Stored;
@@ -10,13 +10,13 @@ use crate::scene::variants;
 use crate::terminal::{Failure, failed, input, remark, say};
 use std::path::{Path, PathBuf};
 
-/// What `profile` was asked for.
+/// The options of `profile --pipelines`.
 pub struct Request<'a> {
     pub input: &'a InputArgs,
-    /// Every mode, preset and filter instead of the scene alone.
+    /// Measures every mode, preset and filter instead of the scene alone.
     pub all: bool,
     pub json: Option<&'a Path>,
-    /// Files to compare: one with what is measured now, two with each other; none.
+    /// Files to compare: one is compared with the new measurement, two with each other.
     pub compare: &'a [PathBuf],
     pub force: bool,
     pub shaders: &'a ShaderArgs,

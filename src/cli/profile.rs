@@ -1,4 +1,4 @@
-//! `echolume profile`.
+//! `echolume profile`: measures the GPU time of every pass.
 
 use super::against::{self, Other};
 use super::pipelines::Request;

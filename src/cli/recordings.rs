@@ -1,4 +1,4 @@
-//! `echolume convert`, `echolume info` and `echolume phantom`: recordings are converted, described and made.
+//! `echolume convert`, `echolume info` and `echolume phantom`: convert, describe and make recordings.
 
 use crate::args::{GeometryArgs, Output, check_outputs, open_recording, recording_help};
 use crate::files::signals::Writing;
@@ -51,7 +51,8 @@ fn check_number(recording: &dyn Source, file: &Path, number: usize) -> Result<()
     }
 }
 
-/// Like [`read_volume`], with the share of the range between the darker and the brighter class of echoes, if there are two.
+/// As [`read_volume`], and also finds the threshold between the darker and the brighter class of echoes as a share of the range, if there
+/// are two classes.
 pub(super) fn read_with_threshold(
     recording: &mut dyn Source,
     file: &Path,
@@ -67,13 +68,13 @@ pub(super) fn read_with_threshold(
     Ok((geometry, volume, found))
 }
 
-/// The threshold that was asked for, or the one that was found.
+/// The threshold of the user, or the one that was found.
 pub(super) fn share_of(asked: Option<f64>, found: Option<&EchoLevels>, file: &Path) -> Result<f64, Failure> {
     let none = || input(format!("{}: the echoes have no two classes; give --threshold", file.display()));
     asked.or(found.map(|levels| levels.threshold)).ok_or_else(none)
 }
 
-/// The lattice of a conversion: that of the volume itself, or one of the spacing that was asked for, mm.
+/// The lattice of a conversion: that of the volume itself, or one with the requested spacing, mm.
 pub(super) fn target_grid(geometry: &Geometry, spacing: Option<f64>) -> Result<Grid, Failure> {
     match (geometry, spacing) {
         // Every voxel stays what and where it is.

@@ -1,4 +1,4 @@
-//! `echolume render`.
+//! `echolume render`: renders a recording to a picture.
 
 use super::budget;
 use super::drawing::{DrawFault, draw_despite_losses, send_volume};

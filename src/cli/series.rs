@@ -70,14 +70,14 @@ fn rate(text: &str) -> Result<f64, String> {
     number.ok_or_else(|| "must lie in 0.1..=240 pictures a second".into())
 }
 
-/// How the pictures are drawn and where they go.
+/// How the pictures are drawn, and where they are written.
 pub struct Job<'a> {
     pub input: &'a InputArgs,
     pub output: &'a Path,
     pub options: RendererOptions,
     pub validate: bool,
     pub timings: bool,
-    /// Shaders come from a folder of the user.
+    /// True if the shaders come from a folder of the user.
     pub own_shaders: bool,
 }
 
@@ -112,7 +112,7 @@ impl SeriesArgs {
         self.turntable.is_some() || self.volumes.is_some()
     }
 
-    /// Refuses what only a series has, if none is asked for.
+    /// Refuses flags that apply only to a series if no series is requested.
     pub fn check(&self) -> Result<(), Failure> {
         match self.rate {
             Some(_) if !self.is_given() => {

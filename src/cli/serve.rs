@@ -1,4 +1,4 @@
-//! `--serve` of `echolume stream`: what it says of the clients.
+//! `echolume stream --serve`: an OpenIGTLink server, and the messages about its clients.
 
 use crate::source::igtl::{self, Publisher, PublisherStatistics, SCHEME, ServerOptions, with_port};
 use crate::terminal::{Failure, failed, input, remark, say};
@@ -21,10 +21,10 @@ pub struct ServeArgs {
 }
 
 impl ServeArgs {
-    /// Begins to listen, if that was asked for, and says where.
+    /// Starts the server if one is requested, and prints its address.
     ///
     /// # Errors
-    /// An address that is none, a port that is in use, a spacing that is no length.
+    /// The address is not valid, the port is in use, or the spacing is not a length.
     pub fn start(&self) -> Result<Option<Serving>, Failure> {
         let Some(given) = &self.serve else { return Ok(None) };
         let place = given.strip_prefix(SCHEME).filter(|place| !place.is_empty());
@@ -56,20 +56,20 @@ impl ServeArgs {
         Ok(Some(Serving { publisher, said: PublisherStatistics::default() }))
     }
 
-    /// True if a server was asked for.
+    /// True if a server is requested.
     pub fn is_asked_for(&self) -> bool {
         self.serve.is_some()
     }
 }
 
-/// A server, and what was said of it.
+/// A running server, and what was printed about it.
 pub struct Serving {
     pub publisher: Publisher,
     said: PublisherStatistics,
 }
 
 impl Serving {
-    /// Says on one line what changed: clients that came or went, and what slow ones did not get.
+    /// Prints changes on one line: clients that connected or disconnected, and data that slow clients did not get.
     pub fn say(&mut self, began: Instant) {
         let now = self.publisher.statistics();
         let (server, said) = (&now.server, &self.said.server);
@@ -84,7 +84,7 @@ impl Serving {
         self.said = now;
     }
 
-    /// Ends the connections after what waits was sent, and says what there was in all.
+    /// Ends the connections after the waiting data was sent, and prints the totals.
     pub fn end(self) {
         let statistics = self.publisher.finish();
         say!("served    {}", line(&statistics));

@@ -195,7 +195,7 @@ fn read_times(file: &Path) -> Result<Vec<f64>, Failure> {
         .filter(|(_, line)| !line.is_empty())
         .map(|(n, line)| match line.parse::<f64>() {
             Ok(time) if time.is_finite() => Ok(time),
-            _ => Err(at_fault(format!("line {n}: {} is no time in seconds", quoted(line)))),
+            _ => Err(at_fault(format!("line {n}: {} is not a time in seconds", quoted(line)))),
         })
         .collect()
 }

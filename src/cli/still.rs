@@ -1,4 +1,4 @@
-//! `echolume render --still`: how many paths a still has, and how far its mean is from its expectation.
+//! `echolume render --still`: the number of paths of a still, and the error of its mean.
 
 use crate::args::parse_nanoseconds;
 use crate::gpu::{GpuError, Renderer};
@@ -7,12 +7,12 @@ use crate::scene::Still;
 use crate::statistics::quantile;
 use crate::terminal::{Failure, input};
 
-/// What `--still` asks for.
+/// The values of `--still`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct StillArgs {
-    /// Assignments of settings, each with the part of the flag that it stands for.
+    /// Assignments of settings, each with the part of the flag that gave it.
     pub set: Vec<(String, String)>,
-    /// Time that the paths may take, s, in place of their number.
+    /// Time that the paths may take, s. It replaces their number.
     pub time: Option<f64>,
 }
 
@@ -44,8 +44,9 @@ impl StillArgs {
     }
 }
 
-/// The number of samples that a time is enough for: `taken` draws so many and says how long that was, s. The first picture takes what does not
-/// depend on their number too, such as the compilation of shaders; a sample takes what a picture of more of them takes longer.
+/// The number of samples that fits into a time. `taken` draws the given number of samples and returns the time, s. The first picture also
+/// takes time that does not depend on the number, such as the compilation of shaders. The time of a sample is the additional time of a
+/// picture with more samples.
 pub fn samples_within(time: f64, mut taken: impl FnMut(u32) -> Result<f64, Failure>) -> Result<u32, Failure> {
     let first = taken(1)?;
     if first >= time {
@@ -64,7 +65,7 @@ pub fn samples_within(time: f64, mut taken: impl FnMut(u32) -> Result<f64, Failu
     Ok((1.0 + (time - first) / each.max(1e-12)).clamp(1.0, f64::from(Still::MAX_SAMPLES)) as u32)
 }
 
-/// The standard error of a still, for people: of the luminance of the pixels that have light, as a share of it.
+/// The standard error of a still in words: that of the luminance of the pixels that have light, as a share of it.
 pub fn noise(renderer: &mut Renderer) -> Result<Option<String>, GpuError> {
     let Some(still) = renderer.scene().still().copied() else { return Ok(None) };
     let [light, squares] = final_sums(renderer.scene());

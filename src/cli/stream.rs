@@ -1,4 +1,4 @@
-//! `echolume stream`.
+//! `echolume stream`: renders frames as they arrive.
 
 use super::one_colour;
 use super::serve::{ServeArgs, Serving};

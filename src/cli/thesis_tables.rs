@@ -1,4 +1,4 @@
-//! `echolume report tables`.
+//! `echolume report tables`: measures the tables of the thesis.
 
 use crate::args::{Output, check_outputs, open_device, write_report};
 use crate::gpu::DeviceChoice;

@@ -1,4 +1,4 @@
-//! `echolume verify`.
+//! `echolume verify`: tests a device and its driver.
 
 use crate::args::{check_outputs, device_failure, write_report};
 use crate::baselines::{Stored, Threshold};

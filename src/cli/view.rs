@@ -1,4 +1,4 @@
-//! `echolume view`.
+//! `echolume view`: shows live frames in a window.
 
 use super::view_config::{ConsoleConfig, First, WindowConfig, rungs};
 use super::view_open::{OpenedInWindow, Shown, check_later, locked};
@@ -196,7 +196,7 @@ impl View {
         self.kiosk
     }
 
-    /// False where the configuration lets the umask say who may read files.
+    /// False if the configuration lets the umask decide who may read files.
     pub fn is_private(&self) -> bool {
         self.config().and_then(Result::ok).is_none_or(|config| config.files.private)
     }
@@ -214,7 +214,7 @@ impl View {
         Ok(())
     }
 
-    /// The log of the configuration: path, bytes per file, number of files.
+    /// The log of the configuration: its path, the size limit of a file in bytes, and the number of files.
     pub fn log(&self) -> Option<(PathBuf, u64, u32)> {
         let files = self.config()?.ok()?.files;
         Some((files.log?, u64::from(files.log_size_mb) << 20, files.log_files))

@@ -30,7 +30,7 @@ const PANICKED: &str = "the thread that opens the source panicked";
 pub struct WindowConfig {
     pub device: ContextOptions,
     pub shape: WindowOptions,
-    /// A monitor without a desktop, instead of a window.
+    /// The monitor to use without a desktop, instead of a window.
     pub direct: Option<MonitorChoice>,
 }
 
@@ -97,18 +97,18 @@ impl WindowConfig {
     }
 }
 
-/// A source that need not be opened any more.
+/// A source that is already open, or is being opened.
 pub enum First {
     Open(Box<dyn Live>),
-    /// By another thread.
+    /// Another thread is opening it.
     BeingOpened(Receiver<Result<Box<dyn Live>, Failure>>),
 }
 
-/// The source and the console. A kiosk reads them anew after a fault.
+/// The source and the console. A kiosk reads them again after a fault.
 pub struct ConsoleConfig {
     /// None: the console shows only a message.
     pub source: Option<SourceArgs>,
-    /// The source, if it was opened before the window, or begun to be.
+    /// The source, if it was opened, or its opening was started, before the window.
     pub first: Option<First>,
     pub options: ConsoleOptions,
 }
@@ -148,7 +148,7 @@ impl ConsoleConfig {
         Ok(ConsoleConfig { source: Some(SourceArgs::from_config(config)?), first: None, options })
     }
 
-    /// The same with its source open, or being opened if that takes long: then the window shows how far it is.
+    /// The same configuration with its source open, or being opened if that takes long. In that case the window shows the progress.
     ///
     /// # Errors
     /// The source cannot be opened.
@@ -170,7 +170,7 @@ impl ConsoleConfig {
         Ok(self)
     }
 
-    /// The arguments of the console: how to open the source, and its options. `factor`: pixels per point of the window system.
+    /// The arguments of the console: a function that opens the source, and its options. `factor`: pixels per point of the window system.
     pub fn options(self, factor: f32, wake: Wake, startup_fault: Option<StartupFault>) -> (OpenSource, ConsoleOptions) {
         let scale = self.options.scale * factor;
         let kind = self.source.as_ref().map_or(SourceKind::default(), SourceArgs::kind);
@@ -194,7 +194,7 @@ fn stamp() -> String {
     crate::ui::export::timestamp(SystemTime::now())
 }
 
-/// The quality steps that hold the frame budget: those of a report, or the built-in ones.
+/// The quality steps that keep the frame budget: those of a report, or the built-in ones.
 pub fn rungs(report: Option<&Path>) -> Result<Vec<Rung>, Failure> {
     match report {
         None => Ok(built_in_ladder()),

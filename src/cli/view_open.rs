@@ -1,4 +1,5 @@
-//! What `echolume view` shows: the source of its flags, or one of the recordings and workspaces that it was given or that were opened in the window.
+//! The source of `echolume view`: that of its flags, or one of the recordings and workspaces that were given as arguments or opened in the
+//! window.
 
 use crate::args::SourceArgs;
 use crate::files::InputError;
@@ -16,12 +17,12 @@ use std::sync::{Arc, Mutex, MutexGuard};
 pub struct Shown {
     pub source: SourceArgs,
     pub workspace: Option<Layers>,
-    /// It was given with the flags, which are about it too.
+    /// True if it was given with the flags, which then apply to it.
     pub is_given: bool,
 }
 
 impl Shown {
-    /// What flags ask for. `file`: a recording or a workspace in place of their source.
+    /// The source that the flags select. `file`: a recording or a workspace that replaces it.
     pub fn of(source: &SourceArgs, file: Option<&Path>) -> Result<Shown, Failure> {
         let named = file.unwrap_or(source.path());
         if workspace::is_named(named) {
@@ -33,13 +34,13 @@ impl Shown {
         Ok(Shown { source, workspace: None, is_given: true })
     }
 
-    /// A file that was opened in the window. The geometry of the flags is that of their own recordings.
+    /// The source of a file that was opened in the window. The geometry flags do not apply to it.
     pub fn opened(flags: &SourceArgs, file: &Path) -> Result<Shown, Failure> {
         Ok(Shown { is_given: false, ..Shown::of(&flags.of_file(file), None)? })
     }
 }
 
-/// Refuses a file that is shown later and is not there. A pattern of names is looked at when it is opened.
+/// Refuses a missing file that would be shown later. A pattern of names is checked only when it is opened.
 pub fn check_later(file: &Path) -> Result<(), Failure> {
     let is_pattern = file.to_string_lossy().contains(['*', '?']);
     match std::fs::metadata(file) {
@@ -48,7 +49,7 @@ pub fn check_later(file: &Path) -> Result<(), Failure> {
     }
 }
 
-/// What was opened in the window, and what else is open there.
+/// The source that was opened last in the window, and the list of open ones.
 #[derive(Default)]
 pub struct OpenedInWindow {
     current: Arc<Current>,
@@ -68,7 +69,7 @@ pub(super) fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl OpenedInWindow {
-    /// What makes the next console show this. `shown`: none for what the program was started with.
+    /// Prepares the next console to show this source. `shown`: None for the source that the program was started with.
     pub fn next(&self, shown: Option<Shown>, source: Box<dyn Live>) -> Opened {
         let current = self.current.clone();
         Box::new(move || (*locked(&current.source), *locked(&current.shown)) = (Some(source), shown))
@@ -78,12 +79,12 @@ impl OpenedInWindow {
         locked(&self.current.shown).is_some()
     }
 
-    /// What was opened last.
+    /// The source that was opened last.
     pub fn shown(&self) -> Option<Shown> {
         locked(&self.current.shown).clone()
     }
 
-    /// The source of what was opened last, once.
+    /// Takes the open source of what was opened last. It is there only once.
     pub fn take_source(&self) -> Option<Box<dyn Live>> {
         locked(&self.current.source).take()
     }

@@ -1,36 +1,37 @@
-//! Bands: a long dispatch in several parts, each in a submission of its own. The watchdog of a driver ends a submission that takes too
-//! long, and the device is lost: after 2 s (Windows), 7.5 s (i915) or 10 s (amdgpu). The size of a band follows from the time that
-//! the pass took on this device.
+//! Divides a long dispatch into parts (bands), each in a submission of its own. The watchdog of a driver ends a submission that takes too
+//! long, and the device is lost: after 2 s (Windows), 7.5 s (i915) or 10 s (amdgpu). The size of a band follows from the measured time of
+//! the pass on this device.
 //!
-//! Workgroups of every pass are independent: only invocations of one workgroup share memory, and atomic operations are on that alone. So any
-//! division between workgroups gives the same texels. A software device has no watchdog and gets no bands, until it is lost.
+//! The workgroups of every pass are independent: only invocations of one workgroup share memory, and atomic operations are on that memory
+//! alone. So any division between workgroups gives the same texels. A software device has no watchdog and gets no bands until it is lost.
 
 use crate::passes::{Pass, Stage};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-/// Time that a submission may take, ns: far less than any watchdog allows, since the next picture may be slower than the last.
+/// Longest expected time of a submission, ns. It is far below the limit of every watchdog, since the next picture may be slower than the
+/// last.
 const TARGET_NS: f64 = 100e6;
-/// The same of a software device that draws a window's panels between.
+/// The same on a software device that draws the panels of a window between the bands.
 const PACED_TARGET_NS: f64 = 20e6;
-/// How often the first bands of a software device are halved: it takes some microseconds for a ray.
+/// How often the first bands of a software device are halved, because a ray takes some microseconds there.
 const SOFTWARE_HALVINGS: u32 = 2;
-/// The shortest such time after losses, ns.
+/// Lower limit of the time of a submission after losses of the device, ns.
 const LEAST_NS: f64 = 1e6;
-/// Invocations of a pass that casts rays, in its first band on a device, when its time is not known.
+/// Invocations in the first band of a pass that casts rays, on a device where its time is not known.
 const FIRST_RAYS: u64 = 1 << 18;
-/// Invocations of any other pass in its first band.
+/// Invocations in the first band of any other pass.
 const FIRST_TEXELS: u64 = 1 << 21;
-/// The least share of the last time that a newer measurement replaces it by: one fast picture does not make the bands of the next ones
-/// long.
+/// Least ratio of a new measured time to the previous one: a faster measurement lowers the time at most by this factor, so that one fast
+/// picture does not make the next bands too long.
 const DECAY: f64 = 0.75;
 
-/// How long dispatches are divided.
+/// How long dispatches are divided into bands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Bands {
     /// By measured time. Each loss of the device so far halves the time that a submission may take.
     Measured { losses: u32 },
-    /// Into bands of at most so many invocations, but at least one row of workgroups: for tests.
+    /// Into bands of at most this many invocations, but at least one row of workgroups: for tests.
     Fixed(u64),
 }
 
@@ -56,7 +57,7 @@ impl InvocationTime {
         }
     }
 
-    /// From now on each invocation is expected to take `factor` times as long, if that is longer.
+    /// From now on each invocation is expected to take `factor` times as long. A factor of at most 1 changes nothing.
     pub(crate) fn lengthen(&self, factor: f64) {
         if let Some(ns) = self.measured().filter(|_| factor.is_finite() && factor > 1.0) {
             self.0.store((factor * ns).to_bits(), Ordering::Relaxed);
@@ -71,10 +72,10 @@ pub(crate) struct Band {
     pub groups: [u32; 3],
 }
 
-/// What one submission may hold.
+/// The limit of one submission.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum BandLimit {
-    /// Time, ns; and how often the first bands are halved.
+    /// Time, ns, and how often the first bands are halved.
     Time { target: f64, halvings: u32 },
     /// Invocations of a band.
     Invocations(u64),
@@ -103,7 +104,7 @@ impl BandLimit {
         }
     }
 
-    /// Expected time of what is submitted at once, so that the device does not wait for the host between two bands.
+    /// Expected time of the work that is submitted at once, so that the device does not wait for the host between two bands.
     pub(crate) fn in_flight(&self) -> Duration {
         match *self {
             BandLimit::Time { target, .. } => Duration::from_nanos((2.0 * target) as u64),
@@ -112,7 +113,7 @@ impl BandLimit {
         }
     }
 
-    /// The expected time of a dispatch, ns; 0 under a limit of invocations.
+    /// Expected time of a dispatch, ns. 0 if the limit is a number of invocations.
     pub fn expected(&self, pass: &Pass, time: &InvocationTime, invocations: u64) -> f64 {
         let BandLimit::Time { target, halvings } = *self else { return 0.0 };
         let each = time.measured().unwrap_or_else(|| {
@@ -134,8 +135,8 @@ impl BandLimit {
         }
     }
 
-    /// The bands of a dispatch of so many workgroups, invocations, and this expected time. They are slabs along the axis with the most
-    /// workgroups.
+    /// The bands of a dispatch of `groups` workgroups and `invocations` invocations with this expected time, ns. They are slabs along the
+    /// axis with the most workgroups.
     pub fn bands(&self, groups: [u32; 3], invocations: u64, expected: f64) -> Vec<Band> {
         let count = match *self {
             BandLimit::Time { target, .. } => (expected / target).ceil() as u64,
@@ -162,16 +163,16 @@ fn after_losses(target: f64, losses: u32) -> f64 {
     (target / 2f64.powi(losses.min(64) as i32)).max(LEAST_NS)
 }
 
-/// Work in a submission whose time is measured: a pass, by the time of its invocations, and their number.
+/// A pass in a submission whose time is measured.
 #[derive(Clone, Debug)]
 pub struct Work {
     pub time: std::sync::Arc<InvocationTime>,
-    /// What it was expected to take, ns.
+    /// Expected time of the pass, ns.
     pub expected: f64,
     pub invocations: u64,
 }
 
-/// Notes that this work took so long together, ns. Where it is several passes, each took its share of what was expected.
+/// Notes the measured time of this work, ns. If it is several passes, each gets the share of the time that was expected of it.
 pub fn measured(work: &[Work], ns: f64) {
     let expected: f64 = work.iter().map(|w| w.expected).sum();
     for w in work.iter().filter(|w| w.invocations > 0) {

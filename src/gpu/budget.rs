@@ -1,16 +1,16 @@
 //! The budget of device memory (VK_EXT_memory_budget): how much this process can use now, beside all others. Beyond it a driver moves
-//! memory of this or another program out of the device, and everything becomes slow, or fails later.
+//! memory of this or another program out of the device. Everything then becomes slow, or an allocation fails later.
 
 use super::error::GpuError;
 use ash::vk;
 
-/// A heap of memory, bytes.
+/// A memory heap. All sizes are in bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct HeapBudget {
     pub size: u64,
-    /// What this process can use in all.
+    /// The most that this process can use at present.
     pub budget: u64,
-    /// What it uses now.
+    /// The amount that this process uses now.
     pub used: u64,
     pub is_device_local: bool,
 }
@@ -19,7 +19,7 @@ pub(crate) struct HeapBudget {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct MemoryBudget {
     pub(crate) heaps: Vec<HeapBudget>,
-    /// By memory type: its heap, and its properties.
+    /// For each memory type the index of its heap, and its properties.
     pub types: Vec<(usize, vk::MemoryPropertyFlags)>,
 }
 
@@ -43,11 +43,11 @@ impl MemoryBudget {
         }
     }
 
-    /// Refuses an allocation that fits into the budget of no heap it can be in. `types`: bits of the memory types that it can have;
-    /// `required`: properties that its type must have; `reserve`: bytes that this process has allocated and does not use.
+    /// Refuses an allocation that fits into the budget of no heap that it could use. `types`: bits of the allowed memory types; `required`:
+    /// properties that the type must have; `reserve`: bytes that this process has allocated but does not use.
     ///
     /// # Errors
-    /// One line with what is needed, the budget, and what is used of it.
+    /// One line with the needed size, the budget, and the used part of it.
     pub fn check(
         &self,
         what: impl FnOnce() -> String,
@@ -72,7 +72,7 @@ impl MemoryBudget {
         }
     }
 
-    /// The budgets of the device's own heaps, for a person; of all heaps if it has none of its own.
+    /// Describes the budgets of the device's own heaps in one line for users, or of all heaps if the device has none of its own.
     pub fn line(&self) -> String {
         let own = self.heaps.iter().any(|heap| heap.is_device_local);
         let heaps = self.heaps.iter().filter(|heap| heap.is_device_local || !own);

@@ -1,5 +1,5 @@
-//! Buffers that the host fills and the device reads, and those that take results back. The memory that is best to write is slow to read:
-//! it is not cached. So the first kind has no method that reads its memory, and the second lies in cached memory.
+//! Buffers that the host fills and the device reads, and buffers that return results. The memory that is fastest to write is slow to read,
+//! because it is not cached. So the first kind has no method that reads its memory, and the second kind lies in cached memory.
 
 use super::context::Context;
 use super::error::{ErrorContext, GpuError};
@@ -14,7 +14,7 @@ use std::mem::MaybeUninit;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// A buffer and its memory, mapped as long as it lives. The host only writes it.
+/// A buffer and its memory, which stays mapped as long as it lives. Only readback buffers are read by the host.
 pub struct Buffer {
     context: Arc<Context>,
     pub handle: vk::Buffer,
@@ -24,7 +24,7 @@ pub struct Buffer {
     allocation: Option<Allocation>,
 }
 
-/// The purpose of a buffer. It decides the kind of memory.
+/// The purpose of a buffer, which decides its kind of memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Purpose {
     /// A lookup table that shaders read.
@@ -35,7 +35,7 @@ pub enum Purpose {
     Staging,
     /// Results to download, read by the CPU.
     Readback,
-    /// Numbers of workgroups, which dispatches read.
+    /// Numbers of workgroups for indirect dispatches.
     Groups,
 }
 
@@ -46,9 +46,9 @@ pub(crate) fn has_texels(context: &Context, bytes: u64) -> bool {
     bytes >= 16 && bytes / 4 <= u64::from(context.candidate.limits.max_texel_buffer_elements)
 }
 
-/// The memory type for results that the host reads, and whether it is coherent. Reading uncached memory takes up to 87 times as long as
-/// reading cached memory, so cached memory that has to be invalidated is better than coherent memory that is not cached: several GPUs
-/// of Intel (GLK, MTL, ARL, LNL) have no type that is both.
+/// The index of the memory type for results that the host reads, and whether the type is coherent. Reading uncached memory takes up to 87
+/// times as long as reading cached memory. So cached memory that must be invalidated is preferred to coherent memory that is not cached:
+/// several GPUs of Intel (GLK, MTL, ARL, LNL) have no type that is both.
 fn readback_type(types: &[vk::MemoryType], allowed: u32) -> Option<(u32, bool)> {
     use vk::MemoryPropertyFlags as M;
     // Memory of this kind must not be allocated without its feature.
@@ -62,7 +62,7 @@ fn readback_type(types: &[vk::MemoryType], allowed: u32) -> Option<(u32, bool)> 
 
 impl Buffer {
     /// # Errors
-    /// A size that the device does not allow; out of memory; a device that fails.
+    /// The device does not allow the size, is out of memory, or fails.
     pub fn new(context: &Arc<Context>, name: &str, size: u64, purpose: Purpose) -> Result<Buffer, GpuError> {
         let operation = || format!("create buffer '{name}' ({} KiB)", size.div_ceil(1024));
         let usage = match purpose {
@@ -134,7 +134,7 @@ impl Buffer {
         self.texels[components.ilog2().min(2) as usize]
     }
 
-    /// The mapped bytes, to be written: they cannot be read through this type.
+    /// The mapped bytes, for writing only.
     pub fn space(&mut self) -> &mut [MaybeUninit<u8>] {
         let size = self.size as usize;
         let bytes = self.allocation.as_mut().and_then(|a| a.mapped_slice_mut()).unwrap_or(&mut []);
@@ -143,7 +143,7 @@ impl Buffer {
         unsafe { std::slice::from_raw_parts_mut(bytes.as_mut_ptr().cast(), length) }
     }
 
-    /// Writes bytes from byte `at` on. What is beyond the end of the buffer is left out.
+    /// Writes bytes at byte offset `at`. Bytes beyond the end of the buffer are left out.
     pub fn write(&mut self, at: usize, bytes: &[u8]) {
         let space = self.space().get_mut(at..).unwrap_or(&mut []);
         let length = space.len().min(bytes.len());
@@ -182,7 +182,7 @@ impl Drop for Buffer {
 pub struct Piece {
     pub parts: Range<u32>,
     pub rows: Range<u32>,
-    /// Where its texels are among those of all parts, which follow each other without gaps.
+    /// Their range among the bytes of all parts, which follow each other without gaps.
     bytes: Range<u64>,
 }
 
@@ -206,17 +206,17 @@ fn pieces(shape: Shape, texel_bytes: usize, parts: Range<u32>, most: u64) -> Vec
     cuts.map(|(part, row)| piece(part, 1, row..(row + rows).min(height))).collect()
 }
 
-/// Staging buffers with texels for parts of an image. There are several if one would be larger than the device allows.
+/// Staging buffers with the texels of parts of an image. There are several if one would be larger than the device allows.
 pub struct Upload {
     pieces: Vec<(Piece, Buffer)>,
 }
 
 impl Upload {
-    /// For an image of this shape and these bytes per texel. `bytes`: the texels of the parts, slice by slice; what is missing at their
-    /// end stays undefined.
+    /// Fills staging buffers for an image of this shape. `texel_bytes`: bytes of a texel; `bytes`: the texels of the parts, slice by slice.
+    /// Bytes that are missing at the end stay undefined.
     ///
     /// # Errors
-    /// Out of memory; a device that fails.
+    /// Memory is exhausted, or the device fails.
     pub fn new(
         context: &Arc<Context>,
         name: &str,
@@ -241,8 +241,8 @@ impl Upload {
     }
 }
 
-/// Buffers that take the texels of an image back, in memory that is fast to read. There are several if one would be larger than the
-/// device allows.
+/// Buffers that receive the texels of an image, in memory that is fast to read. There are several if one would be larger than the device
+/// allows.
 pub struct Readback {
     context: Arc<Context>,
     pieces: Vec<(Piece, Buffer)>,
@@ -254,7 +254,7 @@ impl Readback {
     /// Buffers for a complete image of this shape.
     ///
     /// # Errors
-    /// Out of memory; a device that fails.
+    /// Memory is exhausted, or the device fails.
     pub fn new(context: &Arc<Context>, name: &str, shape: Shape, texel_bytes: usize) -> Result<Readback, GpuError> {
         let cut = pieces(shape, texel_bytes, 0..shape.parts(), context.candidate.max_buffer);
         let made = |piece: Piece| {
@@ -270,10 +270,10 @@ impl Readback {
         self.pieces.iter().map(|(piece, buffer)| (piece, buffer))
     }
 
-    /// The bytes that the device wrote. It must be done.
+    /// The bytes that the device wrote. The device must have finished the copy.
     ///
     /// # Errors
-    /// A device that fails.
+    /// The device fails.
     pub fn bytes(&self) -> Result<Cow<'_, [u8]>, GpuError> {
         let stale: Vec<_> = self.pieces.iter().filter_map(|(_, buffer)| buffer.range_to_invalidate()).collect();
         if !stale.is_empty() && !self.context.faults.breaks(Command::Invalidate) {

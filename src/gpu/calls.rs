@@ -1,13 +1,14 @@
-//! Names the Vulkan calls in which a driver may crash or hang, just before each: a process that ends in one cannot name it afterwards.
+//! Reports the name of each Vulkan call in which a driver may crash or hang, just before the call: a process that ends in the call cannot
+//! name it afterwards.
 
 use std::sync::OnceLock;
 
-/// Is told the name of a call, and of what it is made for.
+/// Receives the name of a call, and of the object that it is made for.
 pub type Told = fn(call: &'static str, of: &str);
 
 static TOLD: OnceLock<Told> = OnceLock::new();
 
-/// From now on `told` is called before such calls, on whatever thread makes them. The first of several stays.
+/// From now on `told` is called before such calls, on the thread that makes them. Only the first call of this function has an effect.
 pub fn tell(told: Told) {
     let _ = TOLD.set(told);
 }

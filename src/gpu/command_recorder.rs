@@ -30,7 +30,7 @@ const STAMPS: u32 = 1024;
 /// Maximum number of submissions of a command buffer whose time stamps wait to be read.
 const MAX_UNREAD: usize = 64;
 
-/// A dispatch of a pass, and everything it runs on.
+/// A dispatch of a pass with everything that it needs.
 #[derive(Clone, Copy)]
 pub struct Dispatch<'a> {
     pub slots: &'a SlotResources,
@@ -48,20 +48,20 @@ pub(crate) struct SlotParts {
     pub parts: Range<u32>,
 }
 
-/// Where texels that are copied lie in a buffer. Lengths of 0: they fill it, row after row.
+/// Layout of copied texels in a buffer. Lengths of 0 mean that the rows follow each other without gaps.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct BufferLayout {
-    /// Byte offset of the first.
+    /// Byte offset of the first texel.
     pub offset: u64,
-    /// Texels from one row to the next.
+    /// Texels from the beginning of one row to the next.
     pub row_length: u32,
-    /// Rows from one image to the next.
+    /// Rows from the beginning of one image to the next.
     pub image_height: u32,
-    /// Bytes from one part to the next, where the last part comes first.
+    /// Bytes from one part to the next, if the parts lie in descending order. None if they ascend.
     pub descending: Option<u64>,
 }
 
-/// Command buffers that are recorded and submitted again and again. One is enough, except for work in bands.
+/// Command buffers that are recorded and submitted repeatedly. A recording needs one, and more only for work in bands.
 pub(crate) struct CommandRecorder {
     context: Arc<Context>,
     pool: vk::CommandPool,
@@ -86,11 +86,11 @@ pub(crate) struct CommandRecorder {
     /// Time stamps that were read, for later submissions.
     spare: Vec<Stamps>,
     time_stamps: TimeStamps,
-    /// How often each pass and copy of the recording counts as run: once for each frame of a batch.
+    /// How many runs each pass and copy of the recording counts as: one for each frame of a batch.
     pub runs: u32,
     /// Invocations are counted.
     statistics: bool,
-    /// The value of the timeline at which the last submission is done.
+    /// Value of the queue's timeline at which the last submission is done.
     done_at: u64,
     /// The last submission whose times were added.
     collected_to: u64,
@@ -100,7 +100,7 @@ pub(crate) struct CommandRecorder {
 }
 
 impl CommandRecorder {
-    /// With `statistics`, the invocations of every dispatch that is timed are counted, if the device can.
+    /// With `statistics`, the invocations of every timed dispatch are counted, if the device supports that.
     pub fn new(
         context: &Arc<Context>,
         queue: usize,
@@ -197,7 +197,7 @@ impl CommandRecorder {
         Ok(())
     }
 
-    /// Ends the recording here and continues it in another command buffer, which is submitted on its own.
+    /// Ends the command buffer here and continues the recording in another one. Each is submitted on its own.
     pub fn cut(&mut self, queues: &mut DeviceQueues) -> Result<(), GpuError> {
         self.submit(queues)?;
         // Where each pass is timed, that of a band is a run of its own.
@@ -235,7 +235,7 @@ impl CommandRecorder {
         }
     }
 
-    /// Adds the times of the last submission, and of those that were set aside, once, when they are done.
+    /// Adds the times of the last submission, and of those that were set aside, once they are done. Each is added once.
     pub fn collect(&mut self, queues: &mut DeviceQueues) -> Result<(), GpuError> {
         let (bits, period) =
             (self.context.queue(self.queue).valid_bits, self.context.candidate.limits.timestamp_period);
@@ -255,8 +255,8 @@ impl CommandRecorder {
         Ok(())
     }
 
-    /// Waits for the last submission, and keeps its time stamps for a later [`CommandRecorder::collect`]. Where too many wait already, its work is
-    /// counted as not timed.
+    /// Waits for the last submission, and keeps its time stamps for a later [`CommandRecorder::collect`]. If too many are kept already, its
+    /// work counts as not timed.
     pub fn set_aside(&mut self, queues: &mut DeviceQueues) -> Result<(), GpuError> {
         self.wait(queues)?;
         if self.collected_to == self.done_at {
@@ -286,7 +286,7 @@ impl CommandRecorder {
         queues.timelines.of(self.queue).is_done(self.done_at)
     }
 
-    /// Submits the recording, after waits for other queues.
+    /// Submits the recording. The queue first waits for the other queues that it depends on.
     pub fn submit(&mut self, queues: &mut DeviceQueues) -> Result<(), GpuError> {
         if let Some(stamps) = self.stamps.as_mut().filter(|_| self.time_stamps == TimeStamps::Ends) {
             stamps.end_of(self.commands, self.label, self.runs, std::mem::take(&mut self.open));
@@ -306,7 +306,7 @@ impl CommandRecorder {
         Ok(())
     }
 
-    /// Records a dispatch, with the barrier that it needs; with `limit`, in the bands that it allows, each in a submission of its own.
+    /// Records a dispatch with the barrier that it needs. With `limit` it is divided into bands, each in a submission of its own.
     ///
     /// # Errors
     /// More parameters than one command buffer can hold; a device that fails.
@@ -453,7 +453,7 @@ impl CommandRecorder {
         Ok(offset)
     }
 
-    /// Where each pass is timed, writes a time stamp; the work since the last one is called `name`.
+    /// If each pass is timed, writes a time stamp. The work since the previous stamp is named `name`.
     ///
     /// # Errors
     /// A device that fails, where CPU time is counted.
@@ -515,7 +515,7 @@ enum DescriptorInfo {
 }
 
 impl CommandRecorder {
-    /// Binds the slots by the names that the shader gives them, and the parameters.
+    /// Binds the slots under the names that the shader gives them, and the parameters.
     fn bind(&mut self, dispatch: &Dispatch, params_offset: u64, params_size: u64) -> Result<(), GpuError> {
         let Dispatch { slots, pipeline, scene, pass, args } = *dispatch;
         let binds = [pass.reads(scene, args), pass.writes(scene, args)].concat();
@@ -680,15 +680,15 @@ impl CommandRecorder {
         }
     }
 
-    /// Says by a barrier that everything submitted so far was waited for, where the layer does not see waits for timelines. A layer that
-    /// sees them gets no barrier.
+    /// Records a barrier that states that everything submitted so far has finished, for a validation layer that does not see waits for
+    /// timelines. For other layers nothing is recorded.
     pub(crate) fn show_layer_the_wait(&self) {
         if self.context.layer_misses_waits() {
             flush(&self.context.device, self.commands, vk::AccessFlags2::MEMORY_READ | vk::AccessFlags2::MEMORY_WRITE);
         }
     }
 
-    /// Copies everything that an upload holds into its parts of an image.
+    /// Copies the content of an upload into its parts of an image.
     pub fn upload(&mut self, queues: &mut DeviceQueues, from: &Upload, image: &Image, to: SlotParts) {
         self.barrier(queues, &[Access::of_slot(to.slot, to.copy, to.parts, true, PipelineStage::Copy)]);
         for (piece, buffer) in from.pieces() {

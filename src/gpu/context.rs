@@ -1,5 +1,5 @@
-//! Instance, device, queues and memory allocator. Everything made from a context holds an `Arc` of it, and its `Drop` destroys them in
-//! order.
+//! Instance, device, queues and memory allocator. Every object that is made from a context holds an `Arc` of it. The `Drop` of a context
+//! destroys its parts in order.
 
 use super::budget::MemoryBudget;
 use super::calls;
@@ -24,39 +24,41 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, Weak};
 use std::time::Instant;
 
-/// 64 MiB where a driver keeps 256 KiB for a pipeline, and 0.8 GiB on lavapipe, which keeps 3 MiB.
+/// Limit of unused pipelines. They take 64 MiB with a driver that keeps 256 KiB for a pipeline, and 0.8 GiB with lavapipe, which keeps 3
+/// MiB.
 const MAX_UNUSED_PIPELINES: usize = 256;
 
 /// Size of a block of memory on a software device, bytes.
 const SOFTWARE_BLOCK: u64 = 8 << 20;
 
-/// Which device a [`Context`] uses, and how.
+/// The device that a [`Context`] uses, and how.
 #[derive(Clone, Debug)]
 pub struct ContextOptions {
     /// The device. The default is the best one.
     pub device: DeviceChoice,
-    /// Enables core and synchronization validation; every message is kept in [`Context::messages`].
+    /// Enables core and synchronization validation. Every message is kept in [`Context::messages`].
     pub validation: bool,
-    /// When a device that does not finish is given up.
+    /// Time after which a device that does not finish is given up.
     pub deadline: Deadline,
-    /// Asked during every wait for the device. Once it returns true, the wait ends after less than a second, and the device is given up
-    /// if it is still busy.
+    /// Is called during every wait for the device. Once it returns true, the wait ends within a second, and the device is given up if it is
+    /// still busy.
     pub stop: Option<fn() -> bool>,
-    /// The folder in which compiled pipelines are kept for the next run; `None` keeps none.
+    /// The folder in which compiled pipelines are stored for the next run. `None`: they are not stored.
     pub pipeline_cache: Option<PathBuf>,
-    /// Pipelines can be asked for the driver's statistics of their compilation, if the device has
+    /// If true, the driver's statistics on the compilation of pipelines can be read, if the device has
     /// VK_KHR_pipeline_executable_properties.
     pub compile_statistics: bool,
-    /// Gives the driver modules without specialization constants and without the branches that their values never take. Validation layers
-    /// then validate each module once instead of each pipeline. `None`: on a software device. lavapipe looks at every instruction
-    /// of each pipeline, and a first picture takes less than half of the time; the compilers of some GPUs take more registers.
+    /// Gives the driver shader modules without specialization constants and without the branches that their values never take. Validation
+    /// layers then validate each module once instead of each pipeline. `None`: only on a software device. lavapipe processes every
+    /// instruction of each pipeline, so that the first picture takes less than half of the time; the compilers of some GPUs then use more
+    /// registers.
     pub specialize: Option<bool>,
-    /// Most pipelines kept that no plan uses, at least 1. Going back to what was forgotten compiles it again.
+    /// Most compiled pipelines that are kept although no plan uses them, at least 1. Returning to a forgotten pipeline compiles it again.
     pub max_unused_pipelines: usize,
 }
 
 impl Default for ContextOptions {
-    /// The best device without validation, and nothing kept for the next run.
+    /// The best device, without validation and without stored pipelines.
     fn default() -> ContextOptions {
         ContextOptions {
             device: DeviceChoice::default(),
@@ -71,18 +73,18 @@ impl Default for ContextOptions {
     }
 }
 
-/// A Vulkan device, opened. Everything that runs on it is made from an `Arc` of this.
+/// An open Vulkan device. Every object on the device is made from an `Arc` of this.
 pub struct Context {
     /// The loader stays loaded as long as anything made from it lives.
     pub(super) entry: ash::Entry,
     pub(super) instance: ash::Instance,
-    /// For a context that presents pictures.
+    /// Of a context that presents pictures.
     pub(super) presentation: Option<Presentation>,
     /// With validation.
     messenger: Option<Messenger>,
     pub candidate: Candidate,
     pub device: ash::Device,
-    /// `None` if the device cannot push descriptors: they are then sets of a pool.
+    /// `None` if the device has no push descriptors. Sets of a pool are then used.
     pub push_descriptor: Option<ash::khr::push_descriptor::Device>,
     /// Reads the device's clock, if the device can.
     clock: Option<ash::ext::calibrated_timestamps::Device>,
@@ -94,7 +96,8 @@ pub struct Context {
     /// See [`ContextOptions::max_unused_pipelines`].
     pub(super) max_unused_pipelines: usize,
     pub(super) pipeline_cache: PipelineCache,
-    /// What the renderers of the device share while one of them holds it: [`super::pipelines::Pipelines`], whose module depends on this one.
+    /// State that the renderers of the device share while one of them holds it: [`super::pipelines::Pipelines`], whose module depends on
+    /// this one.
     pub(super) shared: Mutex<Vec<Weak<dyn Any + Send + Sync>>>,
     /// Reports why the device was lost.
     pub(super) loss: LossReporting,
@@ -123,14 +126,14 @@ pub(crate) struct Presentation {
     pub waits: Option<ash::khr::present_wait::Device>,
 }
 
-/// A reading of the device's clock and the host's.
+/// A simultaneous reading of the device's clock and the host's.
 pub(super) struct ClockReading {
     pub ticks: u64,
     /// The host's monotonic clock, ns, if the driver reads it in the same call.
     pub monotonic: Option<u64>,
     /// The host's clock around the call.
     pub at: Instant,
-    /// The largest time between the readings, ns.
+    /// Largest time between the readings, ns.
     pub deviation: u64,
 }
 
@@ -160,8 +163,9 @@ pub fn list() -> Result<Vec<Candidate>, GpuError> {
     candidates
 }
 
-/// Sizes of the blocks of memory. What is larger than a block has one of its own, which is given back at once. On a GPU that takes time, on a software device
-/// blocks are memory of the machine: after a resize large ones would keep what the larger window had touched of them.
+/// Sizes of the blocks of device memory. An allocation larger than a block has a block of its own, which is freed at once. On a GPU that
+/// takes time. On a software device the blocks are memory of the machine: large ones would, after a resize, keep the pages that the larger
+/// window used.
 fn block_sizes(candidate: &Candidate) -> AllocationSizes {
     match candidate.is_software() {
         true => AllocationSizes::new(SOFTWARE_BLOCK, SOFTWARE_BLOCK),
@@ -302,8 +306,8 @@ impl Context {
         self.messenger.as_ref().map(Messenger::messages).unwrap_or_default()
     }
 
-    /// True if hazards between submissions that validation reports are real. Older layers ignore that a queue waits for the timeline
-    /// of another; with a single queue that does not matter.
+    /// True if the hazards between submissions that validation reports are real. Older layers ignore that a queue waits for the timeline of
+    /// another queue; with a single queue that does not matter.
     pub fn validates_timelines(&self) -> bool {
         !self.layer_misses_waits() || self.queue_count() == 1
     }
@@ -322,7 +326,7 @@ impl Context {
         own.map(|heap| heap.size).sum()
     }
 
-    /// The clock of the device and that of the host, read by one call; `None` if the device's clock cannot be read.
+    /// Reads the clock of the device and that of the host in one call. `None` if the device's clock cannot be read.
     pub(super) fn device_ticks(&self) -> Option<ClockReading> {
         let clock = self.clock.as_ref()?;
         let domain = |domain| vk::CalibratedTimestampInfoEXT::default().time_domain(domain);
@@ -342,7 +346,8 @@ impl Context {
         })
     }
 
-    /// The host's clock, and the same instant on the monotonic clock that the driver reads, ns, if it does.
+    /// The host's clock, and the same instant on the monotonic clock that the driver reads, ns. The second is None if the driver does not
+    /// read that clock.
     pub(super) fn clocks_now(&self) -> (Instant, Option<u64>) {
         let asked = [vk::CalibratedTimestampInfoEXT::default().time_domain(vk::TimeDomainEXT::CLOCK_MONOTONIC)];
         let read = || {
@@ -406,7 +411,8 @@ impl Context {
         }
     }
 
-    /// The queue for this role; with fewer queues on the device than roles, several roles share the last one.
+    /// The queue for a role: 0 renders, 1 ingests frames, 2 copies them. If the device has fewer queues than roles, several roles share the
+    /// last one.
     pub fn queue(&self, number: usize) -> QueueInfo {
         self.candidate.queues[number.min(self.queues.len() - 1)]
     }
@@ -449,15 +455,15 @@ impl Context {
     /// Waits for a fence of a submission that was made at `since`.
     ///
     /// # Errors
-    /// A device that fails or is given up.
+    /// The device fails or is given up.
     pub(super) fn wait_fence(&self, fence: vk::Fence, since: Instant, operation: &str) -> Result<(), GpuError> {
         // SAFETY: the fence is alive; it is signalled, or a submission in flight will signal it.
         let attempt = |ns| unsafe { self.device.wait_for_fences(&[fence], true, ns) };
         self.watchdog.wait(&|| operation.into(), || since, attempt)
     }
 
-    /// True once the device did not finish in time, or was busy when the program had to end. What was made from the context is then
-    /// leaked, not destroyed, and so is the context: the device may still use all of it.
+    /// True once the device did not finish in time, or was busy when the program had to end. Objects of the context are then leaked instead
+    /// of destroyed, and so is the context: the device may still use them.
     pub fn is_given_up(&self) -> bool {
         self.watchdog.has_given_up()
     }
@@ -491,26 +497,27 @@ impl Context {
         work(*self.queues[0].lock().unwrap_or_else(|e| e.into_inner()))
     }
 
-    /// Older layers do not see that a timeline is waited for: they keep what every submission read and wrote until they see an idle
-    /// queue, which was 1 GiB after some minutes of verification. To be called after a wait for the last submission of a timeline.
+    /// Shows an older validation layer an idle queue. Such a layer does not see that a timeline is waited for: it keeps what every
+    /// submission read and wrote until it sees an idle queue, which took 1 GiB after some minutes of verification. Call it after a wait for
+    /// the last submission of a timeline.
     ///
     /// # Errors
-    /// A device that fails or is given up.
+    /// The device fails or is given up.
     pub(super) fn show_layer_an_idle_queue(&self) -> Result<(), GpuError> {
         let is_due = self.queues.len() == 1 && self.messenger.as_ref().is_some_and(Messenger::needs_an_idle_queue);
         if is_due { self.wait_queue(0) } else { Ok(()) }
     }
 
-    /// As [`Context::show_layer_an_idle_queue`], at once and on any number of queues: to be called where another timeline goes on with what the first
-    /// queue wrote, which an older layer would report as a hazard.
+    /// As [`Context::show_layer_an_idle_queue`], but at once and on any number of queues. Call it before another timeline uses what the
+    /// first queue wrote: an older layer would report a hazard.
     ///
     /// # Errors
-    /// A device that fails or is given up.
+    /// The device fails or is given up.
     pub(super) fn show_layer_the_wait(&self) -> Result<(), GpuError> {
         if self.layer_misses_waits() { self.wait_queue(0) } else { Ok(()) }
     }
 
-    /// True if validation is on and its layer is one of those that do not see that a timeline is waited for.
+    /// True if validation is on and its layer does not see waits for timelines.
     pub(super) fn layer_misses_waits(&self) -> bool {
         self.messenger.as_ref().is_some_and(Messenger::misses_waits)
     }
@@ -518,7 +525,7 @@ impl Context {
     /// Waits until a queue has done what was submitted to it so far.
     ///
     /// # Errors
-    /// A device that fails or is given up.
+    /// The device fails or is given up.
     fn wait_queue(&self, queue: usize) -> Result<(), GpuError> {
         let (begun, operation) = (Instant::now(), || "wait for an idle queue".to_string());
         // vkQueueWaitIdle has no time-out; a fence behind everything that was submitted has one.
@@ -538,7 +545,7 @@ impl Context {
     /// Waits until the device is idle.
     ///
     /// # Errors
-    /// A device that fails, and is then idle, or one that is given up.
+    /// The device fails, and is then idle, or it is given up.
     pub(super) fn wait_idle(&self) -> Result<(), GpuError> {
         self.counts.waits_idle.fetch_add(1, Ordering::Relaxed);
         let operation = || "wait for an idle device".to_string();
@@ -595,12 +602,12 @@ fn load() -> Result<ash::Entry, GpuError> {
     unsafe { ash::Entry::load() }.map_err(|e| GpuError::NoLoader(e.to_string()))
 }
 
-/// Destroys an instance, but for the first of the process. The loader unloads drivers with the last instance and loads them again for the next,
-/// and what NVIDIA's driver 580 takes of the memory for thread-local variables is lost each time: after some 40 contexts, one after the other, no
-/// device was left. A kiosk that lost its device as often would have ended.
+/// Destroys an instance, but keeps the first one of the process. The loader unloads the drivers with the last instance and loads them again
+/// for the next. Each time NVIDIA's driver 580 loses the memory that it takes for thread-local variables: after some 40 contexts, one after
+/// the other, no device was left. A kiosk that lost its device as often would end.
 ///
 /// # Safety
-/// Nothing made from the instance is left.
+/// No object of the instance may be left.
 unsafe fn end_instance(entry: &ash::Entry, instance: &ash::Instance) {
     static HAS_KEPT_ONE: AtomicBool = AtomicBool::new(false);
     if HAS_KEPT_ONE.swap(true, Ordering::Relaxed) {

@@ -1,4 +1,4 @@
-//! Descriptor sets for devices without push descriptors, from pools that count what is left in them.
+//! Descriptor sets for devices without push descriptors, from pools whose free space is counted.
 
 use super::context::Context;
 use super::error::{ErrorContext, GpuError};

@@ -1,4 +1,5 @@
-//! The queues of a device, as one user of them sees it: the barriers and waits that order its work, what of that is done, and how long it took.
+//! The queues of a device as one renderer uses them: the barriers and waits that order its work, which submissions are done, and their
+//! times.
 
 use super::context::Context;
 use super::error::GpuError;
@@ -10,8 +11,8 @@ use crate::queues::{QueueTracker, Wait};
 use ash::vk;
 use std::sync::Arc;
 
-/// What orders everything that uses the same slots, a count of its barriers, and its times. It records the barriers that [`crate::barriers`] derives
-/// as Vulkan commands.
+/// Orders all operations that use the same slots, and counts their barriers and times. It records the barriers that [`crate::barriers`]
+/// derives as Vulkan commands.
 pub(crate) struct DeviceQueues {
     pub tracker: QueueTracker,
     pub(super) timelines: Timelines,
@@ -27,7 +28,7 @@ pub(crate) struct DeviceQueues {
 }
 
 impl DeviceQueues {
-    /// The first `count` queues. `spans`: each operation of host and device has its span.
+    /// Uses the first `count` queues. `spans`: records a span for each operation of host and device.
     pub fn new(context: &Arc<Context>, count: usize, spans: bool) -> Result<DeviceQueues, GpuError> {
         Ok(DeviceQueues {
             tracker: QueueTracker::new(count),

@@ -1,4 +1,4 @@
-//! Device selection: the properties of each device, what it lacks, and which one is used.
+//! Device selection: the properties of each device, the features that it lacks, and the choice of one.
 
 use super::budget::MemoryBudget;
 use super::calls;
@@ -40,34 +40,34 @@ pub struct Candidate {
     pub missing: Vec<Cow<'static, str>>,
     /// Optional features that the device lacks, with the consequence.
     pub missing_optional: Vec<&'static str>,
-    /// The queues to use: the first renders, the second (if any) ingests frames, the third (if any) copies them.
+    /// The queues to use: the first renders, the second (if any) ingests frames, and the third (if any) copies them.
     pub queues: Vec<QueueInfo>,
     /// Time stamps can be converted to the host's clock.
     pub calibrated_timestamps: bool,
-    /// The same call reads the host's monotonic clock.
+    /// The host's monotonic clock can be read in the same call.
     pub(crate) reads_monotonic: bool,
     /// Supports push descriptors.
     pub(crate) push_descriptors: bool,
     /// Can count shader invocations.
     pub pipeline_statistics: bool,
-    /// Can tell statistics of the compilation of pipelines.
+    /// Can report statistics on the compilation of pipelines.
     pub compile_statistics: bool,
     /// Can present pictures, with panels drawn over them.
     pub can_present: bool,
-    /// What its pipelines may be loaded by.
+    /// Identity of the device and driver that stored pipelines must match.
     pub(crate) driver_identity: DriverIdentity,
     /// Reports when a picture is on the monitor.
     pub(crate) present_wait: bool,
-    /// Reports why it was lost.
+    /// Reports why the device was lost.
     pub(crate) device_fault: bool,
-    /// Reports the passes that its queues had reached when it was lost.
+    /// Reports the passes that its queues had reached when the device was lost.
     pub checkpoints: bool,
-    /// The budget of its memory when it was listed, if it reports one.
+    /// The memory budget at the time of listing, if the device reports one.
     pub budget: Option<MemoryBudget>,
     pub limits: vk::PhysicalDeviceLimits,
-    /// The largest allocation, bytes: the limit of an image.
+    /// Largest allocation, bytes: the limit of an image.
     pub max_allocation: u64,
-    /// The largest buffer, bytes. Several drivers allow 2 GiB only, and far larger images.
+    /// Largest buffer, bytes. Several drivers allow 2 GiB only, but far larger images.
     pub max_buffer: u64,
 }
 
@@ -75,9 +75,9 @@ pub struct Candidate {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct QueueInfo {
     pub family: u32,
-    /// Within its family.
+    /// Index within the family.
     pub index: u32,
-    /// Valid bits of its time stamps; 0 without time stamps.
+    /// Number of valid bits of its time stamps; 0 if it has none.
     pub valid_bits: u32,
     pub computes: bool,
     pub draws: bool,
@@ -90,7 +90,7 @@ impl Candidate {
         self.kind == vk::PhysicalDeviceType::CPU
     }
 
-    /// True if half-precision floats are truncated where shaders store them. Vulkan allows that; llvmpipe does it in every version
+    /// True if half-precision floats are truncated when shaders store them. Vulkan allows that. llvmpipe does it in every version
     /// (`lp_build_float_to_half` of Mesa), and a test measures it. GPUs round.
     pub fn truncates_halves(&self) -> bool {
         self.is_software() && self.name.contains("llvmpipe")
@@ -101,7 +101,7 @@ impl Candidate {
         self.is_software() || self.kind == vk::PhysicalDeviceType::INTEGRATED_GPU
     }
 
-    /// Valid bits of the time stamps of the rendering queue; 0 without time stamps.
+    /// Number of valid bits of the time stamps of the rendering queue; 0 if it has none.
     pub fn valid_bits(&self) -> u32 {
         self.queues.first().map_or(0, |q| q.valid_bits)
     }
@@ -329,7 +329,7 @@ fn queues(families: &[vk::QueueFamilyProperties]) -> Vec<QueueInfo> {
 /// The index of the chosen device.
 ///
 /// # Errors
-/// No such device, or one that lacks a required feature.
+/// There is no such device, or it lacks a required feature.
 pub fn choose(candidates: &[Candidate], choice: &DeviceChoice) -> Result<usize, GpuError> {
     let names = || candidates.iter().enumerate().map(|(i, c)| format!("{i} {}", c.name)).collect::<Vec<_>>().join(", ");
     if candidates.is_empty() {

@@ -1,8 +1,8 @@
-//! Errors of the GPU, each with the operation that failed.
+//! Errors of the GPU, each with the name of the failed operation.
 
 use ash::vk;
 
-/// An error of Vulkan, of the device's limits, or in the use of a renderer.
+/// An error of Vulkan, a violated limit of the device, or wrong use of a renderer.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum GpuError {
@@ -55,13 +55,13 @@ pub enum GpuError {
 }
 
 impl GpuError {
-    /// True if the device was lost, or was given up because it did not finish: everything has to be recreated from a new context.
+    /// True if the device was lost or was given up because it did not finish. Everything must then be made again from a new context.
     pub fn is_device_lost(&self) -> bool {
         matches!(self, GpuError::Vulkan { result: vk::Result::ERROR_DEVICE_LOST, .. } | GpuError::Lost { .. })
             || self.is_given_up()
     }
 
-    /// True if the device did not finish and was given up.
+    /// True if the device was given up because it did not finish.
     pub fn is_given_up(&self) -> bool {
         matches!(self, GpuError::TimedOut { .. } | GpuError::Stopped { .. })
     }

@@ -22,7 +22,7 @@ pub enum InjectionPoint {
     Acquire,
 }
 
-/// How a call fails, for modules that do not use Vulkan's types.
+/// How a call fails, for modules that do not use types of Vulkan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InjectedFailure {
     OutOfDeviceMemory,
@@ -42,16 +42,16 @@ impl InjectedFailure {
     }
 }
 
-/// What newly allocated memory holds.
+/// The content of newly allocated memory.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Poison {
-    /// Texels of float formats.
+    /// Value of texels of float formats.
     pub float: f32,
-    /// Texels of normalized formats, 0..1.
+    /// Value of texels of normalized formats, 0..1.
     pub normalized: f32,
-    /// Texels of integer formats.
+    /// Value of texels of integer formats.
     pub integer: u32,
-    /// Each byte of a buffer.
+    /// Value of each byte of a buffer.
     pub byte: u8,
 }
 
@@ -116,12 +116,12 @@ impl Faults {
         }
     }
 
-    /// The `after`-th submission from now (0: the next) and all later ones never reach the device, as if it hung.
+    /// The `after`-th submission from now (0: the next) and all later ones never reach the device, which then appears to hang.
     pub fn hang(&self, after: u32) {
         *self.hang.lock().unwrap_or_else(|e| e.into_inner()) = Some(after);
     }
 
-    /// True if the device hangs at this submission.
+    /// True if the device must appear to hang at this submission.
     pub(super) fn keeps_submission(&self) -> bool {
         let mut hang = self.hang.lock().unwrap_or_else(|e| e.into_inner());
         match hang.as_mut() {
@@ -134,8 +134,8 @@ impl Faults {
         }
     }
 
-    /// From now on the host waits for each submission before the next. This is no fault: it hides those of synchronization, which tells
-    /// them from others.
+    /// From now on the host waits for each submission before the next. This is not a fault: it hides faults of synchronization, and so
+    /// distinguishes them from others.
     pub fn wait_for_each_submission(&self) {
         self.waits.store(true, Ordering::Relaxed);
     }
@@ -144,7 +144,7 @@ impl Faults {
         self.waits.load(Ordering::Relaxed)
     }
 
-    /// While it is set, a picture in flight counts as being drawn, as on a device that takes long for it.
+    /// While it is set, a picture in flight counts as not done, as on a slow device.
     pub fn hold_pictures(&self, holds: bool) {
         self.holds_pictures.store(holds, Ordering::Relaxed);
     }
@@ -158,7 +158,7 @@ impl Faults {
         *self.planned.lock().unwrap_or_else(|e| e.into_inner()) = None;
     }
 
-    /// From now on the driver reports this of a lost device.
+    /// From now on the driver reports this loss of the device.
     pub fn report_loss(&self, report: LossReport) {
         *self.loss.lock().unwrap_or_else(|e| e.into_inner()) = Some(report);
     }
@@ -172,7 +172,7 @@ impl Faults {
         self.loss.lock().unwrap_or_else(|e| e.into_inner()).clone()
     }
 
-    /// From now on the device reports that its memory has room for so many bytes of allocations more.
+    /// From now on the device reports a memory budget with room for `bytes` bytes of further allocations.
     pub fn limit_memory(&self, bytes: u64) {
         let heap = HeapBudget { size: bytes, budget: bytes, used: 0, is_device_local: true };
         let types = vec![(0, vk::MemoryPropertyFlags::from_raw(u32::MAX)); 32];
@@ -183,7 +183,8 @@ impl Faults {
         self.budget.lock().unwrap_or_else(|e| e.into_inner()).clone()
     }
 
-    /// From now on new memory holds this; slots that must start with zeros still do ([`Slot::starts_clear`](crate::passes::Slot::starts_clear)).
+    /// From now on new memory holds this content. Slots that must start with zeros still do
+    /// ([`Slot::starts_clear`](crate::passes::Slot::starts_clear)).
     pub fn poison(&self, poison: Option<Poison>) {
         *self.poison.lock().unwrap_or_else(|e| e.into_inner()) = poison;
     }
@@ -192,7 +193,7 @@ impl Faults {
         *self.poison.lock().unwrap_or_else(|e| e.into_inner())
     }
 
-    /// From now on each dispatch of the pass runs this many times; the results stay the same. 0 leaves it out.
+    /// From now on each dispatch of the pass runs `times` times; the results stay the same. 0 leaves the dispatch out.
     pub fn slow_down(&self, pass: &'static str, times: u32) {
         *self.slow.lock().unwrap_or_else(|e| e.into_inner()) = Some((pass, times));
     }
@@ -204,13 +205,13 @@ impl Faults {
         }
     }
 
-    /// Changes what the device receives, as long as the context lives. To be called before anything is made from the context; only the
-    /// first call has an effect.
+    /// Changes what the device receives, as long as the context lives. Call it before anything is made from the context. Only the first
+    /// call has an effect.
     pub fn inject_change(&self, change: Change) {
         self.change.get_or_init(|| change);
     }
 
-    /// How often the injected change has changed something.
+    /// Number of times that the injected change has changed something.
     pub fn change_count(&self) -> u64 {
         self.changes.load(Ordering::Relaxed)
     }
@@ -223,7 +224,7 @@ impl Faults {
         changed
     }
 
-    /// True if the driver is to carry out this command wrongly.
+    /// True if the driver must carry out this command wrongly.
     pub(super) fn breaks(&self, command: Command) -> bool {
         self.apply(|change| matches!(change, Change::Command(broken) if *broken == command))
     }

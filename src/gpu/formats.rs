@@ -1,4 +1,4 @@
-//! Slot formats as Vulkan formats, and what the device can do with them.
+//! Slot formats as Vulkan formats, and their support by the device.
 
 use super::context::Context;
 use super::device_selection::Candidate;
@@ -20,13 +20,12 @@ pub enum TexelAccess {
 }
 
 impl TexelAccess {
-    /// What is fast on a device. A software device runs its complete sampler for every fetch; on a GPU textures have their own
-    /// caches.
+    /// The fast access for a device. A software device runs its complete sampler for every fetch; on a GPU textures have their own caches.
     pub fn for_device(candidate: &Candidate) -> TexelAccess {
         if candidate.is_software() { TexelAccess::Storage } else { TexelAccess::Textures }
     }
 
-    /// The sampling that `auto` selects.
+    /// The sampling that the setting `auto` selects.
     pub fn sampling(self) -> Sampling {
         if self == TexelAccess::Storage { Sampling::PackedNeighbours } else { Sampling::Hardware }
     }
@@ -94,10 +93,10 @@ fn features(context: &Context, slot: Slot, scene: &Scene) -> vk::FormatFeatureFl
 /// Frames whose slots of stage 1 stay in the caches of a CPU.
 const FRAMES_IN_CACHE: u32 = 4;
 
-/// The scene with the fields that the device resolves: the fastest sampling, which reads eight texels if texels are loaded or the
-/// device cannot filter the volume's format; no packed neighbours if the device cannot hold them; a volume in the format that the
-/// device stores best; a picture in the format of the window; and the shared
-/// memory of a GPU. On a CPU few frames go through stage 1 at once: their slots stay in its caches.
+/// Sets the fields of a scene that depend on the device. Sampling is the fastest one, which reads eight texels if texels are loaded or if
+/// the device cannot filter the volume's format. Packed neighbours are left out if the device cannot hold them. The volume has the format
+/// that the device stores best, the picture the format of the window, and passes use shared memory on a GPU. On a CPU few frames go through
+/// stage 1 at once, so that their slots stay in its caches.
 pub fn adapt_scene(context: &Context, texel_access: TexelAccess, mut scene: Scene) -> Scene {
     scene.truncates_halves = context.candidate.truncates_halves();
     let filters = filters(context, Slot::Volume.format(&scene));
@@ -217,7 +216,7 @@ pub struct FormatSupport {
     pub max_extent: [u32; 3],
 }
 
-/// All formats of slots, with all uses that slots make of them.
+/// Lists all formats of slots with all uses that slots make of them.
 pub fn format_support(context: &Context) -> Vec<FormatSupport> {
     let formats = [
         Format::R8,

@@ -1,10 +1,10 @@
-//! Memory of the process that was freed and that the C library keeps. A driver that compiles on the CPU, as lavapipe does with LLVM, has some
-//! hundred MiB for the pipelines of a device. glibc keeps what is freed in arenas, one for several threads, and the threads that compile
-//! for the next device may use another arena than those before: without giving it back the process holds each arena at its largest.
-//! Measured with lavapipe and two arenas: 290 MiB of heap, of which 47 to 147 MiB were in use; with one arena 186 MiB.
+//! Returns memory to the system that the process has freed and the C library keeps. A driver that compiles on the CPU, as lavapipe does
+//! with LLVM, uses some hundred MiB for the pipelines of a device. glibc keeps freed memory in arenas, each for several threads, and the
+//! threads that compile for the next device may use another arena. Without this the process keeps each arena at its largest size. Measured
+//! with lavapipe and two arenas: 290 MiB of heap, of which 47 to 147 MiB were in use; with one arena 186 MiB.
 
-/// Gives memory that was freed back to the system. It takes some milliseconds, in which no thread can allocate: for times when a device was
-/// closed or all pipelines are compiled. Does nothing where the C library is not glibc.
+/// Returns freed memory to the system. This takes some milliseconds, in which no thread can allocate. Call it after a device was closed or
+/// all pipelines were compiled. Does nothing if the C library is not glibc.
 pub fn give_back() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     {

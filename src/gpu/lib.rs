@@ -1,16 +1,18 @@
 //! The Vulkan renderer: the only member that calls Vulkan, and the only one with unsafe code.
 //!
-//! - `context` owns instance, device, queues and allocator; `device_selection` picks the device; `faults` injects faults.
-//! - `resources` are images and the slots of a scene, `buffers` what is uploaded and read back, `memory` where both lie, `formats` what
-//!   the device can do with them.
-//! - `pipelines` compiles shaders, `scene_compiler` those of a scene, `pipeline_compiler` on a thread of its own, `preparation` before there is a renderer, `pipeline_measure` to measure that; `pipeline_cache` keeps
-//!   what was compiled on disk; `shader_reload` takes shaders from a folder that is watched. `descriptor_sets` are for devices without push
+//! - `context` owns instance, device, queues and allocator. `device_selection` picks the device, and `faults` injects faults.
+//! - `resources` has images and the slots of a scene, `buffers` the buffers for upload and readback, `memory` their memory, and `formats`
+//!   the formats that the device supports.
+//! - `pipelines` compiles shaders, `scene_compiler` those of a scene, `pipeline_compiler` those on a thread in the background, and
+//!   `preparation` those that are needed before there is a renderer. `pipeline_measure` measures compilations. `pipeline_cache` stores
+//!   compiled pipelines on disk. `shader_reload` reads shaders from a folder that is watched. `descriptor_sets` serves devices without push
 //!   descriptors.
-//! - `command_recorder` records command buffers with the barriers of `device_queues` and the time stamps of `timing`; `timeline` says when a submission is done,
-//!   and `watchdog` gives up a device that does not finish. `bands` divides dispatches that a driver's watchdog might end, and `paced`
-//!   holds bands back while a window's panels are drawn.
-//! - `lost_device` reports why a device was lost, `losses` counts how often the same work lost it, `budget` how much memory it has left; `host_memory` returns what drivers freed.
-//! - `renderer` runs the four stages, `pass_runner` a single pass for tests and benchmarks.
+//! - `command_recorder` records command buffers with the barriers of `device_queues` and the time stamps of `timing`. `timeline` tells which
+//!   submissions are done, and `watchdog` gives up a device that does not finish. `bands` divides dispatches that a driver's watchdog might
+//!   end, and `paced` holds bands back while a window's panels are drawn.
+//! - `lost_device` reports why a device was lost, `losses` counts how often the same work lost it, `budget` reads the memory that is left,
+//!   and `host_memory` returns the memory that drivers freed.
+//! - `renderer` runs the four stages, and `pass_runner` a single pass for tests and benchmarks.
 //! - `window` presents pictures.
 
 mod bands;

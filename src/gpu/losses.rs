@@ -1,23 +1,23 @@
-//! How often work loses a device before it is given up. A device that was lost may have been lost to a watchdog, so that each further try
-//! divides the work into parts that take half as long.
+//! Counts how often the same work loses a device, until it is given up. The cause may have been a watchdog, so each further try divides the
+//! work into parts that take half as long.
 
 use super::{Bands, GpuError};
 
-/// Most losses in a row after which the work is tried again. By then a band has a 64th of its time, and smaller ones have not helped.
+/// Most losses in a row after which the work is tried again. By then a band has a 64th of its time, and smaller bands have not helped.
 const MAX_LOSSES: u32 = 6;
 
-/// The losses of a device by the same work, one after the other.
+/// Number of consecutive losses of a device by the same work.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Losses(u32);
 
 impl Losses {
-    /// Counts a loss. False if it was one too many, and the work is to be given up.
+    /// Counts a loss. False if there were too many, and the work must be given up.
     pub fn allow_another(&mut self) -> bool {
         self.0 += 1;
         self.0 <= MAX_LOSSES
     }
 
-    /// Counts the loss that `error` is, and says so in the log. False if the work is not to be tried again: the error is no loss, the device
+    /// Counts the loss that `error` reports, and logs it. False if the work must not be tried again: the error is not a loss, the device
     /// did not finish (it would not the next time), or it was lost too often.
     pub fn allow_after(&mut self, error: &GpuError) -> bool {
         let allowed = error.is_device_lost() && !error.is_given_up() && self.allow_another();
@@ -32,7 +32,7 @@ impl Losses {
         self.0 > 0
     }
 
-    /// How the next try divides its work.
+    /// How the next try divides its dispatches.
     pub fn bands(self) -> Bands {
         Bands::Measured { losses: self.0 }
     }

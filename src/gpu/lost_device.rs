@@ -1,5 +1,5 @@
-//! What a driver reports after it lost a device: addresses and codes of the fault (VK_EXT_device_fault), and on NVIDIA the passes that
-//! its queues had reached (VK_NV_device_diagnostic_checkpoints).
+//! Reads what a driver reports after it lost a device: addresses and codes of the fault (VK_EXT_device_fault), and on NVIDIA the passes
+//! that its queues had reached (VK_NV_device_diagnostic_checkpoints).
 
 use crate::passes::PASSES;
 use ash::vk;
@@ -9,7 +9,7 @@ use std::fmt::{self, Display, Formatter};
 /// Most addresses, codes or checkpoints that one line reports of each.
 const MAX_REPORTED: usize = 4;
 
-/// The report of a driver. Everything may be empty: drivers report what they know.
+/// The report of a driver. Each list may be empty, because drivers report only what they know.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LossReport {
     pub description: String,
@@ -18,12 +18,12 @@ pub struct LossReport {
     pub checkpoints: Vec<Checkpoint>,
 }
 
-/// An access that failed, or where an instruction was.
+/// The address of a failed access or of an instruction.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FaultAddress {
     pub kind: &'static str,
     pub address: u64,
-    /// The fault lies within this many bytes, a power of two; 1 is exact.
+    /// Number of bytes around the address within which the fault lies, a power of two. 1 is exact.
     pub precision: u64,
 }
 
@@ -38,10 +38,10 @@ pub struct VendorCode {
 /// A pass that a queue had reached.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Checkpoint {
-    /// The number of the queue.
+    /// Number of the queue.
     pub queue: usize,
     pub pass: &'static str,
-    /// All of its work before the pass was done; otherwise the pass had begun.
+    /// True if all work before the pass was done; otherwise the pass had begun.
     pub is_done: bool,
 }
 

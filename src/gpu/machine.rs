@@ -18,9 +18,9 @@ pub struct Device {
     pub is_software: bool,
     /// Period of the device's clock, ns per tick.
     pub timestamp_period_ns: f64,
-    /// Valid bits of a time stamp; 0 if the queue has none, and then no pass has times.
+    /// Number of valid bits of a time stamp. 0 if the queue has none; then no pass has times.
     pub valid_bits: u32,
-    /// True if the device's clock is calibrated to the host's, so that both can be drawn on one axis.
+    /// True if the device's clock can be related to the host's, so that both can be drawn on one axis.
     pub calibrated: bool,
     /// Description of clocks and power state; None if unknown.
     pub clocks: Option<String>,
@@ -42,7 +42,8 @@ impl Device {
         }
     }
 
-    /// The name without the versions that some drivers put in parentheses behind it, such as that of LLVM: the same before and after an update.
+    /// The name without the versions that some drivers put in parentheses after it, such as that of LLVM. It stays the same when such a
+    /// version changes.
     pub fn identity(&self) -> String {
         let Some((name, rest)) = self.name.split_once(" (") else { return self.name.clone() };
         let is_version = |word: &str| word.contains('.') && word.starts_with(|c: char| c.is_ascii_digit());
@@ -51,7 +52,7 @@ impl Device {
         if parts.is_empty() { name.into() } else { format!("{name} ({})", parts.join(", ")) }
     }
 
-    /// What times depend on, by names for people.
+    /// The conditions that times depend on, each with a name for users.
     pub fn conditions(&self) -> [(&'static str, String); 4] {
         [
             ("device", self.name.clone()),
@@ -117,7 +118,7 @@ impl CpuTime {
         (!threads.is_empty()).then_some(CpuTime(threads))
     }
 
-    /// CPU time of all threads since `then`, ns. Time of threads that have ended is lost; drivers keep theirs alive.
+    /// CPU time of all threads since `then`, ns. Time of threads that have ended meanwhile is lost; drivers keep their threads alive.
     pub fn since(&self, then: &CpuTime) -> f64 {
         let of = |(name, now): (&String, &u64)| now.saturating_sub(then.0.get(name).copied().unwrap_or(0));
         self.0.iter().map(of).sum::<u64>() as f64

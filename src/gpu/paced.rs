@@ -1,5 +1,5 @@
-//! Submissions that are held back, so that a queue is never busy for long with what was submitted: other work, such as the panels of a window,
-//! then gets in between. What is held back keeps its order.
+//! Holds submissions back so that a queue is never busy for long with submitted work. Other work, such as drawing the panels of a window,
+//! can then be submitted in between. Held submissions keep their order.
 
 use std::collections::VecDeque;
 use std::time::Duration;

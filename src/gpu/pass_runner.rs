@@ -25,7 +25,7 @@ pub struct PassRunner {
 
 impl PassRunner {
     /// # Errors
-    /// A device that fails.
+    /// The device fails.
     pub fn new(context: &Arc<Context>) -> Result<PassRunner, GpuError> {
         PassRunner::with_texel_access(context, TexelAccess::for_device(&context.candidate))
     }
@@ -33,7 +33,7 @@ impl PassRunner {
     /// As [`PassRunner::new`], with texels read in the given way.
     ///
     /// # Errors
-    /// A device that fails.
+    /// The device fails.
     pub fn with_texel_access(context: &Arc<Context>, texel_access: TexelAccess) -> Result<PassRunner, GpuError> {
         Ok(PassRunner {
             context: context.clone(),
@@ -47,25 +47,25 @@ impl PassRunner {
         self.context.candidate.limits.sub_texel_precision_bits
     }
 
-    /// The scene as [`PassRunner::run`] runs it: with what the device resolves, except what dispatches there are, since those are the caller's.
+    /// The scene as [`PassRunner::run`] runs it: with the fields that the device decides, but with the caller's dispatches.
     pub fn adapted(&self, scene: &Scene) -> Scene {
         let adapted = formats::adapt_scene(&self.context, self.texel_access, scene.clone());
         Scene { shared_memory: scene.shared_memory, frames_at_once: scene.frames_at_once, ..adapted }
     }
 
-    /// The shader of a pass in an adapted scene as the driver gets it.
+    /// The SPIR-V and layout of a pass in an adapted scene, as the driver receives them.
     ///
     /// # Errors
-    /// A shader that does not exist, or that disagrees with the declaration of the pass.
+    /// The shader does not exist, or disagrees with the declaration of the pass.
     pub fn shader(&self, scene: &Scene, pass: &Pass, args: &DispatchArgs) -> Result<Prepared, GpuError> {
         self.pipelines.prepare(&self.pipelines.key(pass, scene, args), pass, scene, args)
     }
 
-    /// Dispatches `pass` once and returns its outputs. `inputs` have the names of the shader's bindings; slots that the scene computes
-    /// may be missing. Every texel of the outputs holds `poison` before, which shows the texels that the pass does not write.
+    /// Dispatches `pass` once and returns its outputs. `inputs` have the names of the shader's bindings; slots that the scene computes may
+    /// be missing. Every texel of the outputs holds `poison` before the dispatch, so that texels which the pass does not write are visible.
     ///
     /// # Errors
-    /// A slot that the device cannot hold, a shader that does not compile, a device that fails.
+    /// The device cannot hold a slot, a shader does not compile, or the device fails.
     pub fn run(
         &mut self,
         scene: &Scene,
@@ -77,8 +77,8 @@ impl PassRunner {
         self.run_within(scene, pass, args, inputs, poison, u64::MAX)
     }
 
-    /// As [`PassRunner::run`], in bands of at most `most` invocations, but at least one row of workgroups. A dispatch whose workgroups a
-    /// pass counts is not divided.
+    /// As [`PassRunner::run`], in bands of at most `most` invocations, but at least one row of workgroups. A dispatch whose number of
+    /// workgroups another pass counts is not divided.
     ///
     /// # Errors
     /// As of [`PassRunner::run`].
@@ -169,12 +169,12 @@ pub struct PassTimer {
 }
 
 impl PassTimer {
-    /// `contents` is what images hold before the first run, of the volume all of it. Slots that the scene computes are filled; all others hold zeros. A pass
-    /// over frames works on layer 0 and the middle slice, a pass over volumes on all visible slices. Runs the pass once, because drivers
-    /// compile at the first run.
+    /// Allocates the slots and runs the pass once, because drivers compile at the first run. `contents`: the content of images before that
+    /// run, for the volume all of it. Slots that the scene computes are filled; all others hold zeros. A pass over frames works on layer 0
+    /// and the middle slice, a pass over volumes on all visible slices.
     ///
     /// # Errors
-    /// A slot that the device cannot hold, a shader that does not compile; the error names it.
+    /// The device cannot hold a slot, or a shader does not compile; the error names it.
     pub fn new(
         context: &Arc<Context>,
         scene: &Scene,
@@ -254,11 +254,11 @@ impl PassTimer {
         done
     }
 
-    /// Runs all iterations of the pass in one submission, and waits. Returns the device's time for all of them, ns; `None` if the device
-    /// has no time stamps. A repeated pass works on its last results.
+    /// Runs all iterations of the pass in one submission, and waits. Returns the device's time for all of them, ns, or `None` if the device
+    /// has no time stamps. A repeated pass works on the results of its previous run.
     ///
     /// # Errors
-    /// A device that fails.
+    /// The device fails.
     pub fn run(&mut self) -> Result<Option<f64>, GpuError> {
         self.recorder.begin(&mut self.queues)?;
         for (args, pipeline) in &self.dispatches {
@@ -273,7 +273,7 @@ impl PassTimer {
     /// The current content of an image slot; `None` for a slot that the pass does not use, or a lookup table in a buffer.
     ///
     /// # Errors
-    /// A device that fails.
+    /// The device fails.
     pub fn read(&mut self, slot: Slot) -> Result<Option<Texels>, GpuError> {
         let Some(image) = self.slots.image(slot, 0) else { return Ok(None) };
         let buffer = Readback::new(&self.context, "read", image.shape, image.format.texel_bytes())?;
@@ -295,8 +295,8 @@ impl Drop for PassTimer {
     }
 }
 
-/// Times of `count` consecutive runs of a pass, ns, each with all its iterations, on slots that hold zeros. Empty if the device has
-/// no time stamps. A first run, in which drivers compile, is not counted.
+/// Times of `count` consecutive runs of a pass, ns, each with all its iterations, on slots that hold zeros. Empty if the device has no time
+/// stamps. An additional first run, in which drivers compile, is not counted.
 ///
 /// # Errors
 /// As for [`PassTimer::new`].

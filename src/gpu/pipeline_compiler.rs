@@ -1,5 +1,5 @@
-//! A thread that compiles pipelines in the background, so that drawing goes on meanwhile: first those that drawing waits for, then,
-//! while there is nothing else to compile, those of scenes that may come next.
+//! A thread that compiles pipelines in the background, so that drawing goes on meanwhile. It first compiles those that drawing waits for,
+//! then those of scenes that may come next.
 
 use super::error::GpuError;
 use super::formats::{self, TexelAccess};
@@ -17,7 +17,7 @@ use std::time::{Duration, Instant};
 /// Wakes the event loop of a view.
 pub type Wake = Arc<dyn Fn() + Send + Sync>;
 
-/// Makes a scene that may come next; none where these settings cannot be drawn.
+/// Makes a scene that may come next. None if these settings cannot be drawn.
 pub type SceneMaker = Box<dyn FnOnce() -> Option<Scene> + Send>;
 
 /// Longest pause after a pipeline that nobody waits for.
@@ -151,7 +151,7 @@ impl AsyncPipelineCompiler {
         Ok(is_ready)
     }
 
-    /// Compiles the pipelines of these scenes while drawing waits for none, instead of those asked for before.
+    /// While drawing waits for no pipeline, compiles the pipelines of these scenes. They replace the scenes of an earlier call.
     pub fn warm(&self, scenes: Vec<SceneMaker>) {
         let mut queue = self.shared.queue();
         queue.stop_warming();

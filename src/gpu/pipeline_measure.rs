@@ -1,5 +1,5 @@
-//! Compiles the pipelines of scenes to measure that: how long it takes, without any cache and with one, and what the driver tells of the
-//! result (VK_KHR_pipeline_executable_properties). Submits nothing, so that it needs a driver and no working device.
+//! Measures the compilation of the pipelines of scenes: its time without any cache and with one, and the driver's statistics on the result
+//! (VK_KHR_pipeline_executable_properties). Nothing is submitted, so a driver is enough and no working device is needed.
 
 use super::context::Context;
 use super::error::{ErrorContext, GpuError};
@@ -17,7 +17,7 @@ use std::ffi::CStr;
 use std::sync::Arc;
 use std::time::{Duration, SystemTime};
 
-/// A pipeline with what its compilation took.
+/// A pipeline and the measurements of its compilation.
 pub struct MeasuredPipeline {
     /// The first pass that uses it.
     pub pass: &'static str,
@@ -26,22 +26,23 @@ pub struct MeasuredPipeline {
     pub constants: Vec<(&'static str, i32)>,
     /// Formats of the inputs, in the order of the pass.
     pub formats: Vec<Format>,
-    /// What the driver made of it; empty without [`ContextOptions::compile_statistics`](super::ContextOptions::compile_statistics).
+    /// The programs that the driver made of it. Empty without
+    /// [`ContextOptions::compile_statistics`](super::ContextOptions::compile_statistics).
     pub executables: Vec<Executable>,
-    /// Without any cache, the driver's own included.
+    /// Time of compilation without any cache, also without the driver's own.
     pub cold: Duration,
-    /// With a pipeline cache that holds it.
+    /// Time of compilation with a pipeline cache that holds the pipeline.
     pub warm: Duration,
-    /// The driver took the second one from the cache; `None` if it does not say.
+    /// True if the driver took the pipeline from the cache in the second case. `None` if the driver does not report it.
     pub warm_hit: Option<bool>,
 }
 
-/// A program for the device; a pipeline may have several, of which the driver chooses one for a dispatch.
+/// A program for the device. A pipeline may have several, of which the driver chooses one for a dispatch.
 pub struct Executable {
     pub name: String,
-    /// Invocations of a subgroup.
+    /// Number of invocations in a subgroup.
     pub subgroup: u32,
-    /// The driver's statistics under its own names.
+    /// The driver's statistics under the driver's names.
     pub statistics: Vec<(String, f64)>,
 }
 
@@ -53,10 +54,10 @@ struct Target<'a> {
     args: DispatchArgs,
 }
 
-/// Measures every pipeline that these scenes need on a device, each once, in the order of the scenes, made of these shaders.
+/// Measures every pipeline that these scenes need on a device with these shaders, each once, in the order of the scenes.
 ///
 /// # Errors
-/// A scene that the device cannot hold, a shader that does not compile.
+/// The device cannot hold a scene, or a shader does not compile.
 pub fn measure(
     context: &Arc<Context>,
     scenes: &[Scene],
@@ -82,10 +83,10 @@ pub fn measure(
     measure_targets(context, &pipelines, &targets)
 }
 
-/// How long the pipelines of a pass take to compile in a scene, without any cache.
+/// Time to compile the pipelines of a pass in a scene, without any cache.
 ///
 /// # Errors
-/// A shader that does not compile.
+/// A shader does not compile.
 pub fn compile_time(context: &Arc<Context>, scene: &Scene, pass: &'static Pass) -> Result<Duration, GpuError> {
     let texel_access = TexelAccess::for_device(&context.candidate);
     let pipelines = Pipelines::new(context, embedded(), texel_access)?;

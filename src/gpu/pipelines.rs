@@ -1,5 +1,5 @@
-//! Compute pipelines: a layout from the reflected bindings, and a pipeline for each set of specialization constants. All that a plan
-//! lacks are compiled at the same time, one a core.
+//! Compute pipelines: a layout from the reflected bindings, and a pipeline for each set of specialization constants. All pipelines that a
+//! plan lacks are compiled in parallel, one on each core.
 
 use super::bands::InvocationTime;
 use super::buffers::has_texels;
@@ -27,22 +27,22 @@ use std::time::{Duration, Instant};
 pub struct Pipeline {
     context: Arc<Context>,
     pub module: Module,
-    /// Of its filtered textures. [`Pipelines`] owns it.
+    /// Sampler of its filtered textures, owned by [`Pipelines`].
     pub sampler: vk::Sampler,
     pub(crate) set_layout: vk::DescriptorSetLayout,
     pub layout: vk::PipelineLayout,
     pub handle: vk::Pipeline,
-    /// What its compilation took, and whether it came from a pipeline cache; `None` if the driver does not say.
+    /// Time of its compilation, and whether it came from a pipeline cache; the second is `None` if the driver does not report it.
     pub compilation: (Duration, Option<bool>),
-    /// The time of an invocation, as its last dispatches took.
+    /// Time of an invocation, measured on its last dispatches.
     pub time: Arc<InvocationTime>,
 }
 
-/// Shader, constants, and for each input its format, which is part of the module, and whether it is read as a storage image or a texel buffer:
-/// two slots may differ in that, and a lookup table may be too large for it.
+/// Key of a pipeline: shader, specialization constants, and for each input its format, which is part of the module, and whether it is read
+/// as a storage image or a texel buffer. The last may differ between slots, because a lookup table may be too large for a texel buffer.
 pub type Key = (&'static str, Vec<(&'static str, i32)>, Vec<(Format, bool)>);
 
-/// What a pipeline is compiled from: SPIR-V as the device gets it, what it declares, and constants by name.
+/// The input of a compilation: the SPIR-V as the device gets it, its reflected declarations, and constants by name.
 pub struct Prepared {
     pub words: Vec<u32>,
     pub module: Module,
@@ -62,7 +62,7 @@ pub type Shaders = dyn Fn(&str) -> Result<Vec<u32>, String> + Send + Sync;
 /// A pipeline that was compiled just now.
 type Compiled = (Key, Arc<Pipeline>);
 
-/// A cache of pipelines: going back to an earlier setting compiles nothing. Of those that no plan uses, the latest
+/// A cache of pipelines, so that returning to an earlier setting compiles nothing. Of the pipelines that no plan uses, the latest
 /// [`ContextOptions::max_unused_pipelines`](super::ContextOptions::max_unused_pipelines) are kept.
 pub struct Pipelines {
     context: Arc<Context>,
@@ -72,7 +72,7 @@ pub struct Pipelines {
     sampler: vk::Sampler,
 }
 
-/// The embedded shaders: the same `Arc` at every call.
+/// The embedded shaders. Every call returns the same `Arc`.
 pub fn embedded() -> Arc<Shaders> {
     static EMBEDDED: LazyLock<Arc<Shaders>> = LazyLock::new(|| {
         Arc::new(|name| {
@@ -94,11 +94,11 @@ pub(crate) fn descriptor_type(kind: Kind) -> vk::DescriptorType {
 }
 
 impl Pipelines {
-    /// Pipelines of these shaders. Those of the embedded shaders are shared by all that hold some of the same context: a second
-    /// renderer of a scene compiles nothing.
+    /// Pipelines of these shaders. Pipelines of the embedded shaders are shared by all renderers of a context: a second renderer of a scene
+    /// compiles nothing.
     ///
     /// # Errors
-    /// A device that fails.
+    /// The device fails.
     pub fn shared(
         context: &Arc<Context>,
         shaders: Arc<Shaders>,
@@ -119,10 +119,10 @@ impl Pipelines {
         Ok(made)
     }
 
-    /// Pipelines that nobody shares.
+    /// Pipelines that are not shared.
     ///
     /// # Errors
-    /// A device that fails.
+    /// The device fails.
     pub fn new(
         context: &Arc<Context>,
         shaders: Arc<Shaders>,
@@ -141,7 +141,7 @@ impl Pipelines {
         Ok(Pipelines { context: context.clone(), made, shaders, texel_access, sampler })
     }
 
-    /// What the pipeline of a pass in a scene is kept by.
+    /// The key of the pipeline of a pass in a scene.
     pub fn key(&self, pass: &Pass, scene: &Scene, args: &DispatchArgs) -> Key {
         let inputs =
             pass.reads(scene, args).iter().map(|b| (b.slot.format(scene), self.stores(b.slot, scene))).collect();
@@ -179,7 +179,7 @@ impl Pipelines {
     /// The pipeline of a pass in a scene, compiled at its first use.
     ///
     /// # Errors
-    /// A shader that does not exist, or that disagrees with the declaration of the pass.
+    /// The shader does not exist, or disagrees with the declaration of the pass.
     pub fn get(&self, pass: &Pass, scene: &Scene, args: &DispatchArgs) -> Result<Arc<Pipeline>, GpuError> {
         let key = self.key(pass, scene, args);
         if let Some(pipeline) = self.cached(&key) {
@@ -191,8 +191,8 @@ impl Pipelines {
         Ok(pipeline)
     }
 
-    /// The pipelines of a plan, by step. Those that are missing are compiled at the same time, while `goes_on` returns true, which is told before the
-    /// first and after each how many of them are compiled, and how many they are. If it returns false, some are left out.
+    /// The pipelines of a plan, by step. Missing ones are compiled in parallel while `goes_on` returns true. It is called before the first
+    /// and after each with the number of compiled pipelines and the total. If it returns false, the rest is left out.
     ///
     /// # Errors
     /// As of [`Pipelines::get`]: the first of the plan that fails. Those that were compiled are kept.
@@ -207,8 +207,8 @@ impl Pipelines {
         steps
     }
 
-    /// Compiles the pipelines of a plan again that use `shaders`, and forgets all others that do. Returns the pipelines of the plan, by
-    /// step. The device must have finished with the previous pipelines, and no other thread may compile any.
+    /// Compiles the pipelines of a plan again that use `shaders`, and forgets all other pipelines that use them. Returns the pipelines of
+    /// the plan, by step. The device must have finished with the previous pipelines, and no other thread may compile any.
     ///
     /// # Errors
     /// As of [`Pipelines::of_plan_while`]; the previous pipelines stay.
@@ -284,10 +284,10 @@ impl Pipelines {
         Ok(Arc::new(pipeline))
     }
 
-    /// What the pipeline of a pass in a scene is compiled from.
+    /// The input for the compilation of the pipeline of a pass in a scene.
     ///
     /// # Errors
-    /// A shader that does not exist, or that disagrees with the declaration of the pass.
+    /// The shader does not exist, or disagrees with the declaration of the pass.
     pub fn prepare(&self, key: &Key, pass: &Pass, scene: &Scene, args: &DispatchArgs) -> Result<Prepared, GpuError> {
         let at_fault = |fault: String| GpuError::Shader { shader: key.0.to_string(), fault };
         let words = (self.shaders)(key.0).map_err(at_fault)?;
@@ -312,7 +312,7 @@ impl Pipelines {
     /// Compiles a pipeline without keeping it.
     ///
     /// # Errors
-    /// The driver refuses the shader, or memory runs out.
+    /// The driver refuses the shader, or memory is exhausted.
     pub fn compile(&self, name: &'static str, prepared: Prepared, how: Compile) -> Result<Pipeline, GpuError> {
         Pipeline::new(&self.context, self.sampler, name, prepared, how)
     }

@@ -1,4 +1,4 @@
-//! Pipelines of a scene that are compiled before its renderer is made, on threads of their own, so that a window goes on meanwhile.
+//! Compiles the pipelines of a scene before its renderer is made, on threads of its own, so that a window stays responsive.
 
 use super::context::Context;
 use super::error::GpuError;
@@ -11,13 +11,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread::JoinHandle;
 
-/// The pipelines of a scene. A renderer that is made while this is held compiles none of them.
+/// The compiled pipelines of a scene. A renderer that is made while this is held compiles none of them.
 pub struct Prepared {
     _compiler: SceneCompiler,
     _made: Vec<Arc<Pipeline>>,
 }
 
-/// Pipelines in the making.
+/// Pipelines that are being compiled.
 pub struct Preparation {
     progress: Arc<Progress>,
     thread: Option<JoinHandle<Result<Prepared, GpuError>>>,
@@ -45,8 +45,8 @@ struct Progress {
 }
 
 impl Preparation {
-    /// Begins to compile what a renderer of this scene with these options will need; `wake` is called after each pipeline and at the end. None for
-    /// shaders of a folder: renderers do not share their pipelines.
+    /// Begins to compile the pipelines that a renderer of this scene with these options will need. `wake` is called after each pipeline and
+    /// at the end. None for shaders of a folder, because renderers do not share their pipelines.
     ///
     /// # Errors
     /// The thread cannot be started.
@@ -87,7 +87,7 @@ impl Preparation {
         Ok(Some(Preparation { progress, thread: Some(thread) }))
     }
 
-    /// How many pipelines are compiled, and how many there are; 0 and 0 before they are counted.
+    /// Number of compiled pipelines, and their total. Both are 0 before they are counted.
     pub fn progress(&self) -> [usize; 2] {
         [&self.progress.done, &self.progress.count].map(|count| count.load(Ordering::Relaxed))
     }
@@ -97,15 +97,15 @@ impl Preparation {
             || self.thread.as_ref().is_none_or(|thread| thread.is_finished())
     }
 
-    /// No further pipeline is begun. Does not wait for those in the making.
+    /// Begins no further pipeline. Does not wait for those that are being compiled.
     pub fn cancel(&self) {
         self.progress.is_cancelled.store(true, Ordering::Relaxed);
     }
 
-    /// Waits for the end. None if the thread panicked: whoever needs the pipelines compiles them, and reports why not.
+    /// Waits for the end. None if the thread panicked: the renderer then compiles the pipelines and reports the fault.
     ///
     /// # Errors
-    /// What a renderer of the scene would fail with.
+    /// The error with which a renderer of the scene would fail.
     pub fn finish(mut self) -> Result<Option<Prepared>, GpuError> {
         self.thread.take().and_then(|thread| thread.join().ok()).transpose()
     }

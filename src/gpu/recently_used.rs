@@ -1,10 +1,10 @@
-//! A cache of shared values. It forgets those that nobody else holds, the one used longest ago first.
+//! A cache of shared values. It forgets values that only the cache holds, the least recently used first.
 
 use std::collections::HashMap;
 use std::hash::Hash;
 use std::sync::Arc;
 
-/// Keeps a limited number of values that only the cache holds, and all that others hold. The value added last is always kept.
+/// Keeps a limited number of values that only the cache holds, and all values that others hold. The value added last is always kept.
 pub(crate) struct RecentlyUsed<K, V> {
     /// Each value, and the number of its last use.
     values: HashMap<K, (Arc<V>, u64)>,
@@ -24,7 +24,7 @@ impl<K: Hash + Eq + Clone, V> RecentlyUsed<K, V> {
         Some(value.clone())
     }
 
-    /// Adds a value, and returns those that are forgotten: whoever holds a lock can release it before they are dropped.
+    /// Adds a value, and returns the forgotten ones, so that the caller can release a lock before they are dropped.
     #[must_use]
     pub fn insert(&mut self, key: K, value: Arc<V>) -> Vec<Arc<V>> {
         self.uses += 1;
@@ -38,7 +38,7 @@ impl<K: Hash + Eq + Clone, V> RecentlyUsed<K, V> {
         replaced.into_iter().chain(oldest.map(|(value, _)| value)).collect()
     }
 
-    /// Keeps the values whose keys pass.
+    /// Keeps the values whose keys fulfil `is_kept`.
     pub fn retain(&mut self, is_kept: impl Fn(&K) -> bool) {
         self.values.retain(|key, _| is_kept(key));
     }

@@ -21,8 +21,9 @@ pub struct Image {
     pub handle: vk::Image,
     /// A view of the complete image.
     pub view: vk::ImageView,
-    /// Of the frame array, a view of the layers from each one to the last of its entry in the ring: a batch of frames begins with the first
-    /// layer of its view. Validation takes every layer of a view for read, so a view holds none of the other entries, which may be written.
+    /// For the frame array, a view from each layer to the last layer of its ring entry: a batch of frames begins with the first layer of
+    /// its view. Validation assumes that every layer of a view is read, so a view contains no layers of other entries, which may be
+    /// written.
     pub(crate) from_layer: Vec<vk::ImageView>,
     pub extent: vk::Extent3D,
     pub shape: Shape,
@@ -34,7 +35,7 @@ impl Image {
     /// An image in layout UNDEFINED.
     ///
     /// # Errors
-    /// Out of memory; a device that fails.
+    /// Memory is exhausted, or the device fails.
     pub fn new(context: &Arc<Context>, slot: Slot, shape: Shape, format: Format) -> Result<Image, GpuError> {
         let (kind, view_kind, [width, height, depth], layers) = match shape {
             Shape::Two([w, h]) => (vk::ImageType::TYPE_2D, vk::ImageViewType::TYPE_2D, [w, h, 1], 1),
@@ -119,8 +120,9 @@ impl Image {
         Image::new(context, slot, self.shape, self.format)
     }
 
-    /// Records a copy of the complete image, which is in layout GENERAL and was written before a barrier for copies, into another of its
-    /// shape and format, whose last use is done. The other is then in layout GENERAL, and its content visible to copies.
+    /// Records a copy of the complete image into another image of the same shape and format, whose last use is done. This image must be in
+    /// layout GENERAL and written before a barrier for copies. The other image is then in layout GENERAL, and its content is visible to
+    /// copies.
     #[cfg(feature = "view")]
     pub(super) fn copy_to(&self, device: &ash::Device, commands: vk::CommandBuffer, to: &Image) {
         let (stage, general) = (vk::PipelineStageFlags2::ALL_TRANSFER, vk::ImageLayout::GENERAL);
@@ -154,7 +156,7 @@ impl Image {
         barrier(general, [write, vk::AccessFlags2::TRANSFER_READ]);
     }
 
-    /// Its shape and the bytes of a texel.
+    /// Its shape, and the bytes of a texel.
     pub fn layout(&self) -> (Shape, usize) {
         (self.shape, self.format.texel_bytes())
     }
@@ -222,11 +224,11 @@ impl SlotResources {
         SlotResources { context: context.clone(), resources: BTreeMap::new(), images }
     }
 
-    /// Allocates the slots of the plan that are missing or have another shape, and frees those that it does not need. New images are
-    /// in layout UNDEFINED. They are returned and must be cleared, which moves them to GENERAL, before their first use.
+    /// Allocates the slots of the plan that are missing or have another shape, and frees those that it does not need. Returns the new
+    /// images, which are in layout UNDEFINED. They must be cleared, which moves them to GENERAL, before their first use.
     ///
     /// # Errors
-    /// A slot that the device cannot hold; then nothing new is kept.
+    /// The device cannot hold a slot; then nothing new is kept.
     pub fn fit(&mut self, plan: &Plan, scene: &Scene) -> Result<Vec<(Slot, u32)>, GpuError> {
         formats::check(&self.context, plan, scene)?;
         self.resources.retain(|(slot, _), resource| plan.slots.contains(slot) && resource.matches(*slot, scene));

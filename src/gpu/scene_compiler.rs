@@ -1,4 +1,4 @@
-//! Makes scenes ready to run on a device: their plans, and the pipelines of these, compiled at once or in the background.
+//! Prepares scenes for a device: makes their plans, and compiles the pipelines of these at once or in the background.
 
 use super::context::Context;
 use super::error::GpuError;
@@ -50,7 +50,7 @@ impl SceneCompiler {
     /// The pipelines of a plan, by step. The rest is as of [`Pipelines::of_plan_while`].
     ///
     /// # Errors
-    /// A slot that the device cannot hold, or a shader that does not compile.
+    /// The device cannot hold a slot, or a shader does not compile.
     pub(crate) fn compile_while(
         &self,
         plan: &Plan,
@@ -64,7 +64,7 @@ impl SceneCompiler {
     /// The pipelines of a plan, by step.
     ///
     /// # Errors
-    /// A slot that the device cannot hold, or a shader that does not compile.
+    /// The device cannot hold a slot, or a shader does not compile.
     pub fn compile(&self, plan: &Plan, scene: &Scene) -> Result<Vec<Arc<Pipeline>>, GpuError> {
         self.compile_while(plan, scene, &|_, _| true)
     }

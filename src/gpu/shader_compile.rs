@@ -1,4 +1,4 @@
-//! GLSL to SPIR-V, the same in the shader tool and behind `hot-reload`: the only callers of shaderc.
+//! Compiles GLSL to SPIR-V with shaderc, for the shader tool and for the feature `hot-reload`. Nothing else calls shaderc.
 
 use crate::shader_source::Source;
 

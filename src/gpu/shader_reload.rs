@@ -1,5 +1,5 @@
-//! Shaders from a folder of GLSL instead of the embedded ones, for whoever writes them: compiled when a pipeline asks for them, and
-//! again when a file changes ([`Watch`]), so that a running view shows what was edited.
+//! Shaders from a folder of GLSL instead of the embedded ones, for shader development. They are compiled when a pipeline needs them, and
+//! again when a file changes ([`Watch`]), so that a running view shows every edit.
 
 use super::pipeline_compiler::Wake;
 use super::pipelines::{Shaders, embedded};
@@ -13,11 +13,11 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use std::thread::JoinHandle;
 use std::time::{Duration, SystemTime};
 
-/// Between two looks at the times of the files. There are some fifty of them: a look takes less than a millisecond, needs no crate, and
-/// works where the kernel reports nothing, such as on network drives, and with editors that replace files.
+/// Time between two readings of the modification times of the files. There are some fifty files: a reading takes less than a millisecond,
+/// needs no crate, and works where the kernel reports nothing, such as on network drives, and with editors that replace files.
 const LOOK: Duration = Duration::from_millis(250);
 
-/// A folder of GLSL sources, and the SPIR-V that was made of them so far.
+/// A folder of GLSL sources, and the SPIR-V that was compiled from them so far.
 pub struct ShaderFolder {
     glsl: PathBuf,
     compiler: Compiler,
@@ -40,15 +40,15 @@ struct State {
 }
 
 impl ShaderFolder {
-    /// Reads the folder; compiles nothing yet.
+    /// Reads the folder, but compiles nothing yet.
     ///
     /// # Errors
-    /// No compiler, a folder that cannot be read or holds no shader, an include that does not exist.
+    /// There is no compiler, the folder cannot be read or holds no shader, or an include does not exist.
     pub fn open(glsl: &Path) -> Result<Arc<ShaderFolder>, String> {
         ShaderFolder::open_with(glsl, Compiler::find()?)
     }
 
-    /// The same with a given compiler.
+    /// As [`ShaderFolder::open`], with a given compiler.
     ///
     /// # Errors
     /// As of [`ShaderFolder::open`].
@@ -100,7 +100,7 @@ impl ShaderFolder {
         made
     }
 
-    /// Why the sources as they are now are not what is shown: the first fault, several lines; none where all is well.
+    /// The reason why the current sources are not shown: the first fault, several lines. None if there is no fault.
     pub fn fault(&self) -> Option<String> {
         let state = self.state();
         state
@@ -112,8 +112,8 @@ impl ShaderFolder {
             .cloned()
     }
 
-    /// The shaders that were compiled anew since the last call, if any: pipelines of them are out of date. Those that were refused are
-    /// among them until they are not.
+    /// The shaders that were compiled again since the last call, if any: their pipelines are out of date. Refused shaders are among them
+    /// until pipelines of them are accepted.
     pub fn take_changed(&self) -> Option<HashSet<String>> {
         let mut state = self.state();
         let mut changed = std::mem::take(&mut state.changed);
@@ -123,13 +123,13 @@ impl ShaderFolder {
         Some(changed).filter(|changed| !changed.is_empty())
     }
 
-    /// No pipelines can be made of these shaders, although they compile, and why.
+    /// Notes that no pipelines can be made of these shaders although they compile, and the reason.
     pub fn refuse(&self, shaders: HashSet<String>, fault: String) {
         tracing::warn!("{fault}");
         self.state().refused = Some((shaders, fault));
     }
 
-    /// Pipelines were made of all that changed.
+    /// Notes that pipelines were made of all changed shaders.
     pub fn accept(&self) {
         self.state().refused = None;
     }
@@ -200,10 +200,10 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// `wake` is called when shaders or faults changed.
+    /// Starts the thread. `wake` is called when shaders or faults changed.
     ///
     /// # Errors
-    /// A thread that cannot be started.
+    /// The thread cannot be started.
     pub fn new(folder: &Arc<ShaderFolder>, wake: Wake) -> Result<Watch, String> {
         let stop = Arc::new(AtomicBool::new(false));
         let (over, folder) = (stop.clone(), folder.clone());

@@ -1,19 +1,19 @@
-//! The text of a shader as it is compiled: includes expanded, one per variant. Pure, and the same file in the shader tool
-//! (which compiles) and in the tests (which check that `spirv/` is what `glsl/` says).
+//! The text of a shader as it is compiled, with includes expanded, once for each variant. The shader tool, which compiles, and the tests,
+//! which compare `spirv/` with `glsl/`, use this same file. It has no side effects.
 
 use std::path::Path;
 use std::sync::Arc;
 
-/// Options that go into every compilation; a change of them is a change of every shader.
+/// Options of every compilation. A change of them changes every shader.
 pub(crate) const OPTIONS: &str = "vulkan1.3 spirv1.5 -O -g auto-bind";
 
-/// One shader to compile.
+/// A variant of a shader to compile.
 pub struct Source {
-    /// Path below glsl/ without extension, and the variant: `filter/sigma.slice`. This is the name passes use.
+    /// Path below glsl/ without extension, and the variant: `filter/sigma.slice`. Passes use this name.
     pub name: String,
     /// Macros defined for this variant.
     pub defines: Vec<String>,
-    /// The text with every include in place.
+    /// The text with all includes expanded.
     pub text: String,
     /// Where each line of the text comes from.
     origins: Arc<[Origin]>,
@@ -27,10 +27,10 @@ struct Origin {
     line: usize,
 }
 
-/// Every variant of every `.comp` below `root`, in order of name.
+/// Every variant of every `.comp` file below `root`, in order of name.
 ///
 /// # Errors
-/// Files that cannot be read, includes that do not exist or include themselves.
+/// A file cannot be read, or an include does not exist or includes itself.
 pub fn sources(root: &Path) -> Result<Vec<Source>, String> {
     let mut all = Vec::new();
     for stage in sorted(root)? {
@@ -105,7 +105,7 @@ fn version_first(lines: Vec<(String, Origin)>) -> (String, Vec<Origin>) {
 }
 
 impl Source {
-    /// What the SOURCES file holds a hash of.
+    /// The text whose hash the SOURCES file holds.
     pub fn fingerprint(&self) -> String {
         format!("{OPTIONS}\n{}\n{}", self.defines.join(" "), self.text)
     }

@@ -1,5 +1,5 @@
-//! GLSL to SPIR-V by a compiler that is there at run time: shaderc where the feature `hot-reload` built it in, else `glslc` or
-//! `glslangValidator` of the system. All of them compile as tools/shaders does: see [`crate::shader_source::OPTIONS`].
+//! GLSL to SPIR-V by a compiler that is found at run time: shaderc if the feature `hot-reload` built it in, else `glslc` or
+//! `glslangValidator` of the system. All of them compile with the options of tools/shaders: see `shader_source::OPTIONS`.
 
 use crate::shader_source::Source;
 use crate::spirv;
@@ -15,7 +15,7 @@ pub enum Compiler {
     #[cfg(feature = "hot-reload")]
     Shaderc,
     Glslc(PathBuf),
-    /// glslang itself does not optimise for speed: `spirv-opt` does, where it is installed.
+    /// glslang itself does not optimise for speed. `spirv-opt` does, if it is installed.
     Glslang {
         validator: PathBuf,
         optimizer: Option<PathBuf>,
@@ -23,10 +23,10 @@ pub enum Compiler {
 }
 
 impl Compiler {
-    /// The best that there is: shaderc, `glslc`, `glslangValidator`.
+    /// The first available compiler of shaderc, `glslc` and `glslangValidator`.
     ///
     /// # Errors
-    /// There is none.
+    /// No compiler was found.
     pub fn find() -> Result<Compiler, String> {
         #[cfg(feature = "hot-reload")]
         return Ok(Compiler::Shaderc);

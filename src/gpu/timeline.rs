@@ -1,4 +1,4 @@
-//! Timeline semaphores, one for each queue: they say which submissions are done.
+//! Timeline semaphores, one for each queue. Their values tell which submissions are done.
 
 use super::context::Context;
 use super::error::{ErrorContext, GpuError};
@@ -152,7 +152,7 @@ impl Timeline {
     /// Blocks until a submission is done.
     ///
     /// # Errors
-    /// A device that fails, or is given up because it does not finish.
+    /// The device fails, or is given up because it does not finish.
     pub fn wait(&self, value: u64) -> Result<(), GpuError> {
         let operation = || self.operation();
         self.release(value)?;
@@ -181,7 +181,7 @@ impl Timeline {
     /// True if a submission is done; does not wait. Submits what is held back and due.
     ///
     /// # Errors
-    /// A device that fails, or is given up because it does not finish.
+    /// The device fails, or is given up because it does not finish.
     pub fn is_done(&self, value: u64) -> Result<bool, GpuError> {
         self.context.watchdog.check(|| self.operation())?;
         let reached = self.reached().context(|| self.operation()).map_err(|error| self.context.explain(error))?;
@@ -195,8 +195,8 @@ impl Timeline {
         Ok(false)
     }
 
-    /// To be called before resources in flight are destroyed: waits for all submissions, and if that fails for an idle device. A
-    /// device that was lost or given up returns at once; of one that was given up, nothing is destroyed.
+    /// Waits for all submissions, and if that fails for an idle device. Call it before resources in flight are destroyed. If the device was
+    /// lost or given up, it returns at once; after giving up, nothing is destroyed.
     pub fn drain(&self) {
         if self.wait_all().is_err() {
             let _ = self.context.wait_idle();
@@ -222,7 +222,7 @@ impl Timelines {
     /// Submits what is held back.
     ///
     /// # Errors
-    /// A device that fails.
+    /// The device fails.
     #[cfg(feature = "view")]
     pub(super) fn release(&self) -> Result<(), GpuError> {
         self.0.iter().try_for_each(|timeline| timeline.release(timeline.submitted))

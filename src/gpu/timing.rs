@@ -1,5 +1,5 @@
-//! GPU time stamps around every pass, and the times that follow from them: a sum for every pass, and optionally every span, the
-//! device's on the host's clock.
+//! GPU time stamps around every pass, and the times computed from them: a sum for every pass, and optionally every span. Spans of the
+//! device are converted to the host's clock.
 
 use super::bands::{self, Work};
 use super::context::Context;
@@ -10,17 +10,17 @@ use ash::vk;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// What is timed.
+/// The operations that are timed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum TimeStamps {
     /// Nothing.
     None,
-    /// Each submission as a whole: a picture, the conversion of a frame, its copy. Two stamps a command buffer, which wait for nothing,
-    /// so that passes overlap as if there were none.
+    /// Each submission as a whole: a picture, the conversion of a frame, its copy. A command buffer has two stamps, which wait for nothing,
+    /// so that passes overlap as they do without stamps.
     #[default]
     Ends,
-    /// Each pass. An execution barrier at every stamp keeps passes from overlapping, so that a time is the pass's own and their sum is
-    /// more than the time of a picture without these stamps.
+    /// Each pass. An execution barrier at every stamp keeps passes from overlapping. So the time of a pass is its own, and the sum of the
+    /// times exceeds the time of a picture without these stamps.
     EachPass,
 }
 
@@ -59,11 +59,11 @@ pub struct Stamp {
     pub from: u64,
     pub to: u64,
     pub invocations: Option<u64>,
-    /// How many runs the work counts as: none if it goes on in the next submission.
+    /// Number of runs that the work counts as. 0 if it goes on in the next submission.
     pub runs: u32,
 }
 
-/// Time between two stamps, ns. The counter has `valid_bits` bits and wraps; `period` is ns per tick.
+/// Time between two stamps, ns. `valid_bits`: number of bits of the counter, which wraps; `period`: ns per tick.
 pub fn elapsed(from: u64, to: u64, valid_bits: u32, period: f32) -> f64 {
     let mask = if valid_bits >= 64 { u64::MAX } else { (1 << valid_bits) - 1 };
     (to.wrapping_sub(from) & mask) as f64 * f64::from(period)
@@ -203,7 +203,7 @@ impl Stamps {
         self.left_out
     }
 
-    /// The measured work. The device must be done with the recording. What it says of the time of each pass is noted there.
+    /// The measured work. The device must have finished the recording. The measured times are also noted for each pass.
     pub fn read(&self, valid_bits: u32, period: f32) -> Result<Vec<Stamp>, GpuError> {
         let ticks = self.results(self.pool, self.written)?;
         let counts = match self.statistics {
@@ -301,7 +301,7 @@ impl Timings {
         self.cpu.as_mut().map(|log| std::mem::take(&mut log.passes)).unwrap_or_default()
     }
 
-    /// The largest error, ns, with which a time of the device was placed on the host's clock; `None` if its clock cannot be read.
+    /// Largest error of the position of device times on the host's clock, ns. `None` if the device's clock cannot be read.
     pub fn clock_deviation(&self) -> Option<u64> {
         self.spans.as_ref()?.deviation
     }

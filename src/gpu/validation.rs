@@ -1,4 +1,4 @@
-//! The Khronos validation layer: what is asked of it, and its messages.
+//! The Khronos validation layer: the checks that are requested of it, and its messages.
 
 use super::error::{ErrorContext, GpuError};
 use ash::vk;
@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// The first version whose synchronization validation handles timeline semaphores (Vulkan-ValidationLayers #8559, September 2024).
 const KNOWS_TIMELINES: u32 = vk::make_api_version(0, 1, 3, 297);
 
-/// The layer as it is installed.
+/// The installed layer.
 #[derive(Clone, Copy, Debug)]
 pub struct Layer {
     version: u32,
@@ -43,8 +43,8 @@ impl Layer {
     }
 }
 
-/// What is asked of a layer that takes settings. Since 2024 synchronization validation ignores what shaders read and write, unless the
-/// second is on: it assumes that a shader accesses every descriptor that it names. All of ours do.
+/// The settings for a layer that takes settings. Since 2024 synchronization validation ignores the accesses of shaders unless the second
+/// setting is on. It assumes that a shader accesses every descriptor that it names, which all shaders here do.
 pub fn settings() -> [vk::LayerSettingEXT<'static>; 2] {
     const ON: &vk::Bool32 = &vk::TRUE;
     [c"validate_sync", c"syncval_shader_accesses_heuristic"].map(|name| {
@@ -66,7 +66,7 @@ pub(crate) const FEATURES: &[vk::ValidationFeatureEnableEXT] =
 /// Waits for timelines between two idle queues that an older layer is shown: showing it one after each wait took four times the CPU time.
 const UNSEEN_WAITS: u64 = 512;
 
-/// Collects the layer's messages. To be dropped before its instance is destroyed.
+/// Collects the messages of the layer. It must be dropped before its instance is destroyed.
 pub(crate) struct Messenger {
     layer: Layer,
     /// Waits for timelines that the layer did not see.
@@ -119,10 +119,10 @@ impl Drop for Messenger {
     }
 }
 
-/// Passes that write the slices near new frames, a dispatch for each run of them, and their shaders. Layers from 2024 on take every
-/// access through a view for one to the whole image. Such dispatches write different slices of one 3D image without a barrier between
-/// them, because none is needed: the layer reports a write after a write. Where two of them do write the same slice, the barrier oracle of
-/// the tests notices a missing barrier.
+/// Passes that write the slices near new frames with a dispatch for each run of slices, and their shaders. Layers from 2024 on assume that
+/// every access through a view is one to the whole image. Such dispatches write different slices of one 3D image without a barrier between
+/// them, because none is needed, and the layer reports a write after a write. Where two of them do write the same slice, the barrier oracle
+/// of the tests notices a missing barrier.
 pub const WRITERS_OF_RUNS: [(&str, &str); 6] = [
     ("tile_ranges", "empty_space/tile_ranges"),
     ("gaussian_elevation", "filter/gaussian"),

@@ -1,8 +1,7 @@
-//! Waits for the device that end. A driver can leave a submission unfinished for ever: a hung GPU, a lost interrupt, a virtual machine
-//! that was suspended. Waits are therefore short slices. Between two of them a deadline and a request to stop are looked at. A device that
-//! does not finish in time is *given up*: nothing waits for it again, and what was made from its context is leaked instead of destroyed,
-//! because Vulkan forbids to destroy what a submission still uses, and some drivers block in such a call or free memory that the device
-//! still writes.
+//! Limits waits for the device. A driver can leave a submission unfinished for ever: a hung GPU, a lost interrupt, a virtual machine that
+//! was suspended. So a wait is divided into short ones. Between them the deadline and a request to stop are checked. A device that does not
+//! finish in time is *given up*: nothing waits for it again, and the objects of its context are leaked instead of destroyed. Vulkan forbids
+//! destroying what a submission still uses, and some drivers block in such a call or free memory that the device still writes.
 
 use super::error::{ErrorContext, GpuError};
 use ash::vk;
@@ -10,9 +9,9 @@ use std::collections::VecDeque;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-/// Longest time without a look at the deadline and the request to stop. A signal is answered within two of them and [`STOP_GRACE`].
+/// Longest time without a check of the deadline and of the request to stop. A signal is answered within two of them and [`STOP_GRACE`].
 const SLICE: Duration = Duration::from_millis(50);
-/// Time that a wait goes on after a request to stop: most work is done by then, and a command ends as usual.
+/// Time that a wait goes on after a request to stop. Most work is done by then, and a command ends as usual.
 const STOP_GRACE: Duration = Duration::from_millis(400);
 /// The deadline of a GPU. A picture takes milliseconds there, a very large one less than a second.
 const GPU_DEADLINE: Duration = Duration::from_secs(5);
@@ -163,7 +162,7 @@ impl Watchdog {
     }
 }
 
-/// Since when a queue has been busy without progress. Submissions are done in their order.
+/// Tells since when a queue has been busy without progress. Submissions finish in their order.
 #[derive(Debug, Default)]
 pub struct Progress {
     /// The number of each submission that was not seen done, and when it was made.
@@ -173,12 +172,12 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// Submission `number` was made.
+    /// Notes that submission `number` was made.
     pub fn submitted(&mut self, number: u64, now: Instant) {
         self.pending.push_back((number, now));
     }
 
-    /// All submissions up to `number` were seen done.
+    /// Notes that all submissions up to `number` are done.
     pub fn reached(&mut self, number: u64, now: Instant) {
         let before = self.pending.len();
         self.pending.retain(|(pending, _)| *pending > number);
@@ -187,8 +186,8 @@ impl Progress {
         }
     }
 
-    /// The submission of the oldest work that is not done, or the last progress if that came later: what was submitted behind other work
-    /// has its full time from when that work is done. None without work.
+    /// The time when the oldest unfinished work was submitted, or when the last submission finished if that was later: work that was
+    /// submitted behind other work gets its full time. None without unfinished work.
     pub fn busy_since(&self) -> Option<Instant> {
         self.pending.front().map(|(_, made)| self.advanced.map_or(*made, |advanced| advanced.max(*made)))
     }

@@ -1,5 +1,5 @@
-//! Measurements of the renderer: [`profile`] measures GPU times, [`error_report`] error against run time, [`filter_report`] what filters do to
-//! speckle and edges, [`thesis_tables`] the tables of the thesis. [`bounds`] encloses rays.
+//! Measurements of the renderer: [`profile`] measures GPU times, [`error_report`] errors against run time, and [`filter_report`] the effect
+//! of filters on speckle and edges. [`thesis_tables`] measures the tables of the thesis, and [`bounds`] computes proven bounds of rays.
 
 #![forbid(unsafe_code)]
 

@@ -1,6 +1,6 @@
-//! What lasts longer than one picture: streams of frames that are rendered while they arrive ([`live`]), measurements ([`measure`]) and marks
-//! on saved pictures ([`marked`]), presets and workspaces of a user ([`user_presets`], [`workspace`]), and the configuration, the logs and the
-//! support bundle of a kiosk display ([`kiosk`]).
+//! Sessions, which last longer than one picture: streams of frames that are rendered while they arrive ([`live`]), measurements
+//! ([`measure`]) and marks on saved pictures ([`marked`]), presets and workspaces of a user ([`user_presets`], [`workspace`]), and the
+//! configuration, the logs and the support bundle of a kiosk display ([`kiosk`]).
 
 #![forbid(unsafe_code)]
 

@@ -1,4 +1,4 @@
-//! The presets of a user: looks with names in one file. The view saves, renames and deletes them; `--preset` takes them by name.
+//! The presets of a user: named looks in one file. The view saves, renames and deletes them, and `--preset` takes them by name.
 
 use crate::files;
 use crate::scene::Settings;
@@ -17,7 +17,7 @@ pub const MAX_PRESETS: usize = 32;
 /// Longest name, characters.
 pub const MAX_NAME: usize = 40;
 
-/// A look with a name.
+/// A named look.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct UserPreset {
@@ -35,17 +35,17 @@ struct Kept {
 }
 
 impl UserPreset {
-    /// The look of `settings` under a name.
+    /// A preset with this name and the look of `settings`.
     ///
     /// # Errors
-    /// One line: a name that cannot be given, or settings that cannot be written as TOML.
+    /// One line: the name is not allowed, or the settings cannot be written as TOML.
     pub fn new(name: &str, settings: &Settings) -> Result<UserPreset, String> {
         let name = checked_name(name)?;
         let settings = settings.look().to_table();
         settings.map(|settings| UserPreset { name, settings }).map_err(|e| format!("a preset cannot be written: {e}"))
     }
 
-    /// Its settings; what belongs to an examination is as without a choice.
+    /// The settings of the preset. Settings that belong to an examination have their defaults.
     ///
     /// # Errors
     /// One line that names the preset: a setting is not known, or not allowed.
@@ -57,7 +57,7 @@ impl UserPreset {
     }
 }
 
-/// A name without blanks at its ends.
+/// Returns a name without blanks at its ends.
 ///
 /// # Errors
 /// One line: it is empty, longer than [`MAX_NAME`], has control characters, or is that of a built-in preset.
@@ -78,7 +78,7 @@ fn spelled(name: &str) -> Result<&str, String> {
     }
 }
 
-/// Reads the presets of a file; none if there is no file.
+/// Reads the presets of a file. None are returned if there is no file.
 ///
 /// # Errors
 /// One line that names the file: it cannot be read, or is damaged.
@@ -108,10 +108,10 @@ pub fn read(file: &Path) -> Result<Vec<UserPreset>, String> {
     Ok(kept.preset)
 }
 
-/// Writes the presets in place of those of the file: all of them, or the file stays as it is.
+/// Replaces the presets of a file. If this fails, the file stays as it is.
 ///
 /// # Errors
-/// One line that names the file: it is damaged, which is for its owner to see; it cannot be written.
+/// One line: the existing file is damaged, there are more than [`MAX_PRESETS`] presets, or the file cannot be written.
 pub fn write(file: &Path, presets: &[UserPreset]) -> Result<(), String> {
     read(file).map_err(|e| format!("{e}; the file is left as it is"))?;
     if presets.len() > MAX_PRESETS {

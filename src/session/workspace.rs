@@ -1,5 +1,5 @@
-//! Workspaces: a scene file that also names the recording which it shows. The settings, with measurements and annotations, are those of a scene
-//! file; the table `[workspace]` says where the volumes are. `view` and `render` open it in place of a recording.
+//! Workspaces: scene files that also name a recording. The settings, with measurements and annotations, are those of a scene file. The
+//! table `[workspace]` names the source of the volumes. `view` and `render` open a workspace in place of a recording.
 
 use crate::files;
 use crate::scene::Settings;
@@ -22,7 +22,7 @@ pub const PHANTOM: &str = "phantom";
 /// Bytes at the start of a file in which the table must be, to be listed as a workspace.
 const HEAD: u64 = 4096;
 
-/// Where the volumes of a workspace are.
+/// The source of the volumes of a workspace.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Origin {
@@ -33,7 +33,7 @@ pub struct Origin {
     /// Number of the volume that was shown, from 0.
     #[serde(default)]
     pub volume: usize,
-    /// The flags of the recording's geometry, where they were given.
+    /// The flags that gave the recording's geometry, if there were any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub probe: Option<PathBuf>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -43,7 +43,7 @@ pub struct Origin {
 }
 
 impl Origin {
-    /// Of this recording, with no more known about it.
+    /// The origin with this recording and defaults for everything else.
     pub fn of(recording: Option<PathBuf>) -> Origin {
         Origin { version: VERSION, recording, ..Origin::default() }
     }
@@ -57,12 +57,12 @@ pub struct Workspace {
     pub layers: Layers,
 }
 
-/// True if a path is named like a workspace, which no recording is.
+/// True if a path has the ending of a workspace, which no recording has.
 pub fn is_named(path: &Path) -> bool {
     path.extension().is_some_and(|end| end.eq_ignore_ascii_case("toml"))
 }
 
-/// True if a file is named like a workspace and begins like one. Reads at most 4 KiB.
+/// True if a file has the ending of a workspace and begins like one. Reads at most 4 KiB.
 pub fn is_workspace(path: &Path) -> bool {
     if !(is_named(path) && std::fs::metadata(path).is_ok_and(|about| about.is_file())) {
         return false;
@@ -111,7 +111,7 @@ impl Workspace {
     /// The recording to open.
     ///
     /// # Errors
-    /// One line: the workspace was saved of live volumes.
+    /// One line: the workspace was saved from live volumes.
     pub fn recording(&self, path: &Path) -> Result<&Path, String> {
         let fault = || {
             format!(

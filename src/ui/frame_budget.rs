@@ -266,7 +266,7 @@ impl FrameBudget {
         (self.pictures, self.previous) = (0, None);
     }
 
-    /// True if the view moved a moment ago.
+    /// True if the view moved less than `REST_DELAY` ago.
     pub(super) fn is_moving(&self, now: Instant) -> bool {
         self.moved.is_some_and(|at| now.saturating_duration_since(at) < REST_DELAY)
     }

@@ -1,4 +1,4 @@
-//! Inputs built into the program: probes, scenes, bodies and noise, the same on every machine. Tests use them too.
+//! Inputs that are built into the program: probes, scenes, bodies and noise, the same on every machine. Tests use them, too.
 
 use crate::passes::Texels;
 use crate::probe::{Advance, Array, Axis, Geometry, Grid, Indices, Motion, Probe};
@@ -14,9 +14,10 @@ pub struct SceneSpec {
     input: Input,
     /// Settings as TOML.
     toml: String,
-    /// Use pictures of floats, whatever the settings say.
+    /// Uses pictures of floats, whatever the settings are.
     floats: bool,
-    /// Solve rows and columns under AOS, propagate light and filter slices in workgroups, as on a GPU.
+    /// Shared memory, bytes, with which passes solve rows and columns under AOS, propagate light and filter slices in workgroups, as on a
+    /// GPU.
     shared_memory: u32,
 }
 
@@ -38,7 +39,7 @@ impl SceneSpec {
     }
 }
 
-/// Scenes by name that together need every pass, in every variant of the geometry. `shared_memory`: that of the device, bytes.
+/// Scenes by name that together need every pass, in every variant of the geometry. `shared_memory`: shared memory of the device, bytes.
 ///
 /// # Errors
 /// One line: a scene is invalid.
@@ -261,7 +262,7 @@ pub fn still() -> Probe {
     Probe { motion: Motion::Still { thickness: 3.0 }, slices: Axis::centred(1.0, 1), ..wobbler() }
 }
 
-/// A radial probe that is pulled back: lines to 141 degrees off the depth axis.
+/// A radial probe that is pulled back, with lines up to 141 degrees from the depth axis.
 pub fn radial() -> Probe {
     Probe {
         array: Array::Curved { radius: 6.0 },
@@ -281,14 +282,14 @@ pub fn cartesian(size: [usize; 3]) -> Geometry {
 pub const BYTES: Input = Input { stored: StoredType::U8, range: [0.0, 255.0] };
 pub const FLOATS: Input = Input { stored: StoredType::F32, range: [0.0, 1.0] };
 
-/// Frames of a volume with the values that their textures yield, from a function of texel and slice.
+/// Frames of a volume from a function of texel and slice, with the values that their textures return.
 pub fn frames(scene: &Scene, f: impl Fn([usize; 3]) -> f64) -> Vec<Texels> {
     let [width, height] = scene.frame_size().map(|n| n as usize);
     let one = |k| Texels::from_fn([width, height, 1], 1, |[x, y, _], _| f([x, y, k]));
     (0..scene.slices() as usize).map(one).collect()
 }
 
-/// Frames of a volume that shows a body, given as a function of space (mm).
+/// Frames of a volume that shows a body, which is given as a function of position in space, mm.
 pub fn body_frames(scene: &Scene, body: impl Fn(DVec3) -> f64) -> Vec<Texels> {
     let place = |[i, j, k]: [usize; 3]| match &scene.geometry {
         Geometry::Sweep(probe) => probe.to_space(Indices { sample: i as f64, line: j as f64, slice: k as f64 }),
@@ -326,8 +327,8 @@ pub fn modes() -> Vec<SceneSpec> {
     MODES.iter().map(|(name, toml)| SceneSpec::new(name, &sweep, BYTES, format!("{toml}\n{ALL_FILTERS}"))).collect()
 }
 
-/// Frames of a wavy wall between two slightly uneven tissues: structure to render and filter in every mode. The wall has another depth for
-/// each volume `number`.
+/// Frames of a wavy wall between two slightly uneven tissues, which give every mode structure to render and filter. The depth of the wall
+/// depends on the volume `number`.
 pub fn wall(scene: &Scene, number: u32) -> Vec<Texels> {
     let shift = 4.0 * f64::from(number);
     body_frames(scene, |p| {

@@ -1,5 +1,5 @@
-//! Comparisons with what is expected: outputs of a pass with its reference, pictures with pictures, and difference pictures for the
-//! report.
+//! Compares results with expected ones: outputs of a pass with its reference, and pictures with pictures. It also draws difference pictures
+//! for the report.
 
 use super::Findings;
 use crate::passes::slots::Format;
@@ -13,14 +13,14 @@ use crate::scene::Scene;
 pub struct Comparison {
     /// Largest error of the texels within tolerance, in the units of the output.
     pub largest: f64,
-    /// The same as a share of the allowed error.
+    /// Largest error of the texels within tolerance, as a share of the allowed error.
     pub used: f64,
-    /// Largest share of the texels of an output beyond tolerance, minus the extra share allowed.
+    /// Share of the texels beyond tolerance, minus the additionally allowed share; the largest of all outputs.
     pub outliers: f64,
-    /// Mean signed error of the texels within tolerance, as a share of the allowed error: rounding errors do not all have one sign.
-    /// The maximum over outputs that have enough written texels.
+    /// Mean signed error of the texels within tolerance, as a share of the allowed error. Rounding errors have both signs, so it is small.
+    /// The maximum over all outputs that have enough written texels.
     pub bias: f64,
-    /// The worst texel of an output with more texels beyond tolerance than its pass allows.
+    /// The worst texel of an output that has more texels beyond tolerance than its pass allows.
     pub worst: Option<Worst>,
 }
 
@@ -49,10 +49,10 @@ pub struct ExtraTolerance {
 }
 
 impl ExtraTolerance {
-    /// For a pass that samples with the device's texture filter: weights of `bits` bits, possibly truncated, along three axes, between
-    /// neighbours that differ by at most 1. Where a pass compares samples with a threshold or looks them up in a transfer function, a small
-    /// difference may become a large one, and a share of the texels may be off: a threshold is reached a step earlier or later, and rarely
-    /// in another voxel. Single samples are judged by the group "sampling".
+    /// The extra tolerance of a pass that samples with the device's texture filter: weights of `bits` bits, possibly truncated, along three
+    /// axes, between neighbours that differ by at most 1. If a pass compares samples with a threshold or looks them up in a transfer
+    /// function, a small difference may become a large one. Then a share of the texels may be wrong: a threshold is reached a step earlier
+    /// or later, and rarely in another voxel. The group "sampling" judges single samples.
     pub fn of(pass: &Pass, scene: &Scene, args: &DispatchArgs, bits: u32) -> ExtraTolerance {
         if !pass.reads(scene, args).iter().any(|bind| bind.filtered) {
             return ExtraTolerance::default();
@@ -77,8 +77,8 @@ pub(super) fn tolerance_of(pass: &Pass, extra: ExtraTolerance, slot: Slot, forma
     tolerance + 1.01 * Texels::spacing(format, expected) + extra.at(slot)
 }
 
-/// Compares all outputs of a dispatch with those of the reference. `poison`: value of the outputs before it; where the reference leaves
-/// NaN, it must be unchanged.
+/// Compares all outputs of a dispatch with those of the reference. `poison`: value of the outputs before the dispatch. Where the reference
+/// has NaN, this value must be unchanged.
 pub fn compare_outputs(
     pass: &Pass,
     scene: &Scene,
@@ -239,7 +239,7 @@ pub fn compare_picture(findings: &mut Findings, input: &str, expected: &Picture,
     findings.figures.push(Figure { allowed: None, ..largest });
 }
 
-/// Adds a fault unless two pictures are identical, byte for byte. Returns whether they are.
+/// Adds a fault unless two pictures are identical, byte for byte. Returns true if they are.
 pub fn expect_same_picture(findings: &mut Findings, what: &str, expected: &Picture, got: &Picture) -> bool {
     if expected == got {
         return true;
@@ -252,7 +252,7 @@ pub fn expect_same_picture(findings: &mut Findings, what: &str, expected: &Pictu
     let apart = picture_difference(expected, got);
     let other = expected.rgba.iter().zip(&got.rgba).filter(|(a, b)| a != b).count();
     let values = expected.rgba.len();
-    let said = format!("{what}: {other} of {values} values are others, by {} levels at most", apart.largest);
+    let said = format!("{what}: {other} of {values} values differ, by {} levels at most", apart.largest);
     let fault = Some(findings.faults.len());
     findings.pictures.push(PictureComparison { fault, ..picture_comparison(what, expected, got) });
     findings.faults.push(Fault { worst: Some(Worst { beyond: other, ..apart.worst }), ..Fault::new(said) });

@@ -1,5 +1,6 @@
-//! What the checks exercise: shaders, pipelines, specialization constants, workgroups and classes of instructions by pass, and Vulkan commands by group
-//! of checks. It follows from the declarations of passes and built-in scenes, so that no device is needed.
+//! What the checks exercise: for each pass the shaders, pipelines, specialization constants, workgroups and classes of instructions, and
+//! for each group of checks the Vulkan commands. It is derived from the declarations of passes and from built-in scenes, so that no device
+//! is needed.
 
 use super::each_pass::dispatch_args_of;
 use crate::passes::device_limits::{self, MEASURES, POSITIONS};
@@ -9,15 +10,15 @@ use crate::spirv;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
-/// What the check of one pass exercises.
+/// The coverage of one pass by its check.
 #[derive(Default)]
 pub struct PassCoverage {
     pub shaders: BTreeSet<&'static str>,
-    /// Constants with the values that they have.
+    /// Specialization constants with the values that they have in the checks.
     pub constants: BTreeMap<&'static str, BTreeSet<i32>>,
     /// Sets of values of all constants of a shader.
     pub pipelines: BTreeSet<(&'static str, Vec<(&'static str, i32)>)>,
-    /// The most workgroups along each axis.
+    /// Largest number of workgroups along each axis.
     pub groups: [u32; 3],
     /// Classes of instructions of its shaders.
     pub classes: BTreeSet<&'static str>,
@@ -91,7 +92,7 @@ const COMMANDS: [(&str, &str); 21] = [
     ("vkWaitSemaphores", "determinism, failures"),
 ];
 
-/// All of it as text, a line for each pass, class, shader that nothing runs, and command.
+/// The coverage as text, a line for each pass, class, unused shader and command.
 pub fn text(scenes: &[(String, Scene)]) -> String {
     let (of_passes, mut text) = (passes(scenes), String::new());
     let mut by_class: BTreeMap<&str, Vec<&str>> = BTreeMap::new();

@@ -1,4 +1,4 @@
-//! Group "determinism": the same input gives the same bits when rendered again, by another renderer, in another context, on any number
+//! Group "determinism": the same input gives the same bits if it is rendered again, by another renderer, in another context, on any number
 //! of queues, with frames in any order, and with any number of threads of a software device.
 
 use super::built_in::Noise;
@@ -141,10 +141,10 @@ fn again(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     Ok(findings)
 }
 
-/// Checksums of the pictures of every mode, one line per mode.
+/// Checksums of the pictures of every mode, one line for each mode.
 ///
 /// # Errors
-/// A device that fails.
+/// The device fails.
 pub fn digest(context: &Arc<Context>) -> Result<String, GpuError> {
     Ok(digest_of(&render::modes(context)?))
 }
@@ -248,8 +248,8 @@ fn end(mut child: Child) -> Result<String, String> {
     let mut said = String::new();
     let read = child.stdout.take().map_or(Ok(0), |mut out| out.read_to_string(&mut said));
     match (status.success(), read) {
-        (false, _) => Err(format!("the program beside this one failed: {status}")),
-        (true, Err(fault)) => Err(format!("what the program beside this one printed: {fault}")),
+        (false, _) => Err(format!("the child process failed: {status}")),
+        (true, Err(fault)) => Err(format!("the output of the child process: {fault}")),
         (true, Ok(_)) => Ok(said),
     }
 }

@@ -1,5 +1,5 @@
 //! Group "passes": every pass alone against its f64 reference, on noise and extremes, at awkward sizes, in every variant of the geometry.
-//! Each pass gets its own inputs, so that errors do not accumulate; outputs are poisoned first, so that unwritten texels are detected.
+//! Each pass gets its own inputs, so that errors do not accumulate. Outputs are poisoned first, so that unwritten texels are detected.
 
 use super::built_in::Noise;
 use super::compare::{Comparison, ExtraTolerance, compare_outputs, texel_comparison};
@@ -17,7 +17,7 @@ use crate::spirv;
 use std::collections::HashSet;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
-/// Value of outputs before a pass: no pass computes it by chance, and every format stores it (nearly).
+/// Value of outputs before a pass. No pass computes it by chance, and every format stores it almost exactly.
 pub const POISON: f64 = 0.654_321;
 
 /// Maximum mean signed error of a dispatch, as a share of the allowed error of a texel. Rounding errors have both signs.
@@ -41,7 +41,7 @@ pub struct DispatchComparison {
 /// Dispatches one pass alone on inputs of a kind (one of [`KINDS`]), and compares it with its reference.
 ///
 /// # Errors
-/// A device that fails.
+/// The device fails.
 pub fn run_with_reference(
     runner: &mut PassRunner,
     scene: &Scene,
@@ -65,7 +65,7 @@ pub fn run_with_reference(
     Ok(DispatchComparison { inputs, expected, got, writes, comparison })
 }
 
-/// One check per pass.
+/// One check for each pass.
 pub fn checks(_: Level) -> Vec<Check> {
     PASSES.iter().map(|pass| Check::new("passes", pass.name, move |dut| check(dut, pass))).collect()
 }
@@ -105,7 +105,7 @@ fn votes(scene: &Scene, pass: &Pass) -> bool {
     spirv::embedded(name).is_some_and(|bytes| spirv::has_votes(&spirv::words(bytes)))
 }
 
-/// What distinguishes a pipeline: its shader, its constants, and the formats of its bindings; and along which axes a dispatch has more than
+/// Identifies what a dispatch exercises: its shader, its constants, the formats of its bindings, and the axes along which it has more than
 /// eight workgroups.
 pub fn variant(scene: &Scene, pass: &Pass) -> Variant {
     let args = dispatch_args_of(scene, pass, 0);
@@ -134,7 +134,7 @@ fn check(dut: &mut DeviceUnderTest, pass: &'static Pass) -> Result<Findings, Gpu
 /// Checks one pass in one scene, by their indices in [`PASSES`] and [`DeviceUnderTest::scenes`].
 ///
 /// # Errors
-/// A device that fails.
+/// The device fails.
 pub(crate) fn in_scene(dut: &mut DeviceUnderTest, n: usize, scene: usize) -> Result<Findings, GpuError> {
     let mut sum = PassSummary::default();
     sum.add(dut, &PASSES[n], scene, true)?;
@@ -253,8 +253,8 @@ impl PassSummary {
     }
 }
 
-/// Kinds of inputs: noise, all zero, all one, a single bright texel, noise beside nothing. Noise of distances is a smooth surface with cliffs and misses, of
-/// volumes blurred, so that it resembles tissue.
+/// Kinds of inputs: noise, all zero, all one, a single bright texel, and noise beside empty texels. Noise of distances is a smooth surface
+/// with cliffs and misses. Noise of volumes is blurred, so that it resembles tissue.
 pub const KINDS: [&str; 5] = ["noise", "zero", "one", "hot", SPLIT];
 
 /// Noise to one side of a column, and nothing to the other, so that some invocations of a subgroup are done before the others: only then do its
@@ -383,7 +383,7 @@ fn empty_space_of(scene: &Scene, slot: Slot, volume: &Texels) -> Texels {
     slots.remove(&slot).unwrap_or_else(|| Texels::untouched([0; 3], 1))
 }
 
-/// Dispatch arguments that are not the first of anything: of the visible slices, which are stored. Frames come in a batch.
+/// Arguments of a dispatch that is not the first one, for a part of the visible slices, which are stored. Frames come in a batch.
 pub fn dispatch_args_of(scene: &Scene, pass: &Pass, iteration: u32) -> DispatchArgs {
     let visible = scene.visible_bounds.slices();
     let slice = (visible.start + visible.end) / 2;
@@ -394,7 +394,7 @@ pub fn dispatch_args_of(scene: &Scene, pass: &Pass, iteration: u32) -> DispatchA
     DispatchArgs { layer, slice, slices, iteration, image: 0 }
 }
 
-/// Inputs of a pass, of one of [`KINDS`]. Arrays that an earlier pass computes are derived from the others.
+/// Inputs of a pass, of a kind in [`KINDS`]. Arrays that an earlier pass computes are derived from the others.
 pub fn inputs_of(scene: &Scene, pass: &Pass, args: &DispatchArgs, kind: &str, seed: u64) -> Arrays {
     let mut noise = Noise(seed);
     let mut inputs = Arrays::default();

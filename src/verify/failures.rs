@@ -1,6 +1,6 @@
-//! Group "failures": when the device refuses an allocation or is lost, the error names the operation, nothing leaks, and pictures are
-//! correct afterwards; pictures and volumes beyond the limits are refused by name before anything is created, and at the limits they
-//! are rendered correctly. Failures are simulated above the driver, on isolated contexts.
+//! Group "failures": if the device refuses an allocation or is lost, the error names the operation, nothing leaks, and pictures are correct
+//! afterwards. Pictures and volumes beyond the limits are refused by name before anything is created, and at the limits they are rendered
+//! correctly. Failures are simulated above the driver, on isolated contexts.
 
 use super::built_in::{BYTES, FLOATS, frames, scene, wall, wobbler};
 use super::compare::{count_figure, expect_same_picture};
@@ -49,7 +49,7 @@ fn case(context: &Arc<Context>, toml: &str) -> Result<RenderCase, GpuError> {
     Ok(RenderCase { scene, frames, picture })
 }
 
-/// Adds a fault if more device memory is allocated than before.
+/// Adds a fault if more device memory is allocated than the `before` bytes.
 pub fn expect_memory_returned(findings: &mut Findings, context: &Context, before: u64, after_what: &str) {
     let now = context.allocated();
     findings.expect(now <= before, || format!("{after_what}: {} bytes of device memory are still held", now - before));

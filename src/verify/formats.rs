@@ -1,4 +1,4 @@
-//! Group "formats": what the device supports for every format, and that every fallback still renders the picture of the f64 reference.
+//! Group "formats": the device's support of every format. Every fallback must still render the picture of the f64 reference.
 
 use super::built_in::{BYTES, scene, wall, wobbler};
 use super::compare::{count_figure, picture_comparison, picture_difference};
@@ -77,7 +77,7 @@ fn difference(a: &Picture, b: &Picture) -> [f64; 2] {
     [mean, most]
 }
 
-/// LargestDifference differences so far.
+/// Largest differences so far.
 #[derive(Default)]
 pub struct LargestDifference {
     pictures: usize,

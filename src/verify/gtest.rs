@@ -1,11 +1,11 @@
-//! The protocol of GoogleTest programs, so that runners which drive those, such as `deqp-runner gtest-runner` and CTest, drive
-//! `echolume verify`: the list of tests, the filter, and the lines on each test. Suites are groups, cases are checks.
+//! The protocol of GoogleTest programs, so that runners of such programs, such as `deqp-runner gtest-runner` and CTest, can run `echolume
+//! verify`: the list of tests, the filter, and the lines on each test. Suites are groups, and cases are checks.
 
 use super::report::{CheckName, Outcome, Run, Verdict, failure};
 
-/// A pattern list as of `--gtest_filter`: `POSITIVE[-NEGATIVE]`, each a list of patterns separated by `:`. In a pattern `*` is any text
-/// and `?` any single character. Selected is what matches a positive pattern and no negative one; without positive patterns, what
-/// matches no negative one.
+/// A pattern list in the syntax of `--gtest_filter`: `POSITIVE[-NEGATIVE]`, each a list of patterns separated by `:`. In a pattern `*` is
+/// any text and `?` any single character. A name is selected if it matches a positive pattern and no negative one. Without positive
+/// patterns it is selected if it matches no negative one.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Filter {
     positive: Vec<String>,
@@ -26,7 +26,7 @@ impl std::str::FromStr for Filter {
 }
 
 impl Filter {
-    /// True if the filter selects the test of this full name, `suite.case`.
+    /// True if the filter selects the test with this full name, `suite.case`.
     pub fn selects(&self, name: &str) -> bool {
         let any = |patterns: &[String]| patterns.iter().any(|pattern| matches(pattern.as_bytes(), name.as_bytes()));
         any(&self.positive) && !any(&self.negative)
@@ -73,7 +73,7 @@ pub fn full_name(check: &CheckName) -> String {
     format!("{}.{}", identifier(&check.group), identifier(&check.name))
 }
 
-/// The list of `--gtest_list_tests`: each suite with a dot, its cases below it, indented by two spaces.
+/// The output of `--gtest_list_tests`: each suite with a dot, and its cases below it, indented by two spaces.
 pub fn list(checks: &[CheckName]) -> String {
     let (mut text, mut group) = (String::new(), None);
     for check in checks {
@@ -103,8 +103,8 @@ pub fn begins(check: &CheckName) -> String {
     format!("[ RUN      ] {}", full_name(check))
 }
 
-/// The lines after a check; with what it has found if it did not pass. Brackets in a message become parentheses, because runners search
-/// every line for the verdict.
+/// The lines after a check, with its faults if it did not pass. Brackets in a message become parentheses, because runners search every line
+/// for the verdict.
 pub fn ends(outcome: &Outcome) -> String {
     let name = full_name(&outcome.check());
     let ms = milliseconds(outcome.seconds);

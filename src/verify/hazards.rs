@@ -121,8 +121,8 @@ fn volume_waited_for(
     Ok((renderer.picture()?, renderer.read(Slot::Volume)?))
 }
 
-/// Sends volumes one after the other, each into the image that `into` returns, while the one before is rendered. With alternating images
-/// they do not mix; sent into the image that is being rendered they would.
+/// Sends volumes one after the other, each into the image that `into` returns, while the previous one is rendered. With alternating images
+/// they do not mix. If they are sent into the image that is being rendered, they would.
 pub fn alternating_images(
     findings: &mut Findings,
     context: &Arc<Context>,
@@ -238,7 +238,7 @@ fn any_order(
                             .pictures
                             .push(PictureComparison { fault, ..texel_comparison("volume", volume, there, slice) });
                     }
-                    findings.faults.push(Fault::new(format!("{what}: the volume is another")));
+                    findings.faults.push(Fault::new(format!("{what}: the volume differs")));
                 }
                 totals = [totals[0] + 1, totals[1] + usize::from(!is_same)];
             }

@@ -15,7 +15,7 @@ use crate::report::{Fault, Figure, Level, PictureComparison, Unit, Worst};
 use crate::scene::Scene;
 use glam::DVec3;
 
-/// The checks are the same at every level. The slowest come last.
+/// The checks, which are the same at every level. The slowest come last.
 pub fn checks(_: Level) -> Vec<Check> {
     let of = |name: &str, work: fn(&mut DeviceUnderTest) -> Result<Findings, GpuError>| {
         Check::new("known answers", name, work)
@@ -479,7 +479,13 @@ fn ramp_along(
             let input =
                 format!("a ramp along {name}, plane {plane} turned by {azimuth} deg, {shown} mm from black to white");
             let at = [x, y, 0];
-            findings.faults.push(fault(input, "what is there is somewhere else", "picture", at, [expected, value]));
+            findings.faults.push(fault(
+                input,
+                "a value of the ramp is at the wrong position",
+                "picture",
+                at,
+                [expected, value],
+            ));
         }
     }
     if findings.faults.len() > faults {

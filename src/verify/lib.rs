@@ -1,10 +1,9 @@
-//! Checks that a device and its driver render correctly: every pass, every mode and every kind of failure, on inputs that are built
-//! into the program, so that no source tree is needed. The result is a [`Run`]; [`report`] writes it as text, JSON, JUnit XML and HTML
-//! and compares it with an earlier run.
+//! Checks that a device and its driver render correctly: every pass, every mode and every kind of failure, on inputs that are built into
+//! the program, so that no source tree is needed. The result is a [`Run`]. [`report`] writes it as text, JSON, JUnit XML and HTML, and
+//! compares it with an earlier run.
 //!
-//! A [`Check`] runs on a [`DeviceUnderTest`] and returns [`Findings`]. Modules are named like the groups that `echolume verify --list`
-//! prints. [`self_test`] proves the checks by fault injection: it injects faults on the device's side and records which check
-//! detects each.
+//! A [`Check`] runs on a [`DeviceUnderTest`] and returns [`Findings`]. Modules have the names of the groups that `echolume verify --list`
+//! prints. [`self_test`] proves the checks by fault injection: it injects faults on the device's side and records which check detects each.
 
 #![forbid(unsafe_code)]
 
@@ -88,8 +87,8 @@ pub fn run(
     dut.run_of(outcomes, begun)
 }
 
-/// Runs checks one after the other by `one`, which is given their places, and calls `tell` after each. Once `stop` returns a reason,
-/// the remaining checks are interrupted, so that there is one outcome for each name.
+/// Runs checks one after the other by `one`, which receives their indices, and calls `tell` after each. Once `stop` returns a reason, the
+/// remaining checks are interrupted, so that there is one outcome for each name.
 pub fn run_each(
     names: &[CheckName],
     stop: impl Fn() -> Option<&'static str>,
@@ -111,7 +110,7 @@ pub fn run_each(
     outcomes
 }
 
-/// A run of these outcomes that ends now. `device`: what they are of; `validation`: whether the validation layer watched.
+/// A run with these outcomes that ends now. `device`: the tested device; `validation`: true if the validation layer was active.
 pub fn run_on(device: machine::Device, validation: bool, level: Level, outcomes: Vec<Outcome>, begun: Instant) -> Run {
     Run {
         format: Run::FORMAT.into(),
@@ -125,23 +124,23 @@ pub fn run_on(device: machine::Device, validation: bool, level: Level, outcomes:
     }
 }
 
-/// The run of a device that could not be started: one failed check, which says why.
+/// The run of a device that could not be started: one failed check with the reason.
 pub fn unstarted(level: Level, why: String, begun: Instant) -> Run {
     let check = CheckName { group: report::START.into(), name: "start of the device".into() };
     let outcome = Outcome { seconds: begun.elapsed().as_secs_f64(), ..Outcome::unrun(&check, Verdict::Failed, why) };
     run_on(machine::Device::unknown(), false, level, vec![outcome], begun)
 }
 
-/// What a check measured and detected.
+/// The measurements and faults of a check.
 #[derive(Default)]
 pub struct Findings {
     pub figures: Vec<Figure>,
     pub faults: Vec<Fault>,
     pub notes: Vec<String>,
     pub pictures: Vec<PictureComparison>,
-    /// Set if the check was skipped: what this device or system lacks.
+    /// The reason why the check was skipped: what this device or system lacks. None if it was not skipped.
     pub left_out: Option<String>,
-    /// Set if a signal ended the check before it had seen everything: which.
+    /// The signal that ended the check before it was complete. None if it was complete.
     pub interrupted: Option<&'static str>,
 }
 
@@ -185,8 +184,8 @@ impl Check {
         Check { group, name: name.into(), work: Box::new(work) }
     }
 
-    /// Runs the check, and if it fails, as [`Outcome::explained`] says. An error of the device is a fault; after a lost device the next check gets
-    /// a new context.
+    /// Runs the check. If it fails, it is repeated as described at `Outcome::explained`. An error of the device is a fault. After a lost
+    /// device the next check gets a new context.
     pub fn run(&self, dut: &mut DeviceUnderTest) -> Outcome {
         let first = self.run_once(dut);
         if first.verdict != Verdict::Failed {
@@ -239,7 +238,7 @@ impl Check {
         (self.work)(dut)
     }
 
-    /// Runs the check after one of `group`, which becomes this check's group. None: nothing was run before.
+    /// Runs the check after one of `group`, which is then set to this check's group. None: no check was run before.
     pub fn run_after(&self, group: &mut Option<&'static str>, dut: &mut DeviceUnderTest) -> Outcome {
         // State that the validation layer keeps of one group must not affect the next: see `IsolatedContext`.
         let is_other = group.replace(self.group).is_some_and(|before| before != self.group);
@@ -280,7 +279,7 @@ pub struct DeviceUnderTest {
     scenes: Rc<Vec<(String, Scene)>>,
     /// Called on every new context.
     prepare: Option<fn(&Context)>,
-    /// The program that checks start as a child process; None if this process is not the `echolume` program.
+    /// The program that checks start as a child process. None if this process is not the `echolume` program.
     pub program: Option<PathBuf>,
     modes: Option<Rc<Vec<Drawn>>>,
     /// Fault injected into every new context.
@@ -300,7 +299,7 @@ impl DeviceUnderTest {
         DeviceUnderTest::prepared(options, level, None)
     }
 
-    /// Like `new`, but calls `prepare` on every context before anything is created from it.
+    /// As [`DeviceUnderTest::new`], but calls `prepare` on every context before anything is created from it.
     ///
     /// # Errors
     /// As [`DeviceUnderTest::new`].
@@ -355,7 +354,8 @@ impl DeviceUnderTest {
         self.scenes.clone()
     }
 
-    /// Every mode with filters of every stage, rendered in the simplest way: the expected pictures of other checks. Rendered once.
+    /// Every mode with filters of every stage, rendered in the simplest way. Other checks use them as expected pictures. They are rendered
+    /// once.
     ///
     /// # Errors
     /// The device fails.
@@ -373,7 +373,7 @@ impl DeviceUnderTest {
         &mut self.pass_runner
     }
 
-    /// Another context on the same device, because the old one was lost or will be.
+    /// Another context on the same device, because the previous one was lost or will be.
     ///
     /// # Errors
     /// As [`DeviceUnderTest::new`].
@@ -392,18 +392,18 @@ impl DeviceUnderTest {
         Ok(context)
     }
 
-    /// RendererOptions of new contexts.
+    /// Options of new contexts.
     pub fn options(&self) -> &ContextOptions {
         &self.options
     }
 
-    /// True if the validation layer is active, and not known to see nothing.
+    /// True if the validation layer is active and not known to miss a missing barrier.
     pub fn watched(&self) -> bool {
         self.options.validation && !self.validation_is_blind
     }
 
-    /// Finds out, once and for all, whether validation notices a missing barrier. If not, its silence proves nothing, and no report says
-    /// that it watched. Without validation it notices none.
+    /// Determines whether validation detects a missing barrier, and stores the result. If it does not, its silence proves nothing, and no
+    /// report states that it was active. Without validation the result is false.
     ///
     /// # Errors
     /// As [`DeviceUnderTest::another`].

@@ -1,4 +1,4 @@
-//! Group "memory": nothing reads memory that was not written. New memory is filled with poison values that no pass computes; pictures and
+//! Group "memory": no pass reads memory that was not written. New memory is filled with poison values that no pass computes. Pictures and
 //! slots must stay the same, and some pass must write every texel of every slot.
 
 use super::compare::{add_picture_counts, count_figure, expect_same_picture, texel_comparison};

@@ -23,7 +23,7 @@ const MAX_MEAN_ANY_SCENE: f64 = 0.75;
 pub struct View {
     pub name: String,
     pub scene: Scene,
-    /// One array per slice in geometric order, with the values that the texture of a frame yields.
+    /// One array for each slice in geometric order, with the values that the texture of a frame returns.
     pub frames: Vec<Texels>,
 }
 

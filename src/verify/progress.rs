@@ -1,4 +1,4 @@
-//! What a run says while it goes on: a line for each group and each failure, and on a terminal a bar with the running check.
+//! The messages of a run in progress: a line for each group and each failure, and on a terminal a bar with the running check.
 
 use super::gtest;
 use super::report::{self, CheckName, Outcome, Verdict};
@@ -32,14 +32,14 @@ pub struct Progress {
 /// The form of the output.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Style {
-    /// One line a group, and each failure in full.
+    /// One line for each group, and each failure in full.
     Groups,
     /// The lines of a GoogleTest program.
     GoogleTest,
 }
 
 impl Progress {
-    /// `checks`: those that will run. `bar`: of [`bar`].
+    /// `checks`: the checks that will run. `bar`: the result of [`bar`].
     pub fn new(style: Style, checks: &[CheckName], bar: ProgressBar) -> Progress {
         if style == Style::GoogleTest {
             bar.set_draw_target(ProgressDrawTarget::hidden());
@@ -81,7 +81,7 @@ impl Progress {
         self.group.push(Outcome { pictures: Vec::new(), ..outcome.clone() });
     }
 
-    /// After the last check.
+    /// Ends the messages after the last check.
     pub fn finish(mut self) {
         self.end_group();
         self.bar.finish_and_clear();

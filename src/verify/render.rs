@@ -9,7 +9,8 @@ use crate::reference;
 use crate::scene::Scene;
 use std::sync::Arc;
 
-/// A renderer that holds a volume. `frames`: one array per slice in geometric order, with the values that the texture of a frame yields.
+/// A renderer that holds a volume. `frames`: one array for each slice in geometric order, with the values that the texture of a frame
+/// returns.
 pub fn sent(
     context: &Arc<Context>,
     scene: &Scene,
@@ -51,7 +52,7 @@ pub fn slot(context: &Arc<Context>, scene: &Scene, frames: &[Texels], slot: Slot
 pub struct Drawn {
     pub name: String,
     pub scene: Scene,
-    /// One array per slice, with the values that the texture of a frame yields.
+    /// One array for each slice, with the values that the texture of a frame returns.
     pub frames: Vec<Texels>,
     pub picture: Picture,
 }
@@ -83,7 +84,7 @@ pub(crate) fn reference_picture(scene: &Scene, frames: &[Texels]) -> Picture {
     Picture { width: screen.size[0] as u32, height: screen.size[1] as u32, rgba: screen.encode(Format::Rgba8) }
 }
 
-/// The picture by the f64 reference, of frames rounded to the format in which the device stores them.
+/// The picture by the f64 reference, from frames that are rounded to the format in which the device stores them.
 pub fn stored_reference_picture(scene: &Scene, frames: &[Texels]) -> Picture {
     let format = Slot::Frames.format(scene);
     let stored: Vec<_> = frames.iter().map(|f| Texels::decode(f.size, format, &f.encode(format))).collect();

@@ -1,7 +1,7 @@
 //! Group "sampling": the device's linear filter, sample by sample. Vulkan leaves a device some freedom: positions are converted to fixed
-//! point, with as many fractional bits as the device states, and a result has the precision of its format. It does not state the precision of the
-//! weights of the eight texels, which GPUs round to as many bits (measured on an H100). All results that this allows are an interval; a single
-//! sample outside is a fault. How many samples only rounded weights explain is reported.
+//! point, with as many fractional bits as the device states, and a result has the precision of its format. Vulkan does not state the
+//! precision of the weights of the eight texels, which GPUs round to as many bits (measured on an H100). The results that this allows form
+//! an interval, and a single sample outside it is a fault. The number of samples that only rounded weights explain is reported.
 
 use super::built_in::{BYTES, Noise, cartesian, scene};
 use super::compare::{count_figure, texel_comparison};
@@ -38,17 +38,18 @@ pub fn checks(_: Level) -> Vec<Check> {
     FORMATS.into_iter().map(check).collect()
 }
 
-/// The precision with which a device filters.
+/// The precision of a device's filter.
 #[derive(Clone, Copy, Debug)]
 pub struct FilterPrecision {
-    /// Fractional bits of a position (`subTexelPrecisionBits`).
+    /// Number of fractional bits of a position (`subTexelPrecisionBits`).
     pub bits: u32,
-    /// Of the texels and of the result.
+    /// Format of the texels and of the result.
     pub format: Format,
 }
 
 impl FilterPrecision {
-    /// The smallest and largest result that exact weights give at a position in shares of the volume's size, clamped to the edge.
+    /// The smallest and largest result of exact weights at a position, which is given as shares of the volume's size and clamped to the
+    /// edge.
     pub fn bounds(self, volume: &Texels, share: [f64; 3]) -> [f64; 2] {
         let [[low, high], _] = self.both_bounds(volume, share);
         [low, high]
@@ -121,15 +122,15 @@ fn blend(volume: &Texels, low: [i64; 3], at: [f64; 3]) -> f64 {
     sum
 }
 
-/// The samples that are outside of what is allowed: the worst, their number, and the largest share of the allowed interval's half that
-/// the others use.
+/// Judgement of samples: the number of those outside their interval, the worst of them, and the largest share of half the allowed interval
+/// that the others use.
 #[derive(Debug, Default)]
 pub struct Judged {
     pub outside: usize,
-    /// Of those that are not outside, the ones that only rounded weights explain.
+    /// Number of samples inside that only rounded weights explain.
     pub rounded: usize,
     pub used: f64,
-    /// Place in the output, nearest allowed value, and actual value.
+    /// Position in the output, nearest allowed value, and actual value.
     pub worst: Option<([usize; 2], f64, f64)>,
 }
 

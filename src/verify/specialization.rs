@@ -1,5 +1,5 @@
-//! Group "specialization": the driver itself applies specialization constants. Software devices otherwise get modules with the constants written
-//! in, so that the group "passes" alone would not see a driver that ignores them.
+//! Group "specialization": the driver itself applies specialization constants. Otherwise software devices get modules with the constants
+//! written in, so that the group "passes" alone would not detect a driver that ignores them.
 
 use super::each_pass::{PASSES, PassSummary, dispatch_args_of, run_with_reference, seed_of};
 use super::{Check, DeviceUnderTest, Findings};

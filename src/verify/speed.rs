@@ -1,5 +1,5 @@
-//! Group "speed": the time of each pass alone, by the clock of the device, and the time to compile its pipelines. These checks never fail by themselves; a baseline has the
-//! earlier times.
+//! Group "speed": the time of each pass alone, by the clock of the device, and the time to compile its pipelines. These checks never fail
+//! by themselves; a baseline has the earlier times.
 
 use super::built_in::{ALL_FILTERS, BYTES, cartesian, scene, wobbler};
 use super::{Check, DeviceUnderTest, Findings};

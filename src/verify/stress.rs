@@ -1,5 +1,5 @@
-//! Group "stress": random work on one device for a while. Scenes, sizes and modes change, frames arrive, renderers are created and dropped.
-//! Some pictures are compared with those of a new renderer, and at the end no memory may leak.
+//! Group "stress": random work on one device for some time. Scenes, sizes and modes change, frames arrive, and renderers are created and
+//! dropped. Some pictures are compared with those of a new renderer, and at the end no memory may have leaked.
 
 use super::built_in::{self, Noise};
 use super::compare::{add_picture_counts, count_figure, expect_same_picture};

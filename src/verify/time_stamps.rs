@@ -1,5 +1,5 @@
 //! Group "time stamps": their bits and period, that they increase and lie within the interval in which the host waited, and that slower
-//! passes have longer times. There are no absolute time limits: of several runs the least disturbed counts, so that a busy machine
+//! passes have longer times. There are no absolute time limits. Of several runs the least disturbed one counts, so that a busy machine
 //! causes no failure.
 
 use super::built_in::{BYTES, scene, wall, wobbler};
@@ -71,10 +71,10 @@ fn bits_and_period(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
 }
 
 /// Checks the spans of one picture: host spans `submit` and `wait`, and the device spans in running order. Returns two shares of the time
-/// from submission to the end of the wait: that covered by device spans, and that by which they lie outside.
+/// from submission to the end of the wait: the share that device spans cover, and the share by which they lie outside.
 ///
 /// # Errors
-/// One line: what is wrong with the spans.
+/// One line that describes the fault of the spans.
 pub fn check_spans(spans: &[Span]) -> Result<[f64; 2], String> {
     let host = |name: &str| spans.iter().find(|s| s.name == name && !s.on_device).ok_or(format!("no '{name}'"));
     let (from, to) = (host("submit")?.begin, host("wait")?.end);

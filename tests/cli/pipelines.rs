@@ -72,7 +72,7 @@ fn what_cannot_be_compared_is_refused_and_files_are_checked() {
     if measured["has_statistics"] == false {
         assert!(err.contains("VK_KHR_pipeline_executable_properties") && err.lines().count() == 1, "{err}");
         let arguments = ["profile", "--pipelines", "--compare", &file, &file];
-        refuses(&arguments, &run(&arguments), 2, &["told none"]);
+        refuses(&arguments, &run(&arguments), 2, &["reported none"]);
     }
     // Statistics as a driver with this extension tells them: the same in both, then with a spill.
     measured["has_statistics"] = true.into();

@@ -2,7 +2,7 @@
 //! crossed edge, a polygon of the vertices of its four cells (Gibson, *Constrained elastic surface nets*, MICCAI 1998). That is dual
 //! contouring without its error function.
 //!
-//! A cell that holds several patches of the surface has a vertex for each ([`super::cell`]), after Nielson, *Dual marching cubes*, IEEE
+//! A cell that holds several patches of the surface has a vertex for each (`cell`), after Nielson, *Dual marching cubes*, IEEE
 //! Visualization 2004. Two patches that meet on both sides of a face would still share one edge four times: there a vertex is put on the
 //! face. So the mesh is a manifold for any values.
 //!

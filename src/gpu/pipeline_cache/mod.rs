@@ -1,5 +1,5 @@
-//! The driver's pipeline cache, kept on disk between runs: a pipeline that was compiled once on this device, driver and version of the
-//! shaders is loaded. Everything here may fail without an effect but the time of compilation: a fault is logged, once.
+//! The driver's pipeline cache, stored on disk between runs: a pipeline that was compiled once with this device, driver and version of the
+//! shaders is loaded. A failure here costs only the time of compilation: it is logged once.
 
 mod stored;
 

@@ -1,6 +1,6 @@
-//! The file of a pipeline cache: a header that says what it is of, and what the driver handed out. Drivers trust the data that they are
-//! given, so a file is used only if it is complete, unchanged, and of the same device, driver and shaders. Any other is ignored, and
-//! replaced when the program ends.
+//! The file of a pipeline cache: a header that identifies its device, driver and shaders, and the driver's data. Drivers trust the data
+//! that they are given, so a file is used only if it is complete, unchanged, and of the same device, driver and shaders. Any other file is
+//! ignored, and replaced when the program ends.
 
 use crate::files;
 use crate::spirv;
@@ -31,13 +31,13 @@ pub fn checksum(data: &[u8]) -> u64 {
     CRC.checksum(data)
 }
 
-/// What a cache is of: another device or driver cannot use it.
+/// Identity of a cache: another device or driver cannot use it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct DriverIdentity {
     pub vendor: u32,
     pub device: u32,
     pub(crate) driver_version: u32,
-    /// pipelineCacheUUID of the driver: another one when what it stores changes.
+    /// pipelineCacheUUID of the driver. It changes when the format of the stored data changes.
     pub(crate) uuid: [u8; 16],
 }
 
@@ -48,7 +48,7 @@ impl DriverIdentity {
     }
 }
 
-/// A file of a driver, in a folder that need not exist.
+/// The file of a driver, in a folder that need not exist.
 #[derive(Clone, Debug)]
 pub(crate) struct CacheFile {
     path: PathBuf,
@@ -79,8 +79,8 @@ impl CacheFile {
         self.decode(&bytes).map(|data| Some(data.to_vec()))
     }
 
-    /// Replaces the file, and removes what is too much in its folder. Data that is too large removes the file: the next program begins
-    /// with an empty one.
+    /// Replaces the file, and removes excess files from its folder. Data that is too large removes the file instead, and the next program
+    /// begins with an empty cache.
     ///
     /// # Errors
     /// The folder or the disk cannot be written, or the data is too large.
@@ -117,7 +117,7 @@ impl CacheFile {
         let expected = self.encode(data);
         let same = |range: std::ops::Range<usize>| header[range.clone()] == expected[range];
         if !same(0..12) {
-            return refuse("is no pipeline cache of this format");
+            return refuse("is not a pipeline cache of this format");
         }
         if !same(12..40) {
             return refuse("is of another device or driver");

@@ -10,10 +10,10 @@ use crate::plan::Work;
 use crate::window::screen::{Drawn, Panels, PresentOutcome, Screen};
 
 impl Renderer {
-    /// The next picture shows volume image `image`. All of its visible frames must have been sent.
+    /// Selects volume image `image` for the next picture. All of its visible frames must have been sent.
     ///
     /// # Errors
-    /// An image that does not exist; a device that fails.
+    /// The image does not exist, or the device fails.
     pub fn show(&mut self, image: u32) -> Result<(), GpuError> {
         self.check(image)?;
         self.flush()?;
@@ -22,20 +22,20 @@ impl Renderer {
         Ok(())
     }
 
-    /// Draws a picture and copies it to the host. If nothing changed since the last picture, nothing runs.
+    /// Draws a picture and copies it to the host. If nothing changed since the last picture, no pass runs.
     ///
     /// # Errors
-    /// A device that fails; a failed change of scene.
+    /// The device fails, or the last change of the scene failed.
     pub fn picture(&mut self) -> Result<Picture, GpuError> {
         self.begin_picture()?;
         self.end_picture()
     }
 
-    /// Submits the steps that have changed since the last picture. Frames may be sent meanwhile; those for slices that the picture
+    /// Submits the steps whose inputs changed since the last picture. Frames may be sent meanwhile; frames for slices that the picture
     /// shows wait for it. If a picture is in flight, this waits for it first.
     ///
     /// # Errors
-    /// A device that fails; a failed change of scene.
+    /// The device fails, or the last change of the scene failed.
     pub fn begin_picture(&mut self) -> Result<(), GpuError> {
         self.check(self.volumes.shown())?;
         self.wait_drawn()?;
@@ -45,10 +45,10 @@ impl Renderer {
         }
     }
 
-    /// True if a picture is in flight. Submits what is held back of it and due.
+    /// True if a picture is in flight. Submits those of its held bands that are due.
     ///
     /// # Errors
-    /// A device that fails.
+    /// The device fails.
     pub fn is_drawing(&self) -> Result<bool, GpuError> {
         self.drawing.is_drawing(&self.queues)
     }
@@ -58,17 +58,18 @@ impl Renderer {
         self.queues.timelines.held()
     }
 
-    /// True if what is submitted to the device now begins before the picture in flight is done: its bands are held back.
+    /// True if the bands of the picture in flight are held back, so that other work that is submitted now begins before the picture is
+    /// done.
     pub fn is_paced(&self) -> bool {
         self.queues.timelines.is_paced()
     }
 
-    /// How long the device has been at work without finishing anything; zero if it is idle.
+    /// Time since the device last finished a submission, while it is busy; zero if it is idle.
     pub fn busy_for(&self) -> Duration {
         self.queues.timelines.busy_for()
     }
 
-    /// How much of the last picture was drawn again, also if it is in flight.
+    /// The stages that were run for the last picture, even if it is still in flight.
     pub fn drawn_work(&self) -> Work {
         self.drawing.work()
     }
@@ -78,11 +79,11 @@ impl Renderer {
         self.drawing.has_picture()
     }
 
-    /// Waits for the picture in flight and returns it; without one, returns the last picture. With pictures that stay on the
-    /// device, copies it to the host now.
+    /// Waits for the picture in flight and returns it. Without one, returns the last picture. If pictures stay on the device, the picture
+    /// is copied to the host now.
     ///
     /// # Errors
-    /// A device that fails.
+    /// The device fails.
     pub fn end_picture(&mut self) -> Result<Picture, GpuError> {
         self.wait_drawn()?;
         let [width, height] = self.program.scene.picture_size();
@@ -105,7 +106,7 @@ impl Renderer {
     /// Waits for the picture in flight. Returns it, or `None` if pictures stay on the device.
     ///
     /// # Errors
-    /// A device that fails.
+    /// The device fails.
     pub fn end_drawing(&mut self) -> Result<Option<Picture>, GpuError> {
         match self.drawing.readback().is_some() {
             true => self.end_picture().map(Some),
@@ -165,7 +166,7 @@ impl Renderer {
 }
 
 impl Renderer {
-    /// What the CPU last found of the volume that is shown, where the render start follows the fluid.
+    /// What the CPU last found before a face in the volume that is shown, if the render start follows the fluid.
     pub fn unveiled(&self) -> Option<&Unveiled> {
         self.volumes.unveiled().filter(|_| self.program.scene.unveils())
     }
@@ -186,11 +187,11 @@ impl Renderer {
 
 #[cfg(feature = "view")]
 impl Renderer {
-    /// Presents the last picture, with its upper left corner at pixel `at` of the window, and panels over it. A picture in flight is
-    /// waited for on the device and presented.
+    /// Presents the last picture, with its upper left corner at pixel `at` of the window, and panels over it. If a picture is in flight,
+    /// the device waits for it and presents it.
     ///
     /// # Errors
-    /// A device that fails, or a lost surface that cannot be recreated.
+    /// The device fails, or a lost surface cannot be recreated.
     pub fn present(
         &mut self,
         screen: &mut Screen,

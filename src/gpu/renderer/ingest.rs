@@ -1,5 +1,5 @@
-//! Stage 1: frames arrive in a ring of staging buffers, and are converted into slices of a volume image, consecutive ones in a batch: one submission,
-//! and one dispatch of each pass. If frames need no conversion, the batch is copied.
+//! Stage 1: frames arrive in a ring of staging buffers and are converted into slices of a volume image. Consecutive frames form a batch:
+//! one submission, and one dispatch of each pass. Frames that need no conversion are only copied.
 
 use super::Program;
 use crate::buffers::{Buffer, Purpose};

@@ -1,5 +1,5 @@
-//! The four stages on one device: frames in, pictures out. Each batch of frames uses an entry of a ring (staging buffer, layers of the
-//! frame array, command buffer), so that several are in flight. A picture runs only the passes whose inputs changed.
+//! The four stages on one device: frames go in, and pictures come out. Each batch of frames uses an entry of a ring (staging buffer, layers
+//! of the frame array, command buffer), so that several are in flight. A picture runs only the passes whose inputs changed.
 
 mod draw;
 mod drawing;
@@ -36,31 +36,31 @@ use volumes::Volumes;
 pub struct RendererOptions {
     /// Number of volume images: 1 for a still picture, 2 or 3 (double or triple buffering) while frames arrive during rendering.
     pub volume_images: u32,
-    /// Where the SPIR-V of a shader comes from; the embedded shaders by default.
+    /// Source of the SPIR-V of a shader. The default is the embedded shaders.
     pub shaders: Arc<Shaders>,
-    /// Record a span of time for each host and device operation; where each pass is timed, count shader invocations too.
+    /// Records a span of time for each operation of host and device. If each pass is timed, shader invocations are counted, too.
     pub spans: bool,
-    /// On a device that is the CPU, count the CPU time of each pass: [`Renderer::take_cpu_times`]. Each is then submitted alone and waited for.
+    /// On a device that is the CPU, measures the CPU time of each pass ([`Renderer::take_cpu_times`]). Each pass is then submitted alone
+    /// and waited for.
     pub cpu_times: bool,
-    /// What is timed on the device.
+    /// The operations that are timed on the device.
     pub time_stamps: TimeStamps,
     /// How the passes over the volume and the picture are divided, so that no submission takes too long.
     pub bands: Bands,
-    /// Hold back bands of a picture while the device has enough to do, so that a window's panels are drawn between them. They are submitted
-    /// by [`Renderer::is_drawing`], and by whatever waits. On a device with several queues nothing is held back.
+    /// Holds back bands of a picture while the device has enough work, so that a window's panels are drawn between them.
+    /// [`Renderer::is_drawing`] submits them, and so does every wait. On a device with several queues nothing is held back.
     pub paced: bool,
-    /// How single texels are read; `None` selects what is fast on the device.
+    /// How single texels are read. `None` selects the fast way of the device.
     pub texel_access: Option<TexelAccess>,
-    /// Maximum number of frames that go through stage 1 at once, 1..; `None` selects what is fast on the device.
+    /// Most frames that go through stage 1 at once, 1... `None` selects the best number for the device.
     pub frames_at_once: Option<u32>,
-    /// Number of queues, 1..=3; `None` uses all that the device has. With fewer on the device than given, several of them share
-    /// one.
+    /// Number of queues, 1..=3. `None` uses all queues of the device. If the device has fewer queues, several roles share one.
     pub queues: Option<usize>,
-    /// Copy every picture to the host. Otherwise it stays on the device, for presentation.
+    /// Copies every picture to the host. Otherwise pictures stay on the device, for presentation.
     pub readback: bool,
     /// Called when a pipeline has been compiled in the background.
     pub wake: Option<Wake>,
-    /// Keep a log of everything that is recorded and submitted: [`Renderer::log`].
+    /// Keeps a log of everything that is recorded and submitted ([`Renderer::log`]).
     pub log: bool,
 }
 
@@ -132,7 +132,7 @@ impl Renderer {
     /// Allocates the slots and compiles the pipelines that the scene needs.
     ///
     /// # Errors
-    /// A slot that the device cannot hold, or a shader that does not compile; the error names it.
+    /// The device cannot hold a slot, or a shader does not compile; the error names it.
     pub fn new(context: &Arc<Context>, scene: Scene, options: &RendererOptions) -> Result<Renderer, GpuError> {
         let compiler = options.compiler(context)?;
         let (scene, plan) = compiler.plan(scene);
@@ -167,7 +167,7 @@ impl Renderer {
         &self.program.plan
     }
 
-    /// The current scene, with the fields that the device resolves.
+    /// The current scene, with the fields that depend on the device.
     pub fn scene(&self) -> &Scene {
         &self.program.scene
     }
@@ -237,13 +237,12 @@ impl Renderer {
 }
 
 impl Renderer {
-    /// Sends one frame to stage 1, which writes slice `slice` of volume image `image`. `bytes` are samples of the stored type,
-    /// line by line. Returns when the bytes are copied; waits only if the ring is full. A frame that is not visible in this
-    /// scene is skipped and counted.
+    /// Sends one frame to stage 1, which writes slice `slice` of volume image `image`. `bytes` are samples of the stored type, line by
+    /// line. Returns when the bytes are copied, and waits only if the ring is full. A frame that is not visible in this scene is skipped
+    /// and counted.
     ///
-    /// Consecutive slices, up or down, go through stage 1 together. The frame waits for its successors until the batch is full, no
-    /// visible slice can follow, another slice comes, [`Renderer::submit_frames`] is called, anything reads the volume, or the scene
-    /// changes.
+    /// Consecutive slices, up or down, go through stage 1 together. A frame waits for its successors until the batch is full, no visible
+    /// slice can follow, another slice arrives, [`Renderer::submit_frames`] is called, the volume is read, or the scene changes.
     ///
     /// # Errors
     /// A frame of the wrong size, a slice or image that does not exist, a device that fails.
@@ -278,19 +277,19 @@ impl Renderer {
         }
     }
 
-    /// True if the next frame is taken without a wait for the device.
+    /// True if the next frame can be sent without waiting for the device.
     ///
     /// # Errors
-    /// A device that fails.
+    /// The device fails.
     pub fn takes_frame(&self) -> Result<bool, GpuError> {
         self.ring.is_free(&self.queues)
     }
 
-    /// Submits the frames that wait for their successors, so that the device works on them until more arrive. What is only copied goes on
-    /// waiting: submitting a slice takes longer than copying it.
+    /// Submits the frames that wait for their successors, so that the device works on them until more arrive. Frames that are only copied
+    /// stay in the batch: submitting a slice takes longer than copying it.
     ///
     /// # Errors
-    /// A device that fails.
+    /// The device fails.
     pub fn submit_frames(&mut self) -> Result<(), GpuError> {
         if self.ring.only_copies() { Ok(()) } else { self.flush() }
     }
@@ -302,29 +301,29 @@ impl Renderer {
 }
 
 impl Renderer {
-    /// True if `scene` differs from the current one, ignoring fields that the device resolves.
+    /// True if `scene` differs from the current one, ignoring fields that depend on the device.
     pub fn differs_from(&self, scene: &Scene) -> bool {
         let old = &self.program.scene;
         (&scene.geometry, &scene.settings, scene.input, scene.visible_bounds, &scene.shared)
             != (&old.geometry, &old.settings, old.input, old.visible_bounds, &old.shared)
     }
 
-    /// True if the last change of scene failed halfway: nothing can be drawn until another change succeeds.
+    /// True if the last change of the scene failed halfway. Nothing can be drawn until another change succeeds.
     pub fn needs_rebuild(&self) -> bool {
         self.broken.is_some()
     }
 
-    /// True if every pipeline of this scene is compiled. Those that are not are compiled in the background from now on, and
+    /// True if every pipeline of this scene is compiled. Otherwise the missing ones are compiled in the background from now on, and
     /// [`RendererOptions::wake`] is called after each.
     ///
     /// # Errors
-    /// A shader that does not compile, or a slot that the device cannot hold.
+    /// A shader does not compile, or the device cannot hold a slot.
     pub fn prepare(&mut self, scene: &Scene) -> Result<bool, GpuError> {
         self.compiler.prepare(scene)
     }
 
-    /// Compiles the pipelines of further scenes in the background while nothing else is to be compiled, in this order, instead of those
-    /// asked for before. Scenes that this device cannot draw are left out.
+    /// Compiles the pipelines of further scenes in the background while no other pipeline is needed, in this order. They replace the scenes
+    /// of an earlier call. Scenes that this device cannot draw are left out.
     ///
     /// # Errors
     /// The thread cannot be started.
@@ -342,12 +341,12 @@ impl Renderer {
         self.compiler.is_warming()
     }
 
-    /// Changes the scene. The next picture runs the passes that this affects. If it returns [`Rerun::Everything`] or
-    /// [`Rerun::Frames`], all frames have to be sent again first.
+    /// Changes the scene. The next picture runs the passes that the change affects. If this returns [`Rerun::Everything`] or
+    /// [`Rerun::Frames`], all frames must be sent again first.
     ///
     /// # Errors
-    /// If a shader does not compile or the device can never hold a slot, the old scene stays in use. If memory runs out
-    /// halfway, nothing can be drawn until another change succeeds; that one rebuilds everything.
+    /// If a shader does not compile or the device can never hold a slot, the old scene stays in use. If memory is exhausted halfway,
+    /// nothing can be drawn until another change succeeds, which rebuilds everything.
     pub fn change(&mut self, scene: Scene) -> Result<Rerun, GpuError> {
         // Frames that wait go through the stage 1 that they were sent to.
         self.flush()?;
@@ -402,11 +401,11 @@ impl Renderer {
         Ok(rerun)
     }
 
-    /// Compiles the pipelines that use `shaders` again, because their source changed. Returns what has to run again, as
+    /// Compiles the pipelines that use `shaders` again, because their source changed. Returns which stages must run again, as
     /// [`Renderer::change`] does.
     ///
     /// # Errors
-    /// A shader that does not exist, or that disagrees with the declaration of its pass. The previous pipelines stay.
+    /// The shader does not exist, or disagrees with the declaration of its pass. The previous pipelines stay.
     pub fn reload_shaders(&mut self, shaders: &HashSet<String>) -> Result<Rerun, GpuError> {
         if let Some(fault) = &self.broken {
             return Err(GpuError::Broken(fault.clone()));
@@ -452,10 +451,11 @@ impl Renderer {
 }
 
 impl Renderer {
-    /// The current content of an image slot; of the volume all of it, zeros where nothing is stored. `None` for a slot that is not in the plan, and for a lookup table in a buffer.
+    /// The current content of an image slot. For the volume it is all of it, with zeros where nothing is stored. `None` for a slot that is
+    /// not in the plan, and for a lookup table in a buffer.
     ///
     /// # Errors
-    /// A device that fails; a failed change of scene.
+    /// The device fails, or the last change of the scene failed.
     pub fn read(&mut self, slot: Slot) -> Result<Option<Texels>, GpuError> {
         let Some((readback, size, format)) = self.bring_back(slot)? else { return Ok(None) };
         let part = Texels::decode(size, format, &readback.bytes()?);
@@ -471,14 +471,14 @@ impl Renderer {
         self.drawing.bring_back(&mut self.queues, &self.slots, (slot, shown))
     }
 
-    /// Waits for the device, and returns the times of what [`RendererOptions::time_stamps`] selects since the last call, ns. Empty if the
-    /// device has no time stamps.
+    /// Waits for the device, and returns the times since the last call of the operations that [`RendererOptions::time_stamps`] selects, ns.
+    /// Empty if the device has no time stamps.
     pub fn take_times(&mut self) -> Result<Vec<PassTime>, GpuError> {
         self.collect()?;
         Ok(self.queues.timings.take_times())
     }
 
-    /// Number of passes and copies since the last call that could not be timed: too many frames arrived while a picture was drawn.
+    /// Number of passes and copies since the last call that could not be timed, because too many frames arrived while a picture was drawn.
     pub fn take_untimed(&mut self) -> u64 {
         self.queues.timings.take_untimed()
     }
@@ -488,21 +488,20 @@ impl Renderer {
         self.queues.timings.take_times()
     }
 
-    /// Waits for the device, and returns every span since the last call, ns on the host's clock; empty without
-    /// [`RendererOptions::spans`].
+    /// Waits for the device, and returns every span since the last call, ns on the host's clock. Empty without [`RendererOptions::spans`].
     pub fn take_spans(&mut self) -> Result<Vec<Span>, GpuError> {
         self.collect()?;
         Ok(self.queues.timings.take_spans())
     }
 
-    /// CPU time of the passes since the last call, ns, one entry for each run; empty without [`RendererOptions::cpu_times`], on a GPU, and where
-    /// the system does not report it. Recording a pass is part of it.
+    /// CPU time of the passes since the last call, ns, one entry for each run. The time to record a pass is part of it. Empty without
+    /// [`RendererOptions::cpu_times`], on a GPU, and if the system does not report CPU times.
     pub fn take_cpu_times(&mut self) -> Vec<(&'static str, f64)> {
         self.queues.timings.take_cpu()
     }
 
-    /// The largest error, ns, with which spans of the device were placed on the host's clock; `None` without spans, and if the device's
-    /// clock cannot be read.
+    /// Largest error of the position of device spans on the host's clock, ns. `None` without spans, and if the device's clock cannot be
+    /// read.
     pub fn clock_deviation(&self) -> Option<u64> {
         self.queues.timings.clock_deviation()
     }
@@ -515,8 +514,8 @@ impl Renderer {
         Ok(self.dispatch_extents(work)?.into_iter().map(|(name, _)| name).collect())
     }
 
-    /// The names of the passes that `work` dispatches, frames that it leaves waiting included, and their invocations along x, y, z; in
-    /// bands, those of each band.
+    /// The names of the passes that `work` dispatches, including those for frames that it leaves waiting, and their invocations along x, y
+    /// and z. With bands there is an entry for each band.
     pub fn dispatch_extents<T>(
         &mut self,
         work: impl FnOnce(&mut Renderer) -> Result<T, GpuError>,

@@ -1,4 +1,4 @@
-//! The volume images of a renderer: which of them pictures show, what of them passes have to process again, and what the CPU found in them.
+//! The volume images of a renderer: which one pictures show, which slices passes must process again, and what the CPU found in them.
 
 use crate::error::GpuError;
 use crate::passes::Slot;

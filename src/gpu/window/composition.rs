@@ -1,5 +1,5 @@
-//! The composed window: picture and panels in an image of their own, which is copied to the window. While only the picture changes, as in a drag, the
-//! panels beside it stay as they are: to draw them takes a software device as long as a coarse picture.
+//! The composed window: picture and panels in an image of their own, which is copied to the window. While only the picture changes, as
+//! during a drag, the panels beside it stay as they are: drawing them takes a software device as long as a coarse picture.
 
 use super::flat_image::FlatImage;
 use crate::context::Context;
@@ -13,7 +13,7 @@ pub(super) struct Composition {
     pub image: FlatImage,
     /// It was drawn into, and has a layout.
     pub is_laid_out: bool,
-    /// What it holds; None if that is not known.
+    /// Its content. None if it is not known.
     pub content: Option<Content>,
 }
 

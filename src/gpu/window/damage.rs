@@ -1,5 +1,5 @@
-//! What of the composed window has to be drawn again: the picture, and where panels beside it changed. To draw all of them takes a software device as long as
-//! a coarse picture.
+//! Determines which parts of the composed window must be drawn again: the picture, and the panels beside it that changed. Drawing all
+//! panels takes a software device as long as a coarse picture.
 
 use super::composition::Content;
 use egui::epaint::{Primitive, Vertex};
@@ -54,7 +54,7 @@ enum Change {
     None,
     /// Points.
     Within(Rect),
-    /// Nobody knows what is drawn.
+    /// It is not known what is drawn.
     Unknown,
 }
 

@@ -1,4 +1,5 @@
-//! A two-dimensional colour image with its view, in the device's memory: what the panels and the composed window are drawn from and into.
+//! A two-dimensional colour image with its view, in the device's memory. Panels are drawn from such images, and the composed window is
+//! drawn into one.
 
 use crate::context::Context;
 use crate::error::{ErrorContext, GpuError};

@@ -1,5 +1,7 @@
-//! Presentation: `target` is a window or a monitor, `swapchain` the images of its surface, `screen` copies the picture into
-//! `composition`, draws the panels over it, whose textures `panel_textures` keeps, and copies both into one of them; `flat_image` is what both hold. `present_wait` measures when a picture is seen. A build without the feature `view` has only a target that cannot exist.
+//! Presentation. `target` is a window or a monitor, and `swapchain` the images of its surface. `screen` copies the picture into
+//! `composition`, draws the panels over it, and copies the result into an image of the swapchain. `panel_textures` keeps the textures of
+//! the panels, and `flat_image` is the type of image of both. `present_wait` measures when a picture becomes visible. A build without the
+//! feature `view` has only a target that cannot exist.
 
 #[cfg(feature = "view")]
 mod composition;
@@ -25,7 +27,7 @@ pub use swapchain::PresentMode;
 #[cfg(feature = "view")]
 pub use target::{MonitorChoice, Target, WindowHandles};
 
-/// The target of presentation in a build without the feature `view`. No value of it exists, so nothing here is ever called.
+/// The target of presentation in a build without the feature `view`. No value of it exists, so no function here is ever called.
 #[cfg(not(feature = "view"))]
 pub(super) mod target {
     use crate::device_selection::Candidate;

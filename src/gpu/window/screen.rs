@@ -1,5 +1,5 @@
-//! Presents a picture and panels: composes them, and copies them into the next image of the swapchain. One such drawing is in flight at a time: a copy
-//! and a few triangles take little time compared with a picture.
+//! Presents a picture and panels: composes them, and copies them into the next image of the swapchain. One such drawing is in flight at a
+//! time, because a copy and a few triangles take little time compared with a picture.
 
 use super::composition::{self, Composition};
 use super::panel_textures::{PanelTextures, failed};
@@ -27,11 +27,11 @@ const BACKGROUND: [f32; 4] = [0.035, 0.04, 0.05, 1.0];
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PresentOutcome {
     Presented,
-    /// Nothing can be presented now: the window is minimised or covered, or its monitor is gone.
+    /// Nothing can be presented now: the window is minimised or covered, or its monitor is disconnected.
     NotPresentable,
 }
 
-/// The picture of a renderer, and what orders its use among the renderer's work.
+/// The picture of a renderer, and the state that orders its use among the renderer's work.
 pub struct Drawn<'a> {
     pub image: &'a Image,
     pub(crate) queues: &'a mut DeviceQueues,
@@ -81,7 +81,7 @@ impl Screen {
     /// `size`: the size of the window, pixels; ignored for a monitor.
     ///
     /// # Errors
-    /// A target on which the device cannot present.
+    /// The device cannot present on the target.
     pub fn new(
         context: &Arc<Context>,
         target: Target,
@@ -145,12 +145,12 @@ impl Screen {
     /// Presents panels without a picture.
     ///
     /// # Errors
-    /// A device that fails; a lost surface that cannot be recreated.
+    /// The device fails, or a lost surface cannot be recreated.
     pub fn show(&mut self, panels: Option<Panels>) -> Result<PresentOutcome, GpuError> {
         self.show_with(Content::Nothing, panels)
     }
 
-    /// Presents a picture and panels over it. A picture in flight is waited for on the device.
+    /// Presents a picture and panels over it. If the picture is in flight, the device waits for it.
     ///
     /// # Errors
     /// As of [`Screen::show`].
@@ -631,7 +631,7 @@ fn barrier(device: &ash::Device, commands: vk::CommandBuffer, image: vk::Image, 
 #[derive(Default)]
 pub struct Panels {
     pub shapes: Vec<egui::ClippedPrimitive>,
-    /// Textures (also of glyphs) that were added, changed or freed since the last frame. egui reports each only once, so none may be
+    /// Textures (also of glyphs) that were added, changed or freed since the last frame. egui reports each change only once, so none may be
     /// skipped.
     pub textures: egui::TexturesDelta,
     /// Pixels per point.

@@ -71,7 +71,7 @@ impl Swapchain {
     /// A surface without images; [`Swapchain::fit`] creates them.
     ///
     /// # Errors
-    /// A target on which the device cannot present.
+    /// The device cannot present on the target.
     pub fn new(context: &Arc<Context>, target: Target, present_mode: PresentMode) -> Result<Swapchain, GpuError> {
         let surface = target.surface(&context.entry, &context.instance, context.candidate.handle)?;
         let (handle, images, format) = (vk::SwapchainKHR::null(), Vec::new(), vk::Format::UNDEFINED);
@@ -142,8 +142,8 @@ impl Swapchain {
         Ok(())
     }
 
-    /// Recreates the images with the size of the surface, or with `wanted`, pixels, if the surface has no size of its own. Returns false
-    /// if the surface is empty, as with a minimised window. Nothing may be in flight.
+    /// Recreates the images with the size of the surface, or with `wanted`, pixels, if the surface has no size of its own. Returns false if
+    /// the surface is empty, as that of a minimised window. Nothing may be in flight.
     pub fn fit(&mut self, wanted: [u32; 2]) -> Result<bool, GpuError> {
         // It waits with the swapchain that is replaced.
         self.waiter = None;
@@ -219,7 +219,7 @@ impl Swapchain {
         Ok(SwapchainImage { handle, drawn })
     }
 
-    /// Acquires the next image; waits at most so long. The semaphore is signalled when the image may be written.
+    /// Acquires the next image, and waits at most `nanoseconds` for it. The semaphore is signalled when the image may be written.
     pub fn acquire(&self, nanoseconds: u64, free: vk::Semaphore) -> Result<u32, vk::Result> {
         let Some(presentation) = &self.context.presentation else { return Err(vk::Result::ERROR_SURFACE_LOST_KHR) };
         self.context.faults.check(InjectionPoint::Acquire)?;
@@ -230,7 +230,7 @@ impl Swapchain {
         acquired.map(|(image, _)| image)
     }
 
-    /// Presents an image when it has been drawn. Returns true if the swapchain should be recreated.
+    /// Presents an image once it has been drawn. Returns true if the swapchain should be recreated.
     pub fn present(&mut self, image: u32) -> Result<bool, vk::Result> {
         let Some(presentation) = &self.context.presentation else { return Err(vk::Result::ERROR_SURFACE_LOST_KHR) };
         let (chains, images, drawn) = ([self.handle], [image], [self.images[image as usize].drawn]);

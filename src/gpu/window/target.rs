@@ -21,7 +21,7 @@ pub enum Target {
 }
 
 impl Target {
-    /// The instance extensions that a surface on it needs.
+    /// The instance extensions that a surface on this target needs.
     ///
     /// # Errors
     /// A windowing system that Vulkan does not support here.
@@ -49,10 +49,10 @@ impl Target {
         matches!(self, Target::Monitor(_))
     }
 
-    /// A surface on it for this device.
+    /// Creates a surface on this target for the device.
     ///
     /// # Errors
-    /// A window that is gone; no free monitor.
+    /// The window is closed, or no monitor is free.
     pub fn surface(
         &self,
         entry: &Entry,
@@ -70,7 +70,7 @@ impl Target {
             .context(|| "create a surface on the window".into())
     }
 
-    /// Adds to the missing features of a candidate what it lacks to present here.
+    /// Adds the features that the candidate lacks for presentation on this target to its missing features.
     pub(crate) fn check_support(&self, entry: &Entry, instance: &Instance, candidate: &mut Candidate) {
         if !candidate.can_present {
             candidate.missing.push("VK_KHR_swapchain or dynamicRendering".into());

@@ -1,11 +1,11 @@
-//! The range of the field over a part of a ray, proven: interval coordinates, and the extremes of the cell's function.
+//! Proven range of the field over a part of a ray, by interval coordinates and the extremes of the function of a cell.
 //!
-//! Across slices that function is linear, or a cubic B-spline (`ray.elevation=bspline`); within them it is bilinear. Both have Bernstein
-//! coefficients over the part: the values at its ends, or the cubic's polar form (its blossom) at mixed ends (Ramshaw 1989). Through a
-//! Cartesian volume the field within a cell is a polynomial of the place, of degree 3 or 5. Its Bernstein coefficients are means of the
+//! Across slices that function is linear, or a cubic B-spline (`ray.elevation=bspline`); within slices it is bilinear. Both have Bernstein
+//! coefficients over the part: the values at its ends, or the polar form (blossom) of the cubic at mixed ends (Ramshaw 1989). Through a
+//! Cartesian volume the field within a cell is a polynomial of the position, of degree 3 or 5. Its Bernstein coefficients are means of the
 //! function at mixed corners of the two ends, and their hull contains it. Through a swept volume the coordinates over the part are
-//! intervals, and the function over a box lies in the hull of its coefficients at the corners of the box. A part that reaches over the face of
-//! a cell by the rounding of its ends is widened by what the field can change there.
+//! intervals, and the function over a box lies in the hull of its coefficients at the corners of the box. If rounding of its ends makes a
+//! part reach over the face of a cell, the range is widened by the possible change of the field there.
 
 use super::interval::Interval;
 use crate::exact_ray::Line;
@@ -13,7 +13,7 @@ use crate::passes::Texels;
 use crate::probe::{Advance, Array, Axis, Geometry, Motion, Probe};
 use std::f64::consts::FRAC_PI_2;
 
-/// What is known of a part of a ray.
+/// The content of a part of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Content {
     /// All of it is outside the insonified region.
@@ -32,12 +32,12 @@ pub struct Field<'a> {
 }
 
 impl<'a> Field<'a> {
-    /// `range`: smallest and largest value of the volume; `window`: the grey values that become 0 and 1.
+    /// `range`: smallest and largest value of the volume; `window`: the grey values that are mapped to 0 and 1.
     pub fn new(line: &'a Line<'a>, volume: &'a Texels, window: [f64; 2], range: [f64; 2]) -> Field<'a> {
         Field { line, volume, window, range }
     }
 
-    /// The content between two places, mm, `from` at most `to`.
+    /// The content between two positions along the ray, mm, with `from` at most `to`.
     pub fn content(&self, from: f64, to: f64) -> Content {
         match &self.line.scene.geometry {
             Geometry::Cartesian(_) => Content::Within { values: self.along_a_line(from, to), surely_inside: true },

@@ -28,12 +28,12 @@ impl Interval {
     pub const ZERO: Interval = Interval { low: 0.0, high: 0.0 };
     pub const ONE: Interval = Interval { low: 1.0, high: 1.0 };
 
-    /// The numbers between two, in either order.
+    /// The interval between two numbers, in either order.
     pub fn between(a: f64, b: f64) -> Interval {
         Interval { low: a.min(b), high: a.max(b) }
     }
 
-    /// A single number, taken as exact.
+    /// The interval of a single number, which is taken as exact.
     pub fn of(value: f64) -> Interval {
         Interval { low: value, high: value }
     }
@@ -51,12 +51,12 @@ impl Interval {
         Interval { low: self.low.min(other.low), high: self.high.max(other.high) }
     }
 
-    /// Every number cut to 0..1.
+    /// Clamps every number to 0..1.
     pub fn clamped(self) -> Interval {
         Interval { low: self.low.clamp(0.0, 1.0), high: self.high.clamp(0.0, 1.0) }
     }
 
-    /// The smaller one of a number of each.
+    /// The interval of the minimum of a number of each interval.
     pub fn at_most(self, other: Interval) -> Interval {
         Interval { low: self.low.min(other.low), high: self.high.min(other.high) }
     }
@@ -66,12 +66,12 @@ impl Interval {
         self.low.abs().max(self.high.abs())
     }
 
-    /// Every number plus or minus up to `slack`, which is not negative.
+    /// Adds up to `slack` in both directions. `slack` must not be negative.
     pub fn widened(self, slack: f64) -> Interval {
         Interval { low: (self.low - slack).next_down(), high: (self.high + slack).next_up() }
     }
 
-    /// The quotient by numbers above 0; everything if the divisor may be 0.
+    /// The quotient by numbers above 0. If the divisor may be 0, the interval of all numbers.
     pub fn over(self, divisor: Interval) -> Interval {
         if divisor.low <= 0.0 {
             return Interval { low: f64::NEG_INFINITY, high: f64::INFINITY };
@@ -87,27 +87,27 @@ impl Interval {
         Interval { low, high: a.max(b).next_up() }
     }
 
-    /// The square root of the numbers that are not negative.
+    /// The square root of the non-negative numbers of the interval.
     pub fn root(self) -> Interval {
         let root = |v: f64| v.max(0.0).sqrt();
         Interval { low: root(self.low).next_down().max(0.0), high: root(self.high).next_up() }
     }
 
-    /// 1 - exp(-y) of numbers that are not negative: 0..1.
+    /// 1 - exp(-y) for non-negative numbers: 0..1.
     pub fn opacity(self) -> Interval {
         let opacity = |y: f64| -(-y.max(0.0)).exp_m1();
         let (low, high) = (opacity(self.low), opacity(self.high));
         Interval { low: down(low, LIBRARY).max(0.0), high: up(high, LIBRARY).min(1.0) }
     }
 
-    /// -ln(1 - a) of numbers in 0..1, at most `most`.
+    /// -ln(1 - a) for numbers in 0..1, limited to `most`.
     pub fn absorption(self, most: f64) -> Interval {
         let of = |a: f64| if a >= 1.0 { most } else { (-(-a).ln_1p()).min(most) };
         let (low, high) = (of(self.low.max(0.0)), of(self.high.max(0.0)));
         Interval { low: down(low, LIBRARY).max(0.0), high: up(high, LIBRARY) }
     }
 
-    /// The angle of (y, x) for x above 0, where it lies in -pi/2..pi/2: y rises with it, and the extremes are at corners.
+    /// The angle of (y, x) for x above 0, -pi/2..pi/2. It rises with y, and its extremes are at corners.
     pub fn angle(self, x: Interval) -> Interval {
         let corners = [self.low, self.high].map(|y| [x.low.max(0.0), x.high.max(0.0)].map(|x| y.atan2(x)));
         let all = corners.iter().flatten();

@@ -1,6 +1,6 @@
 //! Proven bounds of a picture in volume mode: for every ray and channel an interval that contains the exact integral of the sampled field
-//! (docs/numerics.md, "The exact reference of a ray"). Every number is computed in interval arithmetic with outward rounding, so that
-//! the bounds hold whatever the quadrature, the step or the rounding of a renderer does.
+//! (docs/numerics.md, "The exact reference of a ray"). All numbers are computed in interval arithmetic with outward rounding, so that the
+//! bounds hold for any quadrature, step or rounding of a renderer.
 
 pub mod field;
 pub mod interval;
@@ -19,10 +19,10 @@ use glam::DVec3;
 use interval::Interval;
 use rayon::prelude::*;
 
-/// When a ray's bounds are narrow enough.
+/// Limits of the work on the bounds of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Effort {
-    /// Width of the widest channel, 0..1.
+    /// Sufficient width of the widest channel, 0..1.
     pub width: f64,
     /// Largest number of parts of a ray.
     pub parts: usize,
@@ -34,7 +34,7 @@ pub struct PictureBounds {
     /// Red, green, blue and opacity, before stage 4.
     pub low: Texels,
     pub high: Texels,
-    /// Parts of all rays.
+    /// Number of parts of all rays.
     pub parts: u64,
 }
 
@@ -47,14 +47,14 @@ impl PictureBounds {
 }
 
 impl PictureBounds {
-    /// The same of the rays whose opacity may be above 0: the others have no width.
+    /// Widths of the rays whose opacity may be above 0, as in [`PictureBounds::widths`]. Other rays have no width.
     pub fn widths_of_hits(&self) -> Vec<f64> {
         let hits = self.high.values.chunks_exact(4).map(|high| high[3] > 0.0);
         self.widths().into_iter().zip(hits).filter(|(_, hit)| *hit).map(|(width, _)| width).collect()
     }
 }
 
-/// What bounds prove of a drawn pixel.
+/// What the bounds prove about a drawn pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Proof {
     /// Its error is within the tolerance.
@@ -85,8 +85,8 @@ impl Proof {
     }
 }
 
-/// Why a scene has no bounds, and what to set instead, as the end of a sentence; none if it has. Every setting that a ray of volume rendering
-/// reads is honoured by [`picture`] or named here (tests/unit_pure/ray_keys.rs).
+/// The reason why a scene has no bounds, with the setting to use instead, as the end of a sentence. None if it has bounds. Every setting
+/// that affects a ray of volume rendering is respected by [`picture`] or named here (tests/unit_pure/ray_keys.rs).
 pub fn fault(scene: &Scene) -> Option<&'static str> {
     match scene.settings.mode {
         Mode::Volume if scene.still().is_some() => Some("a still is a mean of random paths: set still=none"),
@@ -110,16 +110,16 @@ pub fn fault(scene: &Scene) -> Option<&'static str> {
     }
 }
 
-/// Bounds of all rays of a scene through a volume: the texels that stage 1 makes.
+/// Bounds of all rays of a scene through a volume, given by the texels that stage 1 makes.
 pub fn picture(scene: &Scene, volume: &Texels, effort: Effort) -> PictureBounds {
     enclosed(scene, volume, effort, |_, _| false)
 }
 
-/// The same as far as is needed to prove of each pixel of a drawn picture (red, green, blue and opacity before stage 4) that it keeps a
+/// Bounds as narrow as needed to prove for each pixel of a drawn picture (red, green, blue and opacity before stage 4) that it keeps a
 /// tolerance, levels of 255 after toning, or that it does not.
 ///
 /// # Errors
-/// In words: a scene whose toning does not keep the order of values, a picture of another size.
+/// One line: the toning of the scene does not keep the order of values, or the picture has another size.
 pub fn proven(
     scene: &Scene,
     volume: &Texels,

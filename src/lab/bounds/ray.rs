@@ -1,5 +1,5 @@
-//! Bounds of the light of a ray: each part's opacity and colours are ranges, composited from back to front with both ends of the
-//! opacity, and parts are halved where that narrows the result most.
+//! Bounds of the light of a ray. The opacity and colours of each part are ranges, which are composited from back to front with both ends of
+//! the opacity. Parts are halved where that narrows the result most.
 
 use super::field::{Content, Field};
 use super::interval::Interval;
@@ -20,17 +20,17 @@ pub struct Medium {
 }
 
 impl Medium {
-    /// `points` as of [`transfer::resolved`]; samples below `threshold` are transparent.
+    /// `points` are those of [`transfer::resolved`]. Samples below `threshold` are transparent.
     pub fn new(points: Vec<TransferPoint>, threshold: f64, absorption: Absorption) -> Medium {
         Medium { points, threshold, absorption, tint: None, fade: None }
     }
 
-    /// With colours that are multiplied by a factor which is linear along the ray.
+    /// The medium with colours that are multiplied by a factor which is linear along the ray.
     pub fn tinted(self, start: [Interval; 3], rate: [Interval; 3]) -> Medium {
         Medium { tint: Some([start, rate]), ..self }
     }
 
-    /// With matter that fades towards the faces of a box.
+    /// The medium with matter that fades towards the faces of a box.
     pub fn faded(self, fade: Option<Fade>) -> Medium {
         Medium { fade, ..self }
     }
@@ -81,7 +81,7 @@ impl Medium {
     }
 }
 
-/// What `region.fade` leaves of the matter along a ray ([`Scene::faded`](crate::scene::Scene::faded)).
+/// The remaining share of the matter along a ray under `region.fade` ([`Scene::faded`](crate::scene::Scene::faded)).
 #[derive(Clone, Copy, Debug)]
 pub struct Fade {
     /// The place at 0 mm along the ray, and its unit direction.
@@ -136,7 +136,7 @@ struct Part {
 pub struct Bounds {
     /// Red, green, blue, opacity.
     pub rgba: [Interval; 4],
-    /// Parts at the end.
+    /// Number of parts at the end.
     pub parts: usize,
 }
 
@@ -147,8 +147,8 @@ impl Bounds {
     }
 }
 
-/// Halves parts until the widest channel is narrower than `target`, the bounds are enough, or there are `most` parts. `hints`: places in rising order at
-/// which a part should end, such as the faces of cells; the bounds hold whatever they are.
+/// Halves parts until the widest channel is narrower than `target`, the bounds are sufficient, or there are `most` parts. `hints`:
+/// positions in rising order at which a part should end, such as the faces of cells; the bounds hold for any hints.
 pub fn bounds(
     field: &Field,
     medium: &Medium,

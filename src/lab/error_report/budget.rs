@@ -1,17 +1,17 @@
-//! The error budget of a scene: what each of its approximations adds to the error of its picture, and all of them together.
+//! The error budget of a scene: the contribution of each of its approximations to the error of its picture, and the total.
 //!
-//! For each source the scene is rendered with the finest setting of all others, and compared with one converged reference. The sum of the squares is the
-//! square of the total where the errors are independent; where they are not, the total tells.
+//! For each source of error the scene is rendered with the finest settings of all other sources, and compared with one converged reference.
+//! If the errors are independent, the sum of their squares is the square of the total; a difference shows dependence.
 
 use super::dials::{self, Dial};
 use super::{Errors, Kind, OwnError, Reference};
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
 
-/// The name of what is left with the finest setting of every source: arithmetic of the device in f32, and its formats.
+/// Name of the error that remains with the finest setting of every source: the device's arithmetic in f32, and its formats.
 pub const FLOOR: &str = "device";
 
-/// What each approximation of a scene adds.
+/// The contribution of each approximation of a scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Budget {
@@ -19,7 +19,7 @@ pub struct Budget {
     pub reference_error: OwnError,
     /// Each source alone; the last is [`FLOOR`].
     pub shares: Vec<Share>,
-    /// The scene as it is.
+    /// Errors of the scene with its own settings.
     pub total: Errors,
 }
 
@@ -29,13 +29,13 @@ pub struct Budget {
 pub struct Share {
     /// The name of its dial.
     pub source: String,
-    /// Its setting in the scene.
+    /// Label of its setting in the scene.
     pub label: String,
     pub errors: Errors,
 }
 
 impl Budget {
-    /// Root of the sum of the squares of the shares' RMSE: the total of errors that are independent.
+    /// Root of the sum of the squares of the shares' RMSE. It equals the total if the errors are independent.
     pub fn sum(&self) -> f64 {
         self.shares.iter().map(|share| share.errors.rmse.powi(2)).sum::<f64>().sqrt()
     }
@@ -44,16 +44,16 @@ impl Budget {
 /// A source of error in a scene.
 pub struct Source {
     pub name: &'static str,
-    /// Its setting in the scene.
+    /// Label of its setting in the scene.
     pub label: String,
-    /// The assignments that make it as fine as it gets, of its own keys alone.
+    /// Assignments of its finest setting, of its own keys alone.
     pub finest: Vec<String>,
-    /// Those of the next coarser setting.
+    /// Assignments of the next coarser setting.
     pub nearly: Vec<String>,
 }
 
-/// The sources of error of a scene: its numerical dials, but for the rule of compositing, which chooses how fast the picture converges, for bricks, which
-/// change no picture, and for the samples in a cell of a light volume, which converge with the cells.
+/// The sources of error of a scene: its numerical dials, with three exceptions. The rule of compositing chooses how fast the picture
+/// converges, bricks change no picture, and the samples in a cell of a light volume converge with the cells.
 pub fn sources(scene: &Scene) -> Vec<Source> {
     let numerical = dials::NAMES.iter().filter_map(|name| dials::dial(name, scene).ok());
     let numerical = numerical

@@ -1,21 +1,21 @@
-//! Orders of convergence: a fit of error over step size, and a test problem for the compositing rules whose fields are formulas, so
-//! that no texture's error disturbs it. The composited sum is the one of the volume renderer's reference; the exact solution
-//! integrates the equation that the sum approximates.
+//! Orders of convergence: a fit of the error over the step size, and a test problem for the compositing rules. The fields of the test
+//! problem are formulas, so that no error of a texture disturbs it. The composited sum is the one of the volume renderer's reference; the
+//! exact solution integrates the equation that the sum approximates.
 
 use crate::passes::raycast::composite::{March, Medium, Place, Rule};
 use crate::scene::transfer;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-/// The range of a fit. An order shows only between steps that are too coarse for the asymptotic range and errors that are too small
+/// The range of a fit. The order is visible only between steps that are too coarse for the asymptotic range and errors that are too small
 /// to be caused by the step.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Range {
     /// Minimum and maximum step, in the dial's unit.
     pub step: [f64; 2],
-    /// The limit of the error for small steps (rounding, the texture format). Points below `ABOVE_FLOOR` times it are left out:
-    /// there it bends the line by more than 5 %.
+    /// Limit of the error for small steps, due to rounding and the texture format. Points below `ABOVE_FLOOR` times this value are left
+    /// out, because the limit bends the line there by more than 5 %.
     pub floor: f64,
 }
 
@@ -33,7 +33,7 @@ pub struct Fit {
     pub coefficient: f64,
     /// The range of the fit.
     pub range: Range,
-    /// Number of points in it.
+    /// Number of points in the range.
     pub points: usize,
 }
 
@@ -79,17 +79,17 @@ pub fn fit(pairs: &[[f64; 2]], range: Range) -> Result<Fit, String> {
 /// Radius of the ball that rays pass through, voxels. All lengths here are in voxels; absorption is per voxel.
 pub const RADIUS: f64 = 12.0;
 
-/// The field that fills the ball.
+/// The field inside the ball.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Field {
     /// Waves of 10 to 20 voxels on a slope, 0.25..0.85: not zero where rays enter and leave.
     Open,
-    /// The same, multiplied by a factor that vanishes at the surface of the ball: a missing last step has no effect.
+    /// [`Field::Open`] multiplied by a factor that vanishes at the surface of the ball, so that a missing last step has no effect.
     Vanishing,
 }
 
 impl Field {
-    /// The value at a place, voxels.
+    /// The value of the field at a position, voxels.
     pub fn at(self, p: DVec3) -> f64 {
         let waves = (0.43 * p.x + 0.21 * p.y).sin() + (0.34 * p.y - 0.27 * p.z + 1.0).sin() + (0.39 * p.z + 0.5).cos();
         let value = 0.55 + 0.09 * waves + 0.03 * (p.x / RADIUS);
@@ -278,7 +278,7 @@ pub fn steps(low: f64, high: f64, count: usize) -> Vec<f64> {
     (0..count).map(|i| low * (high / low).powf(i as f64 / (count - 1) as f64)).collect()
 }
 
-/// RMSE of the light of `count` rays at each step: pairs of step and error, and the error of the exact solution used (its difference
+/// RMSE of the light of `count` rays at each step. Returns pairs of step and error, and the error of the exact solution (its difference
 /// from the solution at half the step).
 pub fn errors(rule: Rule, field: Field, flaw: Flaw, steps: &[f64], count: usize) -> (Vec<[f64; 2]>, f64) {
     const FINE: f64 = 1.0 / 32.0;
@@ -307,16 +307,16 @@ pub struct StiffPoint {
     pub depth: f64,
     /// RMSE of the light with steps of h.
     pub error: f64,
-    /// log2 of that error over the one with steps of h/2 through the same matter.
+    /// log2 of that error over the error with steps of h/2 through the same matter.
     pub order: f64,
 }
 
 /// Value of the field about which its waves are.
 const MEAN_VALUE: f64 = 0.55;
 
-/// The local order of a rule against the optical depth of a step: `count` rays through the open field in steps of `step` voxels and of
-/// half of that, with the absorption scaled so that a step has each of `depths`. An order of 2 for thin steps becomes one of a rule that
-/// samples the wrong place of an opaque step.
+/// The local order of a rule against the optical depth of a step: `count` rays through the open field in steps of `step` voxels and of half
+/// of that. The absorption is scaled so that a step has each of `depths`. The order of 2 for thin steps falls to that of a rule that
+/// samples the wrong position of an opaque step.
 pub fn stiffness(rule: Rule, step: f64, depths: &[f64], count: usize) -> Vec<StiffPoint> {
     let rays = rays(count);
     let point = |depth: &f64| {

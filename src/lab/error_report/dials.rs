@@ -1,6 +1,6 @@
-//! The dials of a scene: settings with the values to measure. Most trade error for time: their values compute the same picture more or less
-//! accurately, and the dial has the settings of a reference. Others choose another look, such as another filter: their pictures differ from
-//! the scene as it is, and none of them is the right one.
+//! The dials of a scene: settings with the values to measure. Most dials trade error for time: their values compute the same picture more
+//! or less accurately, and the dial has settings for a reference. Other dials choose another look, such as another filter: their pictures
+//! differ from that of the scene's own setting, and none of them is the correct one.
 
 use super::Kind;
 use crate::error_map::step_fault;
@@ -12,7 +12,7 @@ use crate::scene::{Compositing, Edge, Mode, PeronaMalik, Sampling, Scene, Scheme
 pub struct DialSetting {
     /// Short label for plots.
     pub label: String,
-    /// `key=value` as `--set` takes them; empty for the scene itself.
+    /// Assignments `key=value` as for `--set`. Empty for the scene's own setting.
     pub set: Vec<String>,
     /// Value on the dial's axis, in its unit.
     pub value: f64,
@@ -23,12 +23,12 @@ pub struct DialSetting {
 pub struct Dial {
     pub name: &'static str,
     pub unit: &'static str,
-    /// The settings to measure. The first is the scene itself.
+    /// The settings to measure. The first is the scene's own.
     pub settings: Vec<DialSetting>,
     pub kind: Kind,
-    /// True if the values lie on an axis; false for names.
+    /// True if the values lie on an axis; false if they are names.
     pub is_ordered: bool,
-    /// Assignments that give the reference. Empty for a look.
+    /// Assignments of the reference. Empty for a look.
     pub best: Vec<String>,
     /// Assignments of the next coarser setting. Its difference from the reference estimates the error of the reference if the device
     /// renders it.
@@ -99,10 +99,10 @@ pub const NAMES: &[&str] = &[
     "pipeline",
 ];
 
-/// The dial of that name.
+/// The dial of a name.
 ///
 /// # Errors
-/// Why this scene has no such dial, as the end of a sentence that begins "this scene".
+/// The reason why this scene has no such dial, as the end of a sentence that begins with "this scene".
 pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
     let s = &scene.settings;
     let step = scene.step;
@@ -111,7 +111,7 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
     let composites = scene.composites();
     let need = |there: bool, why: &str| if there { Ok(()) } else { Err(why.to_string()) };
     let is_one_picture = || match step_fault(scene) {
-        Some(why) => Err(format!("is another picture at another step: {why}")),
+        Some(why) => Err(format!("has another picture at another step: {why}")),
         None => Ok(()),
     };
     let made = |name, unit, default: DialSetting, others: Vec<DialSetting>, best: &[String], nearly: &[String]| Dial {

@@ -1,5 +1,5 @@
-//! Measures error against run time: renders and times every setting of every dial, and compares it with the f64 reference or, if that
-//! is too slow, with a converged picture whose own error is estimated. Dials of rays are compared with exact rays where these exist.
+//! Measures error against run time. It renders and times every setting of every dial, and compares the picture with the f64 reference or,
+//! if that is too slow, with a converged picture whose own error is estimated. Dials of rays are compared with exact rays if these exist.
 //! Then it does the same with combinations of several dials.
 
 use super::budget::{self, Budget, FLOOR, Share};
@@ -23,7 +23,7 @@ use crate::scene::{Layout, Scene};
 use crate::source::Frame;
 use std::sync::Arc;
 
-/// Why a measurement failed.
+/// The reason why a measurement failed.
 #[derive(Debug, thiserror::Error)]
 pub enum MeasureError {
     #[error("{0}")]
@@ -43,26 +43,26 @@ const MAX_EXACT_SEGMENTS: f64 = 5e7;
 /// How many times more accurate than a point its reference must be, if the point takes part in the fit of an order.
 const BETTER: f64 = 10.0;
 
-/// Combinations of several dials that are measured.
+/// Most combinations of several dials that are measured.
 pub const MAX_COMBINATIONS: usize = 24;
 
-/// Which reference to compare with.
+/// The reference to compare with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ReferenceChoice {
-    /// Exact for dials of rays where it exists, else F64, each if it takes about a minute or less; otherwise converged.
+    /// Exact rays for dials of rays if they exist, else f64, each if it takes about a minute or less; otherwise a converged picture.
     Auto,
-    /// Exact rays for every dial; refused where they do not exist.
+    /// Exact rays for every dial. An error if they do not exist.
     Exact,
     F64,
     Converged,
 }
 
-/// What to measure, and on which device.
+/// The subject of a measurement, and its device.
 pub struct ErrorMeasurement<'a> {
     pub context: &'a Arc<Context>,
-    /// What every scene of the report is made from.
+    /// The recording from which every scene of the report is made.
     pub recorded: &'a Recorded,
-    /// Settings before any dial is changed, and before they are completed.
+    /// The settings before any dial is changed and before they are completed.
     pub layers: &'a Layers,
     pub scene: &'a Scene,
     pub frames: &'a [Frame],
@@ -81,7 +81,7 @@ enum Kind {
     Converged,
 }
 
-/// The picture of a scene with the finest setting of every numerical dial: what combinations are compared with.
+/// The picture of a scene with the finest setting of every numerical dial. Combinations are compared with it.
 pub struct Finest {
     rendering: Rendering,
     reference: Reference,
@@ -91,17 +91,17 @@ pub struct Finest {
 
 /// A choice that kept its bound when it was measured again.
 pub struct Verified {
-    /// As measured again.
+    /// The second measurement of the choice.
     pub choice: Combination,
-    /// Times of the scene as it is, measured in turn with the choice; None without time stamps.
+    /// Times of the scene with its own settings, measured alternately with the choice. None without time stamps.
     pub unchanged: Option<Times>,
-    /// Those that did not keep it then.
+    /// The combinations that did not keep the bound in the second measurement.
     pub failed: Vec<Combination>,
 }
 
 impl ErrorMeasurement<'_> {
-    /// Measures the dials one after the other, then combinations of them. `progress` is called with dial and label before each setting
-    /// is rendered. With a bound, more of the combinations are near it.
+    /// Measures the dials one after the other, then combinations of them. `progress` is called with dial and label before each setting is
+    /// rendered. With a bound, more of the combinations are near it.
     ///
     /// # Errors
     /// A setting is refused, or the device fails.
@@ -142,8 +142,8 @@ impl ErrorMeasurement<'_> {
         })
     }
 
-    /// The picture that combinations are compared with: the finest setting of every numerical dial of the scene, whether it is among
-    /// those that are measured or not.
+    /// The picture that combinations are compared with. It has the finest setting of every numerical dial of the scene, including dials
+    /// that are not measured.
     ///
     /// # Errors
     /// As [`ErrorMeasurement::report`].
@@ -263,8 +263,9 @@ impl ErrorMeasurement<'_> {
         Ok((Combination { errors, times, reference_error: finest.error, ..choice.clone() }, Times::of(&runs.default)))
     }
 
-    /// Chooses a combination of the report, and measures it anew. What does not keep the bound then is no choice, and the next best is
-    /// tried. A time is kept if the 95th percentile, longer by [`choose::TIME_MARGIN`], is within the bound.
+    /// Chooses a combination of the report, and measures it again. A combination that does not keep the bound in the second measurement is
+    /// discarded, and the next best is tried. A time bound is kept if the 95th percentile, increased by [`choose::TIME_MARGIN`], is within
+    /// it.
     ///
     /// # Errors
     /// As [`choose::choose`], or the device fails.

@@ -1,11 +1,11 @@
-//! An error report as text: CSV for other programs, a summary table for a terminal.
+//! An error report as text: CSV for other programs, and a summary table for a terminal.
 
 use super::metrics::SurfaceError;
 use super::{Errors, Measure, Reference, Report, Time, Times, choose};
 use std::fmt::Write as _;
 
-/// The report as CSV (RFC 4180): a header, then one line per point. Fields that do not apply are empty; times are in ms. `on_front`:
-/// no other point of the report has both a smaller RMSE and a shorter time.
+/// The report as CSV (RFC 4180): a header, then one line for each point. Fields that do not apply are empty. Times are in ms. `on_front` is
+/// true if no other point of the report has both a smaller RMSE and a shorter time.
 pub fn csv(report: &Report) -> String {
     let front = report.pareto_front(Measure::Rmse);
     let mut text = String::from(
@@ -137,7 +137,8 @@ fn errors_row(e: &Errors, measure: Measure, has_surface: bool) -> String {
     text
 }
 
-/// The points of each dial as a table: errors, time, and the ratio of the time to that of the default; the error budget; the best combinations.
+/// The report as tables: for each point of a dial its errors, its time, and the ratio of the time to that of the default; then the error
+/// budget and the best combinations.
 pub fn summary_table(report: &Report, measure: Measure) -> String {
     let mut text = String::new();
     let [w, h, k] = report.sizes.volume;

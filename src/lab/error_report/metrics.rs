@@ -39,7 +39,8 @@ pub struct ErrorStatistics {
     pub count: usize,
 }
 
-/// Differences of two pictures as a screen shows them, in levels of 255, not rounded. A pixel's difference is that of its channel that differs most.
+/// Differences of two pictures as displayed, in levels of 255, not rounded. The difference of a pixel is that of its channel that differs
+/// most.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Levels {
@@ -48,8 +49,9 @@ pub struct Levels {
     /// 95th percentile, interpolated linearly.
     pub p95: f64,
     pub max: f64,
-    /// Share of the pixels that differ by more than 1 level, and by more than 8.
+    /// Share of the pixels that differ by more than 1 level.
     pub over_1: f64,
+    /// Share of the pixels that differ by more than 8 levels.
     pub over_8: f64,
 }
 
@@ -57,17 +59,17 @@ pub struct Levels {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SurfaceError {
-    /// Over the pixels that are hit in both and do not jump, mm or degrees; None if there are none.
+    /// Error over the pixels that are hit in both and do not jump, mm or degrees. None if there are no such pixels.
     pub error: Option<ErrorStatistics>,
-    /// Share of all pixels that are hit, but missed in the reference.
+    /// Share of all pixels that are hit here, but missed in the reference.
     pub false_hits: f64,
-    /// Share of all pixels that are missed, but hit in the reference.
+    /// Share of all pixels that are missed here, but hit in the reference.
     pub missed_hits: f64,
-    /// Share of all pixels that are hit in both, but on another surface.
+    /// Share of all pixels that are hit in both, but on different surfaces.
     pub jumps: f64,
 }
 
-/// Compares toned pictures, values in 0..1, of which `left_out` pixels do not count.
+/// Compares toned pictures, values in 0..1. Pixels that are true in `left_out` do not count.
 ///
 /// # Errors
 /// As [`pictures`].
@@ -85,8 +87,9 @@ pub fn levels(measured: &Texels, reference: &Texels, left_out: &[bool]) -> Resul
     Ok(Levels { rms: spread.rms, median: spread.median, p95: spread.p95, max: spread.max, over_1, over_8 })
 }
 
-/// The pixels of a picture of `size` whose rays find something else: lost, gained, or on a surface that is farther away by more than `cliff` mm. With them
-/// their neighbours, whose normals and edges they change. The maps may have other sizes than the picture; the ray in a pixel's middle tells.
+/// Marks the pixels of a picture of `size` whose rays differ: hits that are lost or gained, or surfaces whose distances differ by more than
+/// `cliff` mm. Their neighbours are also marked, because their normals and edges change. The maps may have other sizes than the picture;
+/// the ray through the centre of a pixel decides.
 pub fn changed_rays(measured: &Texels, reference: &Texels, cliff: f64, size: [usize; 3]) -> Vec<bool> {
     let at = |map: &Texels, x: usize, y: usize| {
         let along = |n: usize, axis: usize| {
@@ -139,7 +142,7 @@ pub fn distances(measured: &Texels, reference: &Texels) -> Result<SurfaceError, 
     surfaces(measured, reference, f64::INFINITY)
 }
 
-/// The same, where distances that differ by more than `cliff` mm are jumps to another surface and no errors.
+/// Compares distance maps in mm. Distances that differ by more than `cliff` mm count as jumps to another surface, not as errors.
 ///
 /// # Errors
 /// As [`pictures`].
@@ -150,8 +153,8 @@ pub fn surfaces(measured: &Texels, reference: &Texels, cliff: f64) -> Result<Sur
     Ok(surface(&first(measured), &first(reference), difference))
 }
 
-/// Compares maps of normals (first three channels x, y, z) by the angle between them, degrees. Normals need not have unit length; a
-/// zero vector is a miss.
+/// Compares maps of normals (first three channels x, y, z) by the angle between them, degrees. Normals need not have unit length. A zero
+/// vector is a miss.
 ///
 /// # Errors
 /// As [`pictures`].
@@ -222,8 +225,8 @@ fn spread(mut errors: Vec<f64>) -> Option<ErrorStatistics> {
     Some(ErrorStatistics { rms, median: quantile(&errors, 0.5)?, p95: quantile(&errors, 0.95)?, max, count })
 }
 
-/// Mean structural similarity of two planes with values in 0..1 (SSIM; Wang et al. 2004, equation 13), weighted by the Gaussian window, averaged
-/// over all windows within the picture; None if it is smaller than the window.
+/// Mean structural similarity of two planes with values in 0..1 (SSIM; Wang et al. 2004, equation 13), weighted by the Gaussian window and
+/// averaged over all windows within the picture. None if the picture is smaller than the window.
 pub fn similarity(a: &[f64], b: &[f64], [width, height, _]: [usize; 3]) -> Option<f64> {
     if width < WINDOW || height < WINDOW {
         return None;

@@ -1,6 +1,6 @@
-//! Error against run time (work-precision). Every approximation is a dial; the points of a dial are its settings, each with its
-//! errors and its times on the device. [`errors_and_times`] fills a [`Report`], which is stored as JSON, and renders combinations of several
-//! dials; [`export`] and [`plot`] write it as text and as a diagram, [`choose`] picks settings among the combinations.
+//! Error against run time (work-precision). Every approximation is a dial. The points of a dial are its settings, each with its errors and
+//! its times on the device. [`errors_and_times`] fills a [`Report`], which is stored as JSON, and renders combinations of several dials.
+//! [`export`] and [`plot`] write it as text and as a diagram, and [`choose`] picks settings among the combinations.
 
 pub mod budget;
 pub mod choose;
@@ -36,32 +36,33 @@ pub struct Report {
     /// Description of the input on the first line, then all settings, resolved, as TOML.
     pub scene: String,
     pub sizes: Sizes,
-    /// Number of runs of which each time is the median.
+    /// Number of runs whose median each time is.
     pub repeats: u32,
     pub dials: Vec<Dial>,
-    /// Settings of one dial and of several, each rendered and measured against the scene's finest picture. The first is the scene as it is.
+    /// Settings of one dial and of several, each rendered and compared with the scene's finest picture. The first is the scene with its own
+    /// settings.
     pub choices: Vec<Combination>,
-    /// What each approximation of the scene adds to its error.
+    /// Contribution of each approximation of the scene to its error.
     pub budget: Budget,
 }
 
-/// Settings of several dials at once, and what was measured with them.
+/// Settings of several dials at once, and their measurements.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Combination {
-    /// Changes from the scene as it is: name of the dial and label of the point.
+    /// Changes from the scene's own settings: name of the dial and label of the point.
     pub changed: Vec<(String, String)>,
-    /// Their assignments, "key=value" as `--set` takes them.
+    /// Their assignments, "key=value" as for `--set`.
     pub set: Vec<String>,
-    /// Against the scene's own picture with the finest numerical settings.
+    /// Errors against the scene's own picture with the finest numerical settings.
     pub errors: Errors,
-    /// Error of that picture itself; 0 if it is a reference in f64.
+    /// Error of that picture itself. 0 if it is an f64 reference.
     pub reference_error: OwnError,
     /// None without time stamps.
     pub times: Option<Times>,
 }
 
-/// The error of a reference itself.
+/// The error of a reference.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct OwnError {
@@ -72,33 +73,33 @@ pub struct OwnError {
 }
 
 impl OwnError {
-    /// The upper limit that two pictures of a converging sequence give: the difference of the last two.
+    /// The upper limit from two pictures of a converging sequence: the difference of the last two.
     pub fn of(errors: &Errors) -> OwnError {
         OwnError { rmse: errors.rmse, levels: errors.levels.p95 }
     }
 }
 
-/// What the settings of a dial have to do with one another.
+/// How the settings of a dial are related to one another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
-    /// One setting that computes the same picture more or less accurately: a choice may turn it, and combine it with others.
+    /// One setting that computes the same picture more or less accurately. A choice may vary it together with others.
     Numerical,
-    /// Several such settings at once: a choice may take one, and combines it with nothing.
+    /// Several such settings at once. A choice may vary it, but not together with others.
     Several,
-    /// The number of pixels, or of rays in a pixel: another picture, with an error of its own.
+    /// The number of pixels, or of rays in a pixel: a different picture, with an error of its own.
     Pixels,
-    /// Another look: differences from the scene as it is, which are no errors.
+    /// A different look: its differences from the scene's own setting are not errors.
     Look,
 }
 
-/// Sizes of what was rendered.
+/// Sizes of the rendered data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sizes {
     /// Texels of the volume.
     pub volume: [u32; 3],
-    /// Pixels of the picture by default (a dial may change it).
+    /// Default size of the picture, pixels. A dial may change it.
     pub picture: [u32; 2],
 }
 
@@ -114,18 +115,18 @@ pub struct Dial {
     pub unit: String,
     pub reference: Reference,
     pub points: Vec<Point>,
-    /// Order of the error over the value, if it has one.
+    /// Order of the error in the value, if there is one.
     pub order: Option<Fit>,
-    /// RMSE of the device against f64 if only its arithmetic and formats differ.
+    /// RMSE of the device against f64 that is due to arithmetic and formats alone.
     #[serde(default)]
     pub floor: Option<f64>,
-    /// Why the reference is not the exact one, if the dial is one of rays.
+    /// The reason why the reference is not the exact one, if the dial is one of rays.
     #[serde(default)]
     pub note: Option<String>,
 }
 
 impl Dial {
-    /// True if a point lies on the dial's axis. A tolerance of 0 is none at all.
+    /// True if a point lies on the dial's axis. A tolerance of 0 does not, because it means no tolerance.
     pub fn is_on_axis(&self, point: &Point) -> bool {
         self.is_ordered && (self.name != "tolerance" || point.value > 0.0)
     }
@@ -137,33 +138,33 @@ impl Dial {
 pub enum Reference {
     /// The four stages in f64 on the CPU.
     F64,
-    /// The same with exact rays in place of stage 2: no step, no table of the transfer function.
+    /// The stages in f64 with exact rays in place of stage 2: no step, no table of the transfer function.
     Exact {
-        /// Their own estimate of their error, RMS over the rays; no bound. Of the picture, or of the distance map in mm if the scene
-        /// shows surfaces.
+        /// Their own estimate of their error, RMS over the rays; not a bound. It is that of the picture, or of the distance map in mm if
+        /// the scene shows surfaces.
         estimate: f64,
-        /// Parts of rays that were integrated.
+        /// Number of parts of rays that were integrated.
         pieces: u64,
     },
-    /// The device's picture of the scene as it is: the settings differ in look, and what is measured is no error.
+    /// The device's picture with the scene's own settings: the settings differ in look, and the differences are not errors.
     AsItIs,
     /// A picture by the device itself, converged as far as possible.
     Converged {
-        /// The assignments that give it.
+        /// Its assignments.
         set: Vec<String>,
-        /// Its RMSE against the next coarser picture: an upper bound of its own error if it converges.
+        /// Its RMSE against the next coarser picture: an upper bound of its error if the pictures converge.
         rmse: f64,
     },
-    /// What such pictures with ever smaller cells of the light volume converge to, by Richardson's extrapolation ([`richardson`]).
+    /// The limit of such pictures for ever smaller cells of the light volume, by Richardson extrapolation ([`richardson`]).
     Extrapolated {
-        /// The assignments that give the picture with the smallest cells.
+        /// The assignments of the picture with the smallest cells.
         set: Vec<String>,
         /// Edges of the cells, mm, descending.
         cells: [f64; 3],
-        /// The order in the cell that was observed.
+        /// The observed order in the size of the cell.
         order: f64,
-        /// Its RMSE: against what the two coarser pictures alone converge to, and against the next coarser setting of all else, as a root of the sum of
-        /// squares. An upper bound of its own error if the pictures converge.
+        /// Its RMSE: the root of the sum of two squares, the differences from the limit of the two coarser pictures alone and from the next
+        /// coarser setting of everything else. An upper bound of its error if the pictures converge.
         rmse: f64,
     },
 }
@@ -174,21 +175,21 @@ pub enum Reference {
 pub struct Point {
     /// Short label for plots: "0.25", "pre-integrated".
     pub label: String,
-    /// Its assignments, each "key=value" as `--set` takes them.
+    /// Its assignments, each "key=value" as for `--set`.
     pub set: Vec<String>,
-    /// Value on the dial's axis, in the dial's unit; for names their index.
+    /// Value on the dial's axis, in the dial's unit. For names it is their index.
     pub value: f64,
     pub errors: Errors,
     /// None without time stamps.
     pub times: Option<Times>,
-    /// Times relative to the default, by runs of both in turn; None without time stamps.
+    /// Times relative to the default, from alternate runs of both. None without time stamps.
     pub ratios: Option<Times>,
     /// True for the setting of the scene itself, without assignments.
     pub is_default: bool,
 }
 
-/// Errors of a picture, and of the surface if there is one. Pixels whose rays find another surface than those of the reference, or none, and pixels next to
-/// them, are left out of the errors of the picture: their shares are in `mm`.
+/// Errors of a picture, and of the surface if there is one. Pixels whose rays hit another surface than those of the reference, or none, are
+/// left out of the errors of the picture, and so are their neighbours. Their shares are in `mm`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Errors {
@@ -198,7 +199,7 @@ pub struct Errors {
     /// Peak signal-to-noise ratio, dB; None (infinite) for equal pictures.
     pub psnr: Option<f64>,
     pub ssim: Option<f64>,
-    /// As the screen shows it.
+    /// Differences as displayed.
     pub levels: Levels,
     /// Error of the distance map, mm.
     pub mm: Option<SurfaceError>,
@@ -211,10 +212,10 @@ pub struct Errors {
 #[serde(deny_unknown_fields)]
 pub struct Time {
     pub median: f64,
-    /// Confidence interval of the median: 95 % by order statistics; from the shortest to the longest of fewer than 6 runs.
+    /// Confidence interval of the median: 95 % by order statistics. With fewer than 6 runs it is from the shortest to the longest.
     pub low: f64,
     pub high: f64,
-    /// 95th percentile by the nearest rank; the longest of fewer than 20 runs.
+    /// 95th percentile by the nearest rank. With fewer than 20 runs it is the longest.
     pub p95: f64,
 }
 
@@ -246,9 +247,9 @@ impl Time {
 pub struct Times {
     /// Work of each frame and volume: upload and stage 1.
     pub volume: Time,
-    /// Work of each picture: stages 2 to 4, and what rays skip by.
+    /// Work of each picture: stages 2 to 4, and the structures for skipping empty space.
     pub picture: Time,
-    /// Both.
+    /// The sum of both.
     pub total: Time,
 }
 
@@ -307,14 +308,14 @@ impl Measure {
 }
 
 impl Dial {
-    /// True if its settings differ in look, so that its differences are no errors.
+    /// True if its settings differ in look, so that their differences are not errors.
     pub fn is_look(&self) -> bool {
         self.kind == Kind::Look
     }
 }
 
 impl Report {
-    /// True if the report was measured with the settings of a scene, and volumes and pictures of its size.
+    /// True if the report was measured with the settings of `scene`, and with volumes and pictures of its size.
     pub fn is_of(&self, scene: &Scene) -> bool {
         let settings = self.scene.split_once('\n').map_or("", |(_, settings)| settings);
         let sizes = Sizes { volume: scene.volume_size(), picture: scene.picture_size() };
@@ -333,7 +334,7 @@ impl Report {
     /// Reads a report.
     ///
     /// # Errors
-    /// One line: no JSON, another format or version, or numbers that no measurement gives.
+    /// One line: the text is not JSON, has another format or version, or has numbers that no measurement gives.
     pub fn from_json(text: &str) -> Result<Report, String> {
         Report::read(text).map_err(|e| crate::text::single_line(&e))
     }
@@ -364,7 +365,7 @@ impl Report {
                 let wrong = wrong_result(&point.errors, &[point.times, point.ratios], 0.0);
                 if let Some(v) = wrong.or(Some(point.value).filter(|v| !v.is_finite())) {
                     return Err(format!(
-                        "error report: dial '{}', point '{}': {v} is no result",
+                        "error report: dial '{}', point '{}': {v} is not a possible result",
                         dial.name, point.label
                     ));
                 }
@@ -372,21 +373,21 @@ impl Report {
         }
         for choice in &self.choices {
             if let Some(v) = wrong_result(&choice.errors, &[choice.times], choice.reference_error.rmse) {
-                return Err(format!("error report: choice '{}': {v} is no result", choice.set.join(" ")));
+                return Err(format!("error report: choice '{}': {v} is not a possible result", choice.set.join(" ")));
             }
         }
         let sums = self.budget.shares.iter().map(|share| (share.source.as_str(), &share.errors));
         let own = self.budget.reference_error.rmse;
         for (source, errors) in sums.chain([("total", &self.budget.total)]) {
             if let Some(v) = wrong_result(errors, &[], own) {
-                return Err(format!("error report: budget, '{source}': {v} is no result"));
+                return Err(format!("error report: budget, '{source}': {v} is not a possible result"));
             }
         }
         Ok(())
     }
 
-    /// The Pareto front over all dials: indices of dial and point, from the fastest to the most accurate. Points without a time or
-    /// without this error are not on it, nor are those of another look.
+    /// The Pareto front over all dials: indices of dial and point, from the fastest to the most accurate. Points without a time or without
+    /// this error are not on it, nor are points of another look.
     pub fn pareto_front(&self, measure: Measure) -> Vec<(usize, usize)> {
         let mut indices = Vec::new();
         let mut pairs = Vec::new();
@@ -417,8 +418,8 @@ fn wrong_result(e: &Errors, times: &[Option<Times>], other: f64) -> Option<f64> 
     wrong.or_else(|| [e.psnr, e.ssim].into_iter().flatten().find(|v| !v.is_finite()))
 }
 
-/// The Pareto front: indices of the pairs that no other pair dominates (at most as large in both values and smaller in one), in order
-/// of the first value. Equal pairs all stay, in the order given. Pairs that are not finite are never on the front.
+/// The Pareto front: indices of the pairs that no other pair dominates (at most as large in both values and smaller in one), in order of
+/// the first value. All equal pairs stay, in the given order. Pairs that are not finite are never on the front.
 pub fn pareto_front(pairs: &[[f64; 2]]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..pairs.len()).filter(|i| pairs[*i].iter().all(|v| v.is_finite())).collect();
     // A stable sort: equal pairs keep their order.

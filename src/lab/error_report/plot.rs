@@ -1,6 +1,6 @@
-//! The work-precision diagram as SVG or PNG: small multiples, one panel per dial and one for the choices. A panel shows error over
-//! the time that its dial changes, of the picture or of the volume, both logarithmic; every point is named. A line joins values of an axis, and never names.
-//! Dials of another look, whose differences are no errors, are a figure of their own.
+//! The work-precision diagram as SVG or PNG: one panel for each dial and one for the choices. A panel shows the error over the time that
+//! its dial changes, of the picture or of the volume, both logarithmic. Every point is named. A line joins values of an axis, but never
+//! names. Dials of another look, whose differences are not errors, have a separate figure.
 
 use super::{Dial, Kind, Measure, Reference, Report, Sizes, Time, Times, choose};
 use crate::canvas::{self, Canvas, Drawing, Drawn, Frame, GRID, INK};
@@ -27,37 +27,37 @@ const MIN_SIZE: [u32; 2] = [640, 400];
 /// Maximum width and height, pixels.
 const MAX_SIZE: u32 = 4096;
 
-/// What a figure shows.
+/// The content of a figure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Figure {
     /// Errors: the dials of one picture, and the choices among their settings.
     Errors,
-    /// Differences of looks from the scene as it is.
+    /// Differences of looks from the scene's own look.
     Looks,
 }
 
 impl Figure {
-    /// The dials that it shows, by their number in the report.
+    /// The dials of the figure, each with its index in the report.
     fn dials(self, report: &Report) -> impl Iterator<Item = (usize, &Dial)> {
         report.dials.iter().enumerate().filter(move |(_, dial)| (dial.kind == Kind::Look) == (self == Figure::Looks))
     }
 
-    /// True if the report has dials that it shows.
+    /// True if the report has dials of this figure.
     pub fn is_in(self, report: &Report) -> bool {
         self.dials(report).next().is_some()
     }
 }
 
-/// The diagram as SVG, `size` in pixels.
+/// The diagram as SVG. `size`: width and height, pixels.
 ///
 /// # Errors
-/// One line: no point has a time and such an error, or the size is not within 640x400..4096x4096.
+/// One line: no point has both a time and this error, or the size is not within 640x400..4096x4096.
 pub fn svg(report: &Report, figure: Figure, measure: Measure, size: [u32; 2]) -> Result<String, String> {
     check(size)?;
     canvas::svg(size, &Diagram { report, figure, measure })
 }
 
-/// The diagram as a picture, `size` in pixels.
+/// The diagram as a picture. `size`: width and height, pixels.
 ///
 /// # Errors
 /// As [`svg`].
@@ -74,7 +74,7 @@ fn check([width, height]: [u32; 2]) -> Result<(), String> {
     Ok(())
 }
 
-/// The size at which every panel has room for its names, pixels.
+/// The size at which every panel has room for the names of its points, pixels.
 pub fn size(report: &Report, figure: Figure) -> [u32; 2] {
     let panels = panels(report, figure, Measure::Rmse);
     let rows = panels.len().div_ceil(COLUMNS).clamp(1, 12) as u32;

@@ -15,26 +15,27 @@ use crate::passes::Texels;
 /// Orders that are looked for. Below, the differences hardly shrink; above, they vanish at once, and the picture with the smallest cells is as good.
 const ORDERS: [f64; 2] = [0.25, 8.0];
 
-/// The picture that others converge to.
+/// The limit of a sequence of pictures.
 #[derive(Clone, Debug)]
 pub struct Extrapolated {
     pub picture: Texels,
-    /// What the two coarser pictures alone converge to, with this order.
+    /// The limit of the two coarser pictures alone, with this order.
     pub coarser: Texels,
-    /// The order that was observed; infinite if the two finest pictures are the same.
+    /// The observed order. Infinite if the two finest pictures are equal.
     pub order: f64,
-    /// RMS difference of both, over all values. It is the error of the coarser one as far as the next term is known, and so an upper bound of this picture's
-    /// own if the pictures converge.
+    /// RMS difference of `picture` and `coarser`, over all values. It is the error of the coarser one as far as the next term is known, and
+    /// so an upper bound of this picture's error if the pictures converge.
     pub error: f64,
-    /// RMS difference of the picture with the smallest cells from this one: an estimate of its error.
+    /// RMS difference of the picture with the smallest cells from the limit: an estimate of its error.
     pub finest: f64,
 }
 
-/// Extrapolates pictures to cells of no size. `cells`: the edges of their cells, descending, in any unit; those that the lattices have, not those that were
-/// asked for.
+/// Extrapolates pictures to cells of size 0. `cells`: the edges of their cells, descending, in any unit. They must be the cells of the
+/// actual lattices, not the requested ones.
 ///
 /// # Errors
-/// One line: pictures of different sizes, cells that do not descend, values that are not finite, or differences that do not shrink as a power of the cell.
+/// One line: the pictures differ in size, the cells do not descend, a value is not finite, or the differences do not shrink as a power of
+/// the cell.
 pub fn extrapolated(pictures: [&Texels; 3], cells: [f64; 3]) -> Result<Extrapolated, String> {
     let [coarse, middle, fine] = pictures;
     let is_alike = |other: &Texels| (other.size, other.channels) == (fine.size, fine.channels);
@@ -57,7 +58,7 @@ pub fn extrapolated(pictures: [&Texels; 3], cells: [f64; 3]) -> Result<Extrapola
         return Ok(Extrapolated { picture, coarser, order: f64::INFINITY, error: 0.0, finest: 0.0 });
     }
     let order = order_of(first / second, cells).ok_or_else(|| {
-        format!("extrapolation: pictures with cells of {c1}, {c2} and {c3} differ by {first:.1e} and {second:.1e}, which is no order of {} to {}", ORDERS[0], ORDERS[1])
+        format!("extrapolation: pictures with cells of {c1}, {c2} and {c3} differ by {first:.1e} and {second:.1e}, which gives no order within {} to {}", ORDERS[0], ORDERS[1])
     })?;
     let towards = |from: &Texels, to: &Texels, from_cell: f64, to_cell: f64| {
         let share = to_cell.powf(order) / (from_cell.powf(order) - to_cell.powf(order));

@@ -1,4 +1,4 @@
-//! Runs every candidate on frames, as stage 1 does: the frame is scan-converted, then filtered on the device.
+//! Runs every candidate on frames in the way of stage 1: the frame is scan-converted, then filtered on the device.
 
 use super::candidates::{Candidate, candidates};
 use super::quality::quality;
@@ -20,21 +20,21 @@ const PHANTOM: Areas = Areas {
     background: Area { lateral: [-15.0, 15.0], depth: [32.0, 42.0] },
 };
 
-/// What to measure, and how.
+/// Options of a measurement.
 #[derive(Clone, Copy, Debug)]
 pub struct MeasureOptions<'a> {
-    /// Part of the names of the filters; empty for all.
+    /// Part of the names of the filters to measure; empty for all.
     pub only: &'a str,
     /// Pixels along the longer edge of a slice.
     pub pixels: u32,
-    /// Times measured for each row.
+    /// Number of times measured for each row.
     pub repeats: usize,
 }
 
-/// Why a frame cannot be measured.
+/// The reason why a frame cannot be measured.
 #[derive(Debug, thiserror::Error)]
 pub enum MeasureError {
-    /// What the caller gave cannot be used.
+    /// An option or input cannot be used.
     #[error("{0}")]
     Input(String),
     #[error("{0}")]

@@ -1,13 +1,13 @@
-//! The filters that are compared, each over its windows and strengths.
+//! The filters to compare, each with several windows and strengths.
 
 /// A filter of slices with its settings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Candidate {
     /// Name of the filter.
     pub filter: &'static str,
-    /// What is varied: window and strength.
+    /// The varied values: window and strength.
     pub label: String,
-    /// The settings that switch it on, as `--set` takes them.
+    /// Its settings, as for `--set`.
     pub set: Vec<String>,
 }
 
@@ -32,7 +32,8 @@ const AOS_STEPS: u32 = 4;
 /// Standard deviations of the Gaussian, pixels.
 const DEVIATIONS: [f64; 6] = [0.7, 1.0, 2.0, 3.0, 4.0, 6.0];
 
-/// No filter, and the candidates whose filter's name contains `only`; those of one filter follow each other. `pitch`: edge of a pixel, mm.
+/// No filter, and the candidates whose filter's name contains `only`. Candidates of one filter are consecutive. `pitch`: edges of a pixel,
+/// mm.
 pub fn candidates(pitch: [f64; 2], only: &str) -> Vec<Candidate> {
     let mut all = candidates_of_all(pitch);
     all.retain(|candidate| candidate.set.is_empty() || candidate.filter.contains(only));

@@ -1,4 +1,4 @@
-//! Filtered frames side by side, one of each filter, with their names and figures.
+//! Filtered frames side by side, one for each filter, with their names and measures.
 
 use super::{Report, Row, Subject};
 use crate::canvas::{self, Canvas, Drawing, Drawn, INK};
@@ -13,7 +13,7 @@ const WIDTH: usize = 240;
 const GAP: usize = 8;
 const CAPTION: usize = 40;
 
-/// The frame of a subject after the setting of each filter that is [chosen](Report::chosen), and its clean frame if there is one.
+/// Draws the frame of a subject after the [chosen](Report::chosen) setting of each filter, and its clean frame if there is one.
 ///
 /// # Errors
 /// One line: the drawing failed.

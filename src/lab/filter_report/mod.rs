@@ -1,6 +1,6 @@
-//! Compares the 2D filters of slices: how well each reduces speckle and keeps edges, over its windows and strengths, and what it
-//! costs (as thesis Figs. 46-53, with figures). [`candidates`] lists the settings, [`quality`] has the measures, [`candidate_runs`]
-//! runs them on a device, [`export`] and [`contact_sheet`] write tables and pictures.
+//! Compares the 2D filters of slices: how well each reduces speckle and preserves edges, for its windows and strengths, and how long it
+//! takes (as thesis Figs. 46-53, but with numbers). [`candidates`] lists the settings, [`quality`] has the measures, [`candidate_runs`]
+//! runs them on a device, and [`export`] and [`contact_sheet`] write tables and pictures.
 
 pub mod candidate_runs;
 pub mod candidates;
@@ -12,29 +12,29 @@ use crate::machine::Device;
 use crate::thesis_tables::Spread;
 use quality::Quality;
 
-/// A part of a slice, mm: lateral, and depth as `region.depth` counts it.
+/// A part of a slice, mm: lateral positions, and depths counted as in `region.depth`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Area {
     pub lateral: [f64; 2],
     pub depth: [f64; 2],
 }
 
-/// Where a frame is measured.
+/// The parts of a frame that are measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Areas {
-    /// All measures but SNR and CNR; also what the contact sheet shows. Must lie inside of the sector.
+    /// The area of all measures except SNR and CNR, which the contact sheet also shows. It must lie inside the sector.
     pub crop: Area,
-    /// Tissue of one kind: SNR, and CNR against `background`.
+    /// Tissue of one kind: for SNR, and for CNR against `background`.
     pub region: Area,
     pub background: Area,
 }
 
-/// One filter with its settings, measured.
+/// Measurements of one filter with its settings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
     pub candidate: candidates::Candidate,
     pub quality: Quality,
-    /// Time of the filter's passes for one slice, ms; None for no filter and without time stamps.
+    /// Time of the filter's passes for one slice, ms. None without a filter and without time stamps.
     pub time: Option<Spread>,
     /// The filtered crop, row by row, 0..1.
     pub pixels: Vec<f64>,
@@ -46,11 +46,11 @@ pub struct Subject {
     /// Name of the recording, or `phantom`.
     pub name: String,
     pub areas: Areas,
-    /// Frame of the volume, counted from 0.
+    /// Index of the frame in the volume, from 0.
     pub frame: usize,
     /// Pixels of the crop.
     pub size: [usize; 2],
-    /// The crop as the mean over all speckle, row by row; None if it is not known.
+    /// The crop as the mean over all speckle, row by row. None if it is not known.
     pub clean: Option<Vec<f64>>,
     pub rows: Vec<Row>,
 }
@@ -63,14 +63,14 @@ pub struct Report {
     pub program: String,
     /// Time of the measurement, RFC 3339.
     pub date: String,
-    /// Times measured for each row.
+    /// Number of times measured for each row.
     pub repeats: usize,
-    /// The first is the phantom, which has a clean frame.
+    /// The frames. The first is the phantom's, which has a clean frame.
     pub subjects: Vec<Subject>,
 }
 
 impl Report {
-    /// For every filter the index of its row that is most similar to the clean frame (SSIM), in the order of the rows.
+    /// For every filter the index of the row that is most similar to the clean frame (SSIM), in the order of the rows.
     pub fn chosen(&self) -> Vec<usize> {
         let Some(subject) = self.subjects.iter().find(|s| s.clean.is_some()) else { return Vec::new() };
         let ssim = |n: &usize| subject.rows[*n].quality.ssim.unwrap_or(f64::NEG_INFINITY);

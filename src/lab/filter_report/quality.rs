@@ -1,4 +1,4 @@
-//! Measures of a filtered picture: noise in tissue of one kind, contrast, and, where the clean picture is known, edges and error.
+//! Measures of a filtered picture: noise in tissue of one kind, contrast, and, if the clean picture is known, edges and error.
 
 use crate::error_report::metrics::similarity;
 use crate::picture::{Level, Region};
@@ -10,22 +10,23 @@ const DISPLACEMENT: f64 = 1.0 / 9.0;
 /// Steepness that makes a pixel of the clean picture an edge, as a share of its steepest.
 const IDEAL_STEEPNESS: f64 = 0.1;
 
-/// How good a filtered picture is.
+/// Measures of the quality of a filtered picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quality {
-    /// Mean over standard deviation of tissue of one kind; None without noise.
+    /// Mean over standard deviation in tissue of one kind. None without noise.
     pub snr: Option<f64>,
-    /// Contrast to noise of that tissue against a background; None without noise.
+    /// Contrast-to-noise ratio of that tissue against a background. None without noise.
     pub cnr: Option<f64>,
-    /// Pratt's figure of merit, 0..1: 1 if the edges are where those of the clean picture are. None if that is not known.
+    /// Pratt's figure of merit, 0..1. It is 1 if all edges are where those of the clean picture are. None if the clean picture is not
+    /// known.
     pub edges: Option<f64>,
-    /// Root mean square of the difference from the clean picture, 0..1.
+    /// Root mean square difference from the clean picture, 0..1.
     pub rmse: Option<f64>,
     /// Structural similarity to the clean picture, at most 1.
     pub ssim: Option<f64>,
 }
 
-/// Measures a picture of `size` pixels with values in 0..1. SNR and CNR are those of a region and a background of it.
+/// Measures a picture of `size` pixels with values in 0..1. `levels`: the region of tissue and the background, for SNR and CNR.
 pub fn quality(pixels: &[f64], clean: Option<&[f64]>, size: [usize; 2], levels: [&Region; 2]) -> Quality {
     let [tissue, behind]: [Level; 2] = levels.map(|region| region.level(pixels, size[0] as u32));
     let mean_square = |clean: &[f64]| {

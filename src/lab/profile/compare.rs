@@ -33,11 +33,11 @@ use toml::{Table, Value};
 /// Thresholds of a comparison.
 #[derive(Clone, Copy, Debug)]
 pub struct CompareOptions {
-    /// Of medians: above it a slower pass is a regression.
+    /// Threshold for the ratio of medians: a pass that is slower by more is a regression.
     pub threshold: Threshold,
     /// Probability of any false alarm in the whole report, 0..1.
     pub alpha: f64,
-    /// A pass with a smaller share of the time of all passes (0..1) may hide a slowdown.
+    /// Passes with a smaller share of the time of all passes (0..1) may hide a slowdown.
     pub minor: f64,
     /// Compare even if the profiles ran different work.
     pub force: bool,
@@ -49,7 +49,7 @@ impl Default for CompareOptions {
     }
 }
 
-/// Why two profiles cannot be compared.
+/// The reason why two profiles cannot be compared.
 #[derive(Debug, thiserror::Error)]
 pub enum CompareError {
     #[error("{which} profile: {fault}")]
@@ -64,7 +64,7 @@ pub enum CompareError {
     Minor(f64),
 }
 
-/// Result of comparing one line.
+/// Result of the comparison of one line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
@@ -76,20 +76,20 @@ pub enum Verdict {
     NotComparable,
 }
 
-/// What the times of a line are of.
+/// The kind of times of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
     Pass,
-    /// A span of the host. Reported, but never a regression: such spans are short and part of the wall time.
+    /// A span of the host. It is reported, but never a regression: such spans are short and part of the wall time.
     Host,
-    /// From submission until the device is idle.
+    /// Time from submission until the device is idle.
     Wall,
     /// CPU time of all threads over the same interval.
     Cpu,
 }
 
-/// New over old; below 1 is faster.
+/// Ratio of the new time to the old one. Below 1 is faster.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Ratio {
     pub estimate: f64,
@@ -97,11 +97,11 @@ pub struct Ratio {
     pub low: f64,
     pub high: f64,
     pub coverage: f64,
-    /// Uncorrected.
+    /// Uncorrected p value.
     pub p: f64,
-    /// Corrected by Holm over all lines.
+    /// p value corrected by Holm over all lines.
     pub p_holm: f64,
-    /// Noise floor as a ratio (at least 1): a smaller difference is noise.
+    /// Noise floor as a ratio, at least 1. A smaller difference is noise.
     pub floor: f64,
 }
 
@@ -118,15 +118,15 @@ pub struct Line {
     pub new_ns: Option<f64>,
     /// None if there was nothing to compare.
     pub ratio: Option<Ratio>,
-    /// Why it is not comparable, or other remarks.
+    /// The reason why the line is not comparable, or another remark.
     pub note: Option<String>,
-    /// True if slower by more than the threshold.
+    /// True if the line is slower by more than the threshold.
     pub is_regression: bool,
-    /// The smallest slowdown that the noise would have let be called slower, a ratio; None if none would.
+    /// The smallest slowdown, as a ratio, that would have been reported as slower with this noise. None if none would.
     pub limit: Option<f64>,
     /// True if a slowdown by more than the threshold may have been overlooked.
     pub is_unseen: bool,
-    /// True if it may be, as a pass of little time.
+    /// True if a slowdown may be overlooked, because the pass takes little time.
     pub is_minor: bool,
 }
 
@@ -134,7 +134,7 @@ pub struct Line {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Comparison {
     pub format: &'static str,
-    /// Description of the time that was compared.
+    /// Description of the compared times.
     pub time: &'static str,
     /// Description of the statistical test.
     pub test: String,
@@ -149,8 +149,8 @@ impl Comparison {
         self.lines.iter().filter(|l| l.is_regression)
     }
 
-    /// Why it cannot be said that nothing is slower by more than the threshold, in one line: the smallest slowdown that would have been seen, and
-    /// where more would not have been. None if all would.
+    /// The reason why a slowdown by more than the threshold cannot be excluded, in one line: the smallest slowdown that would have been
+    /// detected, and the lines in which even a larger one would not have been. None if all would.
     pub fn cannot_tell(&self) -> Option<String> {
         let (worst, named) = hidden(self.lines.iter().filter(|line| line.is_unseen && !line.is_minor))?;
         Some(format!("cannot tell {worst}: {named}"))
@@ -190,27 +190,27 @@ enum Repeats {
     InTurn,
 }
 
-/// Compares two profiles. Lines are in this order: passes of the new profile, passes only in the old one, host spans, wall time,
-/// CPU time where it is compared.
+/// Compares two profiles. The lines are in this order: passes of the new profile, passes that only the old one has, host spans, wall time,
+/// and CPU time if it is compared.
 ///
 /// # Errors
-/// An option out of range, an inconsistent profile, or profiles of different work unless forced.
+/// An option is out of range, a profile is inconsistent, or the profiles are of different work and `force` is not set.
 pub fn compare(old: &Profile, new: &Profile, options: &CompareOptions) -> Result<Comparison, CompareError> {
     compare_repeats(old, new, options, Repeats::Apart)
 }
 
-/// Compares two runs that were measured in turn, the n-th repeats of the n-th blocks of both next to each other.
+/// Compares two runs that were measured alternately, with the n-th repeats of the n-th blocks of both next to each other in time.
 ///
 /// # Errors
-/// As of [`compare`]; blocks of one run that are of different work.
+/// As of [`compare`], or blocks of one run are of different work.
 pub fn in_turn(old: &[Profile], new: &[Profile], options: &CompareOptions) -> Result<Comparison, CompareError> {
     let [old, new] = [("old", old), ("new", new)]
         .map(|(which, blocks)| blocks_as_repeats(blocks, old).map_err(|fault| CompareError::Profile { which, fault }));
     compare_repeats(&old?, &new?, options, Repeats::InTurn)
 }
 
-/// The number of blocks of each run that [`in_turn`] needs to tell differences of so many passes, and two that may disagree; even, so that each run
-/// is as often the first.
+/// The number of blocks of each run that [`in_turn`] needs to detect differences of so many passes, plus two that may disagree. It is even,
+/// so that each run is first equally often.
 pub fn blocks_in_turn(passes: usize, alpha: f64) -> usize {
     let lines = passes as f64 + 1.0;
     (10..100).step_by(2).find(|n| min_signed_p(n - 2) * lines <= alpha).unwrap_or(100)
@@ -433,12 +433,12 @@ pub fn blocks_needed(lines: usize, alpha: f64) -> usize {
     (MIN_BLOCKS..100).find(|b| min_p(*b) * lines as f64 <= alpha).unwrap_or(100)
 }
 
-/// How two series are compared.
+/// The method by which two series are compared.
 #[derive(Clone, Copy)]
 pub enum Method {
-    /// By the medians of so many blocks of each.
+    /// By the medians of `blocks` blocks of each series.
     Apart { blocks: usize },
-    /// Time by time.
+    /// Time by time, for runs that were measured alternately.
     InTurn,
 }
 
@@ -609,7 +609,7 @@ fn line(pair: Pair, ratio: Option<(Ratio, f64)>, fault: Option<String>, options:
     }
 }
 
-/// A note if all passes changed by a similar factor: then a clock changed rather than a pass.
+/// A note if all passes changed by a similar factor, which suggests a change of the clock rather than of a pass.
 pub fn common_shift(lines: &[Line]) -> Option<String> {
     let passes: Vec<Ratio> = lines.iter().filter(|l| l.kind == Kind::Pass).filter_map(|l| l.ratio).collect();
     let logs: Vec<f64> = passes.iter().map(|r| r.estimate.ln()).collect();
@@ -620,6 +620,6 @@ pub fn common_shift(lines: &[Line]) -> Option<String> {
     // The shift is more than twice the spread of the passes.
     (shift.abs() > floor && spread < shift.abs() / 2.0).then(|| {
         let each = sample.quantile(0.5).exp();
-        format!("all passes changed alike, by a factor of {each:.2}: look whether clocks or other load differ between the runs")
+        format!("all passes changed alike, by a factor of {each:.2}: check whether clocks or other load differ between the runs")
     })
 }

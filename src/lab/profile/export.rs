@@ -1,5 +1,5 @@
-//! Profiles, comparisons and pass times for other programs and for people: CSV, tables for a terminal, and a run as Chrome trace events
-//! (Trace Event Format, JSON object form), which Perfetto and chrome://tracing open.
+//! Writes profiles, comparisons and pass times: CSV, tables for a terminal, and a run as Chrome trace events (Trace Event Format, JSON
+//! object form), which Perfetto and chrome://tracing open.
 
 use super::compare::{Comparison, Kind, Line, Verdict};
 use super::statistics::{Interval, Sample, drift};
@@ -8,8 +8,8 @@ use crate::passes::times::acquisition_floor;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 
-/// A profile as CSV: one line per pass, then the host spans, `device` (first begin to last end), `wall` and `cpu` (of the process,
-/// if the system reports it). Without time stamps the time columns of passes are empty.
+/// A profile as CSV: one line for each pass, then the host spans, `device` (first begin to last end), `wall` and `cpu` (of the process, if
+/// the system reports it). Without time stamps the time columns of passes are empty.
 pub fn csv(profile: &Profile) -> String {
     let mut text = String::from(
         "kind,stage,name,runs_per_picture,repeats,min_ns,p5_ns,median_ns,p95_ns,max_ns,mad_ns,ci_low_ns,ci_high_ns,\
@@ -359,7 +359,7 @@ fn comparison_row(line: &Line) -> Vec<String> {
     row
 }
 
-/// Where a span ran, and by whose clock it was timed.
+/// The processor on which a span ran, and whose clock timed it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Track {
     Device,
@@ -371,16 +371,16 @@ pub enum Track {
 pub struct Span {
     pub name: String,
     pub track: Track,
-    /// Repeat that it belongs to, from 0.
+    /// Index of the repeat that it belongs to.
     pub repeat: usize,
     pub begin_ns: f64,
     pub end_ns: f64,
 }
 
-/// Why a trace cannot be written.
+/// The reason why a trace cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub enum TraceError {
-    #[error("span {name:?} of repeat {repeat}: from {begin_ns} to {end_ns} ns is no interval of time")]
+    #[error("span {name:?} of repeat {repeat}: from {begin_ns} to {end_ns} ns is not an interval of time")]
     Interval { name: String, repeat: usize, begin_ns: f64, end_ns: f64 },
     #[error("trace: {0}")]
     Json(String),
@@ -389,9 +389,8 @@ pub enum TraceError {
 /// Maximum time that the numbers of the format resolve to the nanosecond: 2^53 ns, 104 days.
 const MAX_NS: f64 = 9_007_199_254_740_992.0;
 
-/// Writes spans as a Chrome trace, both tracks on one time axis. Host spans may nest; other overlapping spans get threads of their
-/// own, so that no viewer drops them. Without calibration the device's spans are consistent only among themselves, and the trace
-/// says so.
+/// Writes spans as a Chrome trace, both tracks on one time axis. Host spans may nest; other overlapping spans get threads of their own, so
+/// that no viewer drops them. Without calibration the device's spans are consistent only among themselves, and the trace states that.
 ///
 /// # Errors
 /// A span that ends before it begins, or is not finite.

@@ -1,5 +1,5 @@
-//! Profiles: run times of every pass, what they were measured on, and their JSON file. [`timed_run`] makes a profile, [`compare`]
-//! compares two, [`export`] writes them as text and as Chrome traces. [`pipelines`] is about their compilation.
+//! Profiles: run times of every pass with the conditions of their measurement, and their JSON file. [`timed_run`] makes a profile,
+//! [`compare`] compares two, and [`export`] writes them as text and as Chrome traces. [`pipelines`] measures the compilation of pipelines.
 
 pub mod compare;
 pub mod export;
@@ -33,37 +33,37 @@ pub struct Profile {
     /// Description of the input.
     pub input: String,
     pub sizes: Sizes,
-    /// Time to acquire the volume; None for volumes that no probe swept.
+    /// Time to acquire the volume. None for volumes that no probe swept.
     pub acquisition: Option<Acquisition>,
-    /// Pictures measured.
+    /// Number of measured pictures.
     pub repeats: usize,
-    /// Pictures rendered before those, not measured.
+    /// Number of pictures that are rendered first and not measured.
     pub warm_up: usize,
     /// Rotation of the view from each repeat to the next, deg.
     #[serde(default)]
     pub turn: f64,
-    /// In running order.
+    /// The passes in running order.
     pub passes: Vec<PassProfile>,
     /// Spans of the host: submit, upload, wait, total. They may nest, so they do not add up.
     pub host: Vec<PassProfile>,
-    /// From submission until the device is idle again, by the host's clock.
+    /// Time from submission until the device is idle again, by the host's clock.
     pub wall_ns: Vec<f64>,
-    /// CPU time of the process over the same interval, all threads, user and system. On a software device this is the cost of
-    /// the work, independent of other load. Empty if the system does not report it.
+    /// CPU time of the process over the same interval, all threads, user and system. On a software device this is the cost of the work,
+    /// independent of other load. Empty if the system does not report it.
     #[serde(default)]
     pub cpu_ns: Vec<f64>,
-    /// From the begin of the first pass to the end of the last, by the device's clock. Empty without time stamps.
+    /// Time from the begin of the first pass to the end of the last, by the device's clock. Empty without time stamps.
     pub device_ns: Vec<f64>,
     pub ceilings: Option<Ceilings>,
     /// Description of how the volume is sampled and texels are read.
     #[serde(default)]
     pub sampling: Option<String>,
-    /// Largest error with which spans of the device are placed on the host's clock, ns; None if its clock cannot be read.
+    /// Largest error of the position of device spans on the host's clock, ns. None if the device's clock cannot be read.
     #[serde(default)]
     pub clock_deviation_ns: Option<u64>,
 }
 
-/// Sizes of what was processed.
+/// Sizes of the processed data.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sizes {
@@ -90,15 +90,15 @@ pub struct Acquisition {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PassProfile {
-    /// Unique in its list.
+    /// Name, unique in its list.
     pub name: String,
     /// Stage of the pass; `host` for host spans.
     pub stage: String,
-    /// Dispatches in one repeat.
+    /// Number of dispatches in one repeat.
     pub runs_per_picture: u32,
     /// Sum over all runs of a repeat, ns. Empty without time stamps.
     pub samples_ns: Vec<f64>,
-    /// CPU time of all threads in a repeat, ns, where the device is the CPU; else empty.
+    /// CPU time of all threads in a repeat, ns, if the device is the CPU; otherwise empty.
     #[serde(default)]
     pub cpu_ns: Vec<f64>,
     /// Minimum bytes read in a repeat: every texel of every bound slot once.
@@ -111,7 +111,7 @@ pub struct PassProfile {
     /// Filtered texture samples in a repeat, if they can be counted.
     #[serde(default)]
     pub filtered: Option<u64>,
-    /// Invocations that a repeat asks for, without those that fill up workgroups.
+    /// Invocations that a repeat needs, without those that fill up workgroups.
     #[serde(default)]
     pub dispatched: Option<u64>,
     /// Compute shader invocations in a repeat, from pipeline statistics if the device has them.
@@ -137,7 +137,7 @@ pub struct Ceilings {
     pub copy: Ceiling,
     /// Filtered texture samples.
     pub sampling: Ceiling,
-    /// Samples interpolated by the shader from eight texels.
+    /// Samples that the shader interpolates from eight texels.
     #[serde(default)]
     pub exact: Option<Ceiling>,
     /// Texel fetches, or storage loads if the device uses those.
@@ -147,7 +147,7 @@ pub struct Ceilings {
 /// The ceiling that a pass is closest to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Roof {
-    /// Achieved rate over the ceiling. Above 1 if caches serve what the micro-benchmark fetched from memory.
+    /// Ratio of the achieved rate to the ceiling. Above 1 if caches serve what the micro-benchmark fetched from memory.
     pub share: f64,
     /// "copy", "sampling" or "fetch".
     pub bound: &'static str,

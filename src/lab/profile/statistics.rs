@@ -1,9 +1,9 @@
-//! Order statistics, rank tests and multiple-test correction. They assume no distribution: run times have long tails and
-//! outliers, so medians and ranks are used throughout, means and standard deviations nowhere.
+//! Order statistics, rank tests and multiple-test correction. They assume no distribution: run times have long tails and outliers, so
+//! medians and ranks are used throughout, and never means or standard deviations.
 
 use crate::statistics;
 
-/// Why values are no sample.
+/// The reason why values are not a sample.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SampleError {
     #[error("there are no samples")]
@@ -64,7 +64,7 @@ impl Sample {
         self.0[self.0.len() - 1]
     }
 
-    /// As [`statistics::quantile`]; a sample has values.
+    /// As [`statistics::quantile`], but never None, because a sample has values.
     pub fn quantile(&self, share: f64) -> f64 {
         statistics::quantile(&self.0, share).unwrap_or(f64::NAN)
     }
@@ -139,11 +139,11 @@ const MAX_EXACT: usize = 60;
 /// The Mann-Whitney test, two-sided.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MannWhitney {
-    /// Pairs in which the value of the first sample is larger; ties count half.
+    /// Number of pairs in which the value of the first sample is larger. Ties count half.
     pub u: f64,
     /// Probability of a U at least as extreme if both samples are from one distribution.
     pub p: f64,
-    /// From the exact distribution, not the normal approximation.
+    /// True if p is from the exact distribution, not from the normal approximation.
     pub is_exact: bool,
 }
 
@@ -157,9 +157,9 @@ pub struct Shift {
     pub coverage: f64,
 }
 
-/// H. B. Mann and D. R. Whitney, On a test of whether one of two random variables is stochastically larger than the other,
-/// 1947. Small samples: the exact permutation distribution of the midranks, so that ties need no correction. Large ones: the
-/// normal approximation with the variance corrected for ties and a continuity correction.
+/// The Mann-Whitney test (H. B. Mann and D. R. Whitney, On a test of whether one of two random variables is stochastically larger than the
+/// other, 1947). Small samples use the exact permutation distribution of the midranks, so that ties need no correction. Large samples use
+/// the normal approximation with the variance corrected for ties and a continuity correction.
 ///
 /// # Errors
 /// `a` or `b` is no sample.
@@ -216,9 +216,9 @@ pub fn min_p(n: usize) -> f64 {
     2.0 / (1..=n).map(|i| (n + i) as f64 / i as f64).product::<f64>()
 }
 
-/// J. L. Hodges and E. L. Lehmann, Estimates of location based on rank tests, 1963: the median of all differences b - a. The
-/// interval holds every shift that the Mann-Whitney test would not reject; `coverage` is below `level` if there are too few
-/// samples. Memory: n * m values.
+/// The shift between two samples: the median of all differences b - a (J. L. Hodges and E. L. Lehmann, Estimates of location based on rank
+/// tests, 1963). The interval holds every shift that the Mann-Whitney test would not reject; `coverage` is below `level` if there are too
+/// few samples. Memory: n * m values.
 ///
 /// # Errors
 /// `a` or `b` is no sample.
@@ -273,8 +273,9 @@ fn all_rank_sums(ranks: &[usize]) -> Vec<f64> {
     counts
 }
 
-/// F. Wilcoxon, Individual comparisons by ranking methods, 1945: the probability, two-sided, of rank sums at least as extreme if differences
-/// of pairs lie symmetrically about 0. The exact distribution of the midranks; differences of 0 are left out.
+/// The two-sided signed-rank test (F. Wilcoxon, Individual comparisons by ranking methods, 1945): the probability of rank sums at least as
+/// extreme if differences of pairs lie symmetrically about 0. It uses the exact distribution of the midranks. Differences of 0 are left
+/// out.
 ///
 /// # Errors
 /// `differences` is no sample.
@@ -297,8 +298,8 @@ pub fn min_signed_p(n: usize) -> f64 {
     2.0 * 0.5f64.powi(n as i32)
 }
 
-/// The median of the means of all two differences of pairs, each with itself too (Hodges and Lehmann, 1963). The interval holds every shift that
-/// [`signed_rank`] would not reject; `coverage` is below `level` if there are too few pairs.
+/// The shift of paired samples: the median of the means of all two differences, each also with itself (Hodges and Lehmann, 1963). The
+/// interval holds every shift that [`signed_rank`] would not reject; `coverage` is below `level` if there are too few pairs.
 ///
 /// # Errors
 /// `differences` is no sample.
@@ -322,8 +323,8 @@ pub fn paired_shift(differences: &[f64], level: f64) -> Result<Shift, SampleErro
     Ok(Shift { estimate: means.median(), low, high, coverage: (1.0 - 2.0 * tail).max(0.0) })
 }
 
-/// S. Holm, A simple sequentially rejective multiple test procedure, 1979: adjusted p values, in the order given. Rejecting those
-/// up to alpha gives a family-wise error rate of at most alpha, whatever their dependence.
+/// Holm's correction (S. Holm, A simple sequentially rejective multiple test procedure, 1979): adjusted p values, in the given order.
+/// Rejecting those up to alpha gives a family-wise error rate of at most alpha, whatever their dependence.
 pub fn holm(p: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..p.len()).collect();
     order.sort_by(|i, j| p[*i].total_cmp(&p[*j]));

@@ -17,9 +17,9 @@ use std::time::Instant;
 
 #[derive(Clone, Debug)]
 pub struct ProfileOptions {
-    /// Pictures measured.
+    /// Number of measured pictures.
     pub repeats: usize,
-    /// Pictures rendered before those, not measured.
+    /// Number of pictures that are rendered first and not measured.
     pub warm_up: usize,
     /// Runs the frames through stage 1 once, so that only the later stages are measured.
     pub still: bool,
@@ -31,8 +31,8 @@ pub struct ProfileOptions {
     pub ceilings: bool,
 }
 
-/// A profile in progress: each call of [`ProfileRun::repeat`] renders the scene once. Two runs can be interleaved, so that other
-/// load on the machine affects both alike.
+/// A profile in progress: each call of [`ProfileRun::repeat`] renders the scene once. Two runs can be interleaved, so that other load on
+/// the machine affects both alike.
 pub struct ProfileRun {
     context: Arc<Context>,
     renderer: Renderer,
@@ -69,10 +69,10 @@ impl ProfileRun {
         ProfileRun::with_shaders(context, scene, options, &RendererOptions::default().shaders)
     }
 
-    /// With these shaders instead of the embedded ones.
+    /// As [`ProfileRun::new`], with these shaders instead of the embedded ones.
     ///
     /// # Errors
-    /// As of [`ProfileRun::new`]; a shader that does not compile.
+    /// As of [`ProfileRun::new`], or a shader does not compile.
     pub fn with_shaders(
         context: &Arc<Context>,
         scene: &Scene,

@@ -10,7 +10,7 @@ use crate::scene::Estimator;
 use crate::text::{csv_quoted, markdown_table, markdown_text};
 use std::fmt::Write as _;
 
-/// Tables 3-6 as CSV, one line per row; a missing time is an empty field.
+/// Tables 3-6 as CSV, one line for each row. A missing time is an empty field.
 pub fn tables_csv(report: &Report) -> String {
     let mut text = String::from(
         "table,varied,value,usual,picture_ms,picture_least_ms,picture_most_ms,ratio,thesis_ms,thesis_ratio,stage_1_ms,\
@@ -45,7 +45,7 @@ fn csv_row(report: &Report, table: &Table, row: &Row, usual: bool) -> String {
     fields.join(",") + "\n"
 }
 
-/// Tables 7-9 as CSV, one line per picture, sigma, starting window and step of growth; shares in 0..1.
+/// Tables 7-9 as CSV, one line for each picture, sigma, starting window and step of growth. Shares are in 0..1.
 pub fn growth_csv(grown: &[Grown]) -> String {
     let mut text = String::from("picture,centre,sigma,window,largest,grew,share\n");
     for picture in grown {
@@ -74,7 +74,7 @@ fn ms(value: f64) -> String {
     format!("{value:.3}")
 }
 
-/// The report as Markdown: conditions, Tables 3-6 with the figures of the thesis, notes, and Tables 7-9 of every picture.
+/// The report as Markdown: conditions, Tables 3-6 with the values of the thesis, notes, and Tables 7-9 for every picture.
 pub fn markdown(report: &Report) -> String {
     let mut text = String::from("# Tables of the thesis on this device\n\n");
     conditions(&mut text, report);

@@ -1,5 +1,5 @@
-//! Tables 7-9 of the thesis (5.5): how far the windows of the enhanced sigma filter grow on a picture, as the share of pixels whose
-//! window grew by +0, +2, +4 ... pixels.
+//! Tables 7-9 of the thesis (5.5): the growth of the windows of the enhanced sigma filter on a picture, as the share of pixels whose window
+//! grew by +0, +2, +4 ... pixels.
 
 use crate::gpu::{Context, GpuError, Renderer, RendererOptions};
 use crate::passes::Slot;
@@ -10,7 +10,8 @@ use crate::source::StoredType;
 use std::fmt::Write as _;
 use std::sync::Arc;
 
-/// Starting and largest windows of Tables 7-9, pixels: as far as their columns go. 7x7 reaches 19 in Tables 7 and 9, and 21 in Table 8.
+/// Starting and largest windows of Tables 7-9, pixels, up to the last columns of the tables: 7x7 reaches 19 in Tables 7 and 9, and 21 in
+/// Table 8.
 pub const WINDOWS: [[u32; 2]; 7] = [[3, 17], [5, 19], [7, 19], [7, 21], [9, 21], [11, 21], [13, 23]];
 /// Estimators of the centre: the thesis ties Fig. 48, and so Table 7, to the median (5.7), and planes to Perona-Malik (5.7). Tables 8 and 9
 /// do not say.
@@ -38,7 +39,7 @@ pub struct Growth {
 }
 
 impl Growth {
-    /// From the number of rings by which the window of each pixel grew.
+    /// `rings`: for each pixel the number of rings by which its window grew.
     pub fn new(centre: Estimator, sigma: f64, windows: [u32; 2], rings: &[f64]) -> Growth {
         let max_rings = (windows[1] - windows[0]) / 2;
         let mut counts = vec![0; max_rings as usize + 1];
@@ -79,7 +80,7 @@ pub fn table(rows: &[Growth]) -> String {
     text
 }
 
-/// The same as CSV with shares in 0..1; a window that cannot grow that far has an empty field.
+/// The rows as CSV with shares in 0..1. A window that cannot grow that far has an empty field.
 pub fn csv(rows: &[Growth]) -> String {
     let mut text = "centre,sigma,window,largest".to_string();
     (0..columns(rows)).for_each(|n| text.push_str(&format!(",grew {}", 2 * n)));
@@ -94,7 +95,7 @@ pub fn csv(rows: &[Growth]) -> String {
     text
 }
 
-/// How far the windows of the enhanced sigma filter grew on one picture (Tables 7-9).
+/// The growth of the windows of the enhanced sigma filter on one picture (Tables 7-9).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grown {
     /// Name of the picture.
@@ -105,7 +106,7 @@ pub struct Grown {
 /// One row to measure: centre, sigma, starting and largest window, and its settings.
 pub type GrowthSettings = (Estimator, f64, [u32; 2], Settings);
 
-/// Why growth cannot be measured.
+/// The reason why growth cannot be measured.
 #[derive(Debug, thiserror::Error)]
 pub enum GrowthError {
     #[error("{0}")]

@@ -1,6 +1,6 @@
-//! The tables of the thesis, next to the times of this device: Tables 3-6 (4.5), time per rendered volume in surface mode, and
-//! Tables 7-9 (5.5), the growth of filter windows. This file has the rows, their conditions and the figures of the thesis;
-//! [`row_times`] and [`growth`] fill them, [`export`] writes Markdown and CSV.
+//! The tables of the thesis, next to the times of this device: Tables 3-6 (4.5), the time for each rendered volume in surface mode, and
+//! Tables 7-9 (5.5), the growth of filter windows. This file has the rows, their conditions and the values of the thesis. [`row_times`] and
+//! [`growth`] fill them, and [`export`] writes Markdown and CSV.
 
 pub mod export;
 pub mod growth;
@@ -30,9 +30,9 @@ pub(crate) const THESIS_BANDWIDTH: f64 = 80.0;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Filter3d {
     None,
-    /// As in the thesis: along every ray, with a sliding front slice (`ray.sliding`). Samples along each edge.
+    /// As in the thesis: along every ray, with a sliding front slice (`ray.sliding`). The value is the number of samples along each edge.
     Sliding(u32),
-    /// Separable, applied slice by slice in stage 1 (`slices.smooth.kernel`). Taps along each axis.
+    /// Separable, applied slice by slice in stage 1 (`slices.smooth.kernel`). The value is the number of taps along each axis.
     Stored(u32),
 }
 
@@ -54,20 +54,21 @@ pub struct Conditions {
     pub frames: usize,
     /// Scan lines per frame, of [`SAMPLES`] samples.
     pub lines: usize,
-    /// n of n^3: slices of n x n pixels, n samples per ray from the face to the end of the volume.
+    /// n of a volume of n^3: slices of n x n pixels, and n samples per ray from the face to the end of the volume.
     pub volume: u32,
-    /// Edge of the picture, pixels: that of the volume, unless the picture is held fixed.
+    /// Edge of the picture, pixels. It equals that of the volume, unless the picture is held fixed.
     pub picture: u32,
     pub filter_3d: Filter3d,
-    /// Edge of the sigma filter's window, pixels: on the distance map, or, where rays are composited, the starting one of all three stages.
+    /// Edge of the sigma filter's window, pixels. The filter runs on the distance map, or, if rays are composited, it is the starting
+    /// window of all three stages.
     pub filter_2d: u32,
-    /// As the thesis' pipeline has it (4.1, chapter 6): whole rays are composited and their colour is lit, and the enhanced sigma filter
-    /// runs in stages 1, 3 and 4. Otherwise the surface alone is found, in one colour, and a plain sigma filter runs in stage 3.
+    /// True for the pipeline of the thesis (4.1, chapter 6): whole rays are composited and their colour is lit, and the enhanced sigma
+    /// filter runs in stages 1, 3 and 4. False: only the surface is found, in one colour, and a plain sigma filter runs in stage 3.
     pub is_composited: bool,
 }
 
 impl Conditions {
-    /// The conditions of the thesis; if `quick`, with a quarter of the edge of the volume and half of the lines.
+    /// The conditions of the thesis. With `quick`, the edge of the volume is a quarter and the number of lines a half of these.
     pub fn usual(quick: bool) -> Conditions {
         let (lines, volume) = if quick { (64, 128) } else { (128, 512) };
         let filter_3d = Filter3d::Sliding(3);
@@ -93,7 +94,7 @@ pub struct Spread {
 }
 
 impl Spread {
-    /// From times in ns; None without times.
+    /// Statistics of times in ns. None without times.
     pub fn new(ns: &[f64]) -> Option<Spread> {
         let sample = Sample::new(ns).ok()?;
         let [median, min, max] = [sample.median(), sample.min(), sample.max()].map(|ns| ns * 1e-6);
@@ -101,7 +102,7 @@ impl Spread {
     }
 }
 
-/// The figure of the thesis for a row.
+/// The value of the thesis for a row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Thesis {
     /// Time per rendered volume, ms.
@@ -127,17 +128,17 @@ pub struct Row {
 /// One of Tables 3-6, or the usual row by another pipeline.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
-    /// Number in the thesis; None of a table that it does not have.
+    /// Number in the thesis. None for a table that the thesis does not have.
     pub number: Option<u32>,
     /// Name of the varied condition.
     pub varied: &'static str,
     pub rows: Vec<Row>,
-    /// Index of the row with the usual conditions, to which ratios are given.
+    /// Index of the row with the usual conditions, to which ratios refer.
     pub usual: usize,
 }
 
 impl Table {
-    /// Ratio of the median of stages 2-4 to that of the usual row; None if not measured.
+    /// Ratio of the median of stages 2-4 to that of the usual row. None if not measured.
     pub fn ratio(&self, row: &Row) -> Option<f64> {
         let usual = Spread::new(&self.rows.get(self.usual)?.times.picture)?;
         let own = Spread::new(&row.times.picture)?;
@@ -206,7 +207,7 @@ pub fn tables(quick: bool) -> Vec<Table> {
     ]
 }
 
-/// Where the rays of a row hit a surface, which shows whether rows did the same work.
+/// Where the rays of a row hit a surface. It shows whether rows did the same work.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reached {
     /// Share of the rays that hit a surface, 0..1.
@@ -225,9 +226,9 @@ pub struct Report {
     pub date: String,
     pub quick: bool,
     pub repeats: usize,
-    /// Volumes rendered before those, not measured.
+    /// Number of volumes that are rendered first and not measured.
     pub warm_up: usize,
-    /// What copying reaches on this device, bytes/s; None without time stamps.
+    /// Rate that copying reaches on this device, bytes/s. None without time stamps.
     pub copy: Option<Ceiling>,
     pub tables: Vec<Table>,
     pub grown: Vec<Grown>,

@@ -1,7 +1,7 @@
 //! Measures Tables 3-6 of the thesis on a device: renders the scene of every row repeatedly.
 //!
 //! The input is synthetic: a sweep with the geometry of the thesis (4.5) through a ball in front of a wall, both in dark fluid, so that
-//! rays end where those of an examination do. Computed from a formula, so it is the same on every machine.
+//! rays end at the depths of those of an examination. It is computed from a formula, so it is the same on every machine.
 
 use crate::gpu::{self, Context, GpuError, Renderer};
 use crate::machine;
@@ -31,14 +31,14 @@ const PICTURE_SIGMA: f64 = 0.03;
 /// Largest window of a growing one that starts at 9x9 (Tables 7-9), pixels.
 const GROWING_TO: u32 = 21;
 
-/// How to measure the tables.
+/// Options of the measurement of the tables.
 #[derive(Clone, Copy, Debug)]
 pub struct TableOptions {
-    /// Use smaller volumes: see [`Conditions::usual`].
+    /// Uses smaller volumes: see [`Conditions::usual`].
     pub quick: bool,
-    /// Volumes measured in each row.
+    /// Number of volumes measured in each row.
     pub repeats: usize,
-    /// Volumes rendered before those, not measured.
+    /// Number of volumes that are rendered first and not measured.
     pub warm_up: usize,
 }
 
@@ -140,8 +140,8 @@ fn broken(error: &SceneError) -> GpuError {
     GpuError::Broken(format!("the scene that measures: {error}"))
 }
 
-/// The scene of a row: only the filters that the conditions of the thesis name, no shadow. The coarse detector is off, so that a
-/// ray takes all of its samples. Composited, the filters have the sigmas and the largest window of preset `thesis`.
+/// The scene of a row. It has only the filters that the conditions of the thesis name, and no shadow. The coarse detector is off, so that a
+/// ray takes all of its samples. If rays are composited, the filters have the sigmas and the largest window of preset `thesis`.
 ///
 /// # Errors
 /// None for the conditions of [`tables`].

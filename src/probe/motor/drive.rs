@@ -31,7 +31,7 @@ pub struct MotorStatus {
     pub watchdog: Option<Duration>,
 }
 
-/// An open motor. Dropping it stops it, see [`super::guard`].
+/// An open motor. Dropping it stops the motor in every case, as the module `guard` describes.
 pub struct Drive {
     pub(super) guard: Guard,
     pub(super) table: MotorTable,

@@ -1,7 +1,7 @@
 //! The motor that wobbles the array: a stepper behind a TMCL module on a serial port.
 //!
-//! [`tmcl`] is the protocol and [`port`] the serial port. [`guard`] stops the motor in every case. [`drive`] finds home and sweeps,
-//! [`sweep`] computes the speed and gives each frame its angle and direction, [`background_sweep`] sweeps on a thread of its own during a
+//! [`tmcl`] is the protocol and [`port`] the serial port. `guard` stops the motor in every case. [`drive`] finds home and sweeps,
+//! [`sweep`] computes the speed and gives each frame its angle and direction, `background_sweep` sweeps on a thread of its own during a
 //! stream, and [`simulate`] is a simulated module for tests and demonstrations. A [`MotorError`] is one line with the fault, the port, what
 //! to do and whether the motor was stopped.
 

@@ -1,4 +1,4 @@
-//! The support bundle: one archive with information about program and machine, the configuration and the logs, without data of patients.
+//! The support bundle: one archive with information about program and machine, the configuration and the logs, but without patient data.
 
 use super::config::{self, Config};
 use super::log_rotation::{is_log_file, rotated_name};
@@ -47,8 +47,8 @@ struct Entry {
 }
 
 impl Bundle {
-    /// Collects the system information, the configuration and its logs. `config`: path of the configuration, or the default one. This
-    /// never fails: what cannot be read is noted in the bundle.
+    /// Collects the system information, the configuration and its logs. `config`: path of the configuration, or None for the default one.
+    /// This never fails: the bundle notes what cannot be read.
     pub fn new(config: Option<&Path>) -> Bundle {
         let mut bundle = Bundle { redactor: Redactor::new(), entries: Vec::new(), notes: Vec::new() };
         let path = config.unwrap_or(Path::new(config::DEFAULT_PATH));
@@ -140,13 +140,13 @@ impl Bundle {
         }
     }
 
-    /// Adds a note to the README: what is missing, and why.
+    /// Adds a note to the README on a missing part and the reason.
     pub fn note(&mut self, note: &str) {
         let note = self.redactor.redact(&crate::text::printable(note));
         self.notes.push(note);
     }
 
-    /// The archive (.tar.gz). It starts with `README.txt`, which lists the contents.
+    /// Packs the archive (.tar.gz). It starts with `README.txt`, which lists the contents.
     ///
     /// # Errors
     /// Writing the archive to memory failed.

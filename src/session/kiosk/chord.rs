@@ -66,7 +66,7 @@ pub struct Chord {
     pub modifiers: Modifiers,
 }
 
-/// Why a text is not a key combination.
+/// The reason why a text is not a key combination.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{fault}; examples of keys: ctrl+alt+q, shift+f12, escape (any of ctrl, alt and shift, then one key)")]
 pub struct ChordError {

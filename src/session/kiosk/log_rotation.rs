@@ -32,11 +32,11 @@ impl Sink for File {
 
 type Opener = Box<dyn FnMut(&Path) -> io::Result<Box<dyn Sink>> + Send>;
 
-/// The writer of a log with rotation. What is written up to the end of a line is one event; it is written completely or not at all.
+/// The writer of a log with rotation. The text up to the end of a line is one event, which is written completely or not at all.
 ///
 /// Writing never fails. Lines that cannot be written, on a full disk or in a deleted folder, are counted. Every later write tries again,
-/// and the first one that succeeds reports how many lines are missing. No line is split between two files, and all files together hold
-/// at most `bytes` times `files`. Only one process at a time may write to a log ([`files::Lock`](crate::files::Lock)).
+/// and the first one that succeeds reports how many lines are missing. No line is split between two files, and all files together hold at
+/// most `bytes` times `files`. Only one process at a time may write to a log ([`files::Lock`](crate::files::Lock)).
 pub struct RotatingLog {
     path: PathBuf,
     bytes: u64,
@@ -104,7 +104,8 @@ impl RotatingLog {
         Ok(log)
     }
 
-    /// The same log, whose file is opened anew before the next line each time that `reopens` becomes true: who renamed it gets no more lines.
+    /// The same log, but each time that `reopens` becomes true it opens its file again before the next line. After another program has
+    /// renamed the file, the lines go to a new one.
     #[must_use]
     pub fn reopened(mut self, reopens: Arc<AtomicBool>) -> RotatingLog {
         self.reopens = reopens;
@@ -231,26 +232,26 @@ impl Drop for RotatingLog {
     }
 }
 
-/// A log whose file may not be there yet: until it can be opened, lines go to another place.
+/// A log whose file may not exist yet. Until it can be opened, lines go to another writer.
 ///
-/// Writing never fails. A write tries to open the file if the last try is at least `pause` ago. The first line of the file then says where the lines
-/// before it are.
+/// Writing never fails. A write tries to open the file if the last try is at least `pause` ago. The first line of the file then states
+/// where the earlier lines are.
 pub struct LateLog<O, W> {
     open: O,
     until: W,
     pause: Duration,
     tried: Instant,
-    /// The log, or why there is none yet.
+    /// The log, or the reason why it is not open yet.
     log: Result<RotatingLog, String>,
 }
 
 impl<O: FnMut() -> Result<RotatingLog, String>, W: Write> LateLog<O, W> {
-    /// Tries to open the log. `until`: takes the lines as long as that fails.
+    /// Tries to open the log. `until`: receives the lines until that succeeds.
     pub fn new(mut open: O, until: W, pause: Duration) -> LateLog<O, W> {
         LateLog { log: open(), open, until, pause, tried: Instant::now() }
     }
 
-    /// Why the file could not be opened, on one line.
+    /// The reason why the file could not be opened, on one line.
     pub fn fault(&self) -> Option<&str> {
         self.log.as_ref().err().map(String::as_str)
     }

@@ -1,5 +1,5 @@
-//! What a machine that runs for weeks in a clinic needs besides the picture: one file of configuration ([`config`]), logs of bounded size
-//! ([`log_rotation`]), and a support [`bundle`] without any data of patients ([`redaction`]). None of it depends on a device or a window.
+//! Support for a machine that runs for weeks in a clinic: one configuration file ([`config`]), logs of bounded size ([`log_rotation`]), and
+//! a support [`bundle`] without patient data ([`redaction`]). It depends on neither a device nor a window.
 
 pub mod bundle;
 pub mod chord;

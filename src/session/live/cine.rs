@@ -1,5 +1,5 @@
-//! The cine loop: the last volumes, for looking back. Their frames are kept as acquired, so that every setting, also of stage 1, can
-//! still be changed. Bounded in volumes and bytes. Pure.
+//! The cine loop: the most recent volumes, for review. Their frames are kept as acquired, so that every setting, also of stage 1, can still
+//! be changed. The loop is limited in volumes and bytes. It has no side effects.
 
 use crate::source::Frame;
 use std::collections::VecDeque;
@@ -9,12 +9,12 @@ use std::sync::Arc;
 #[derive(Clone, Debug, Default)]
 pub struct CineVolume {
     pub volume: u32,
-    /// In order of the slices.
+    /// Frames in the order of the slices.
     pub frames: Vec<Arc<Frame>>,
     bytes: usize,
 }
 
-/// Size of a cine loop.
+/// Limits of a cine loop.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CineLimits {
     /// Most volumes; 0 switches the cine loop off.
@@ -44,7 +44,7 @@ impl Cine {
         Cine { limits, slices, volumes: VecDeque::new(), filling: None, bytes: 0 }
     }
 
-    /// True if the volumes have so many frames.
+    /// True if the volumes have `slices` frames.
     pub fn is_of(&self, slices: usize) -> bool {
         self.slices == slices
     }
@@ -59,7 +59,7 @@ impl Cine {
         self.bytes
     }
 
-    /// True if a further volume like the newest would remove the oldest.
+    /// True if another volume of the size of the newest would remove the oldest.
     pub(crate) fn is_full(&self) -> bool {
         let next = self.volumes.back().map_or(0, |newest| newest.bytes);
         self.volumes.len() >= self.limits.volumes || (next > 0 && self.bytes + next > self.limits.bytes)
@@ -70,7 +70,7 @@ impl Cine {
         *self = Cine::new(self.limits, self.slices);
     }
 
-    /// Removes the volume that is being filled: its remaining frames will not come.
+    /// Removes the volume that is being filled, because its remaining frames will not arrive.
     pub(crate) fn discard_partial(&mut self) {
         self.filling = None;
     }

@@ -1,6 +1,6 @@
-//! A live source on its own thread, and a bounded queue of what it reported. Frames that arrive in lines are assembled here, so that
-//! everything that follows has whole ones. If the queue is full, a source that can wait is kept waiting; a source that cannot wait loses frames,
-//! the oldest first, which are counted. The thread also records the frames.
+//! Runs a live source on a thread of its own, with a bounded queue of its events. Frames that arrive line by line are assembled here, so
+//! that all later stages get whole frames. If the queue is full, a source that can wait is kept waiting; a source that cannot wait loses
+//! frames, the oldest first, which are counted. The thread also records the frames.
 
 use crate::gpu::Wake;
 use crate::source::live::{Event, Live};
@@ -22,7 +22,7 @@ const MAX_EVENTS: usize = 4096;
 /// Longest wait of the thread before it checks whether it is to stop.
 const PATIENCE: Duration = Duration::from_millis(50);
 
-/// An event, and when it arrived.
+/// An event and its time of arrival.
 #[derive(Clone, Debug)]
 pub struct Arrived {
     pub event: Event,
@@ -32,16 +32,16 @@ pub struct Arrived {
 /// Sees every event of a feed.
 pub type Observer = Box<dyn FnMut(&Event) + Send>;
 
-/// What a feed counted.
+/// The counts of a feed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FeedCounts {
     /// Frames that were lost because the queue was full.
     pub lost: u64,
     /// Frames that could not be recorded, and other failures of the recording.
     pub unrecorded: u64,
-    /// How often the source was disconnected.
+    /// Number of times that the source was disconnected.
     pub disconnected: u64,
-    /// Pictures of a freehand sweep that are in no volume, or not wholly.
+    /// Pictures of a freehand sweep that are missing from the volumes, in whole or in part.
     pub left_out: u64,
 }
 
@@ -57,7 +57,7 @@ impl FeedCounts {
     }
 }
 
-/// A source that is listened to, or none.
+/// A live source that is being read, or none.
 pub struct Feed {
     shared: Arc<Shared>,
     can_wait: bool,
@@ -162,8 +162,8 @@ impl Shared {
 }
 
 impl Feed {
-    /// Listens to a source until it ends or the feed is dropped. If `record` is given, every frame is also written to this `.frames`
-    /// file. Each further geometry gets a file of its own: NAME-2.frames.
+    /// Reads a source until it ends or the feed is dropped. If `record` is given, every frame is also written to this `.frames` file. Each
+    /// further geometry gets a file of its own: NAME-2.frames.
     ///
     /// # Errors
     /// The thread cannot be started.
@@ -203,7 +203,7 @@ impl Feed {
         Ok(Feed { shared, can_wait, is_recording, thread: Some(thread) })
     }
 
-    /// The oldest queued event. Waits for one for at most `patience`.
+    /// The oldest queued event. If there is none, waits at most `patience` for one.
     pub fn next(&self, patience: Duration) -> Option<Arrived> {
         let mut queue = self.shared.lock();
         if queue.events.is_empty() && !patience.is_zero() {
@@ -222,7 +222,7 @@ impl Feed {
         self.can_wait
     }
 
-    /// True if the source is a recording that is read as fast as it is taken.
+    /// True if the source is a recording that is read as fast as its frames are taken.
     pub fn is_recording(&self) -> bool {
         self.is_recording
     }
@@ -232,17 +232,17 @@ impl Feed {
         self.shared.lock().events.len()
     }
 
-    /// Why the source is not connected at the moment, on one line; None while it is.
+    /// The reason why the source is not connected at present, on one line. None while it is connected.
     pub fn disconnected(&self) -> Option<String> {
         self.shared.lock().disconnected.clone()
     }
 
-    /// True if a complete volume has arrived after this one and the source cannot wait: then this one need not be drawn.
+    /// True if a complete volume has arrived after `volume` and the source cannot wait. Then `volume` need not be drawn.
     pub fn is_behind(&self, volume: u32) -> bool {
         !self.can_wait && self.shared.lock().newest.is_some_and(|newest| newest > volume.saturating_add(1))
     }
 
-    /// What was counted so far.
+    /// The counts so far.
     pub fn counts(&self) -> FeedCounts {
         let Shared { lost, unrecorded, disconnections, left_out, .. } = &*self.shared;
         let [lost, unrecorded, disconnected, left_out] =

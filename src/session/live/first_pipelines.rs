@@ -1,9 +1,10 @@
-//! The pipelines that a stream's first geometry needs: compiled on a thread while the window goes on, and again for what the user changes meanwhile.
+//! The pipelines that the first geometry of a stream needs. They are compiled on a thread while the window stays responsive, and again for
+//! settings that the user changes meanwhile.
 
 use crate::gpu::{GpuError, Preparation, Prepared};
 use crate::scene::Settings;
 
-/// How often settings that change while pipelines are compiled are followed before the geometry begins.
+/// Limit of the changes of settings that are followed while pipelines are compiled, before the geometry begins.
 const MOST_CHANGES: u32 = 2;
 
 /// Pipelines in the making, made, and given up.
@@ -30,20 +31,20 @@ impl FirstPipelines {
         self.cancelled.retain(|preparation| !preparation.is_finished());
     }
 
-    /// What is in the making, if it has not ended: its progress, pipelines compiled and pipelines in all.
+    /// Progress of the compilation, if it has not ended: compiled pipelines and their total.
     pub fn progress(&self) -> Option<[usize; 2]> {
         self.making.as_ref().map(|making| making.preparation.progress())
     }
 
-    /// True while a thread compiles; false when it has ended; none if nothing is in the making.
+    /// True while a thread compiles, false once it has ended, None if nothing is being compiled.
     pub fn is_working(&self) -> Option<bool> {
         self.making.as_ref().map(|making| !making.preparation.is_finished())
     }
 
-    /// True if all is compiled for these settings, or will be when the geometry begins. Otherwise `begin` begins to.
+    /// True if everything is compiled for these settings, or will be when the geometry begins. Otherwise `begin` starts the compilation.
     ///
     /// # Errors
-    /// What a renderer of the settings would fail with, a lost device, and what `begin` fails with.
+    /// The error with which a renderer of the settings would fail, a lost device, or the error of `begin`.
     pub fn advance<E: From<GpuError>>(
         &mut self,
         settings: [Settings; 2],
@@ -70,13 +71,13 @@ impl FirstPipelines {
         Ok(self.making.is_none())
     }
 
-    /// A geometry has begun, or nothing is prepared for the next one: a renderer holds what it needs.
+    /// Releases the compiled pipelines: a geometry has begun and its renderer holds them, or nothing is prepared for the next one.
     pub fn release(&mut self) {
         self.made = None;
         self.making.take_if(|making| making.preparation.is_finished());
     }
 
-    /// Forgets what is being compiled, without waiting for it. False if nothing was.
+    /// Cancels the compilation without waiting for its end. False if nothing was being compiled.
     pub fn cancel(&mut self) -> bool {
         self.made = None;
         let Some(Making { preparation, .. }) = self.making.take() else { return false };

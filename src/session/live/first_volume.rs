@@ -1,5 +1,5 @@
-//! Settings of a stream that nobody chose, from its geometry and its first whole volume. They are then kept: windows that follow each volume would make
-//! the picture pump.
+//! Settings of a stream that nobody chose, derived from its geometry and its first complete volume. They are then kept: if they followed
+//! each volume, the brightness of the picture would pump.
 
 use crate::scene::default_look::{Defaults, block_edge};
 use crate::scene::load::Layers;
@@ -28,7 +28,7 @@ impl FirstVolume {
         FirstVolume { layers, header: None, collected: None }
     }
 
-    /// What settings follow from for a geometry, before any frame. None if it is the previous one, whose settings stay.
+    /// The basis of the default settings of a geometry, before any frame. None if the geometry is the previous one, whose settings stay.
     pub fn begin(&mut self, header: &Header) -> Option<Defaults> {
         if self.header.as_ref() == Some(header) {
             return None;
@@ -38,7 +38,7 @@ impl FirstVolume {
         Some(self.defaults(header, None))
     }
 
-    /// What [`FirstVolume::begin`] will return.
+    /// The value that [`FirstVolume::begin`] will return.
     pub(crate) fn at_begin(&self, header: &Header) -> Option<Defaults> {
         (self.header.as_ref() != Some(header)).then(|| self.defaults(header, None))
     }
@@ -47,7 +47,7 @@ impl FirstVolume {
         Defaults { layers: self.layers.clone(), geometry: header.forward.clone(), levels }
     }
 
-    /// Takes a frame. What settings follow from, if it makes the first volume whole.
+    /// Takes a frame. Returns the basis of the default settings if the frame completes the first volume.
     pub fn frame(&mut self, frame: &Frame) -> Option<Defaults> {
         let (header, collected) = (self.header.as_ref()?, self.collected.as_mut()?);
         if !collected.take(header, frame) {
@@ -74,7 +74,7 @@ impl Collected {
         }
     }
 
-    /// Takes a frame. True if all of its volume were taken.
+    /// Takes a frame. True if all frames of its volume were taken.
     fn take(&mut self, header: &Header, frame: &Frame) -> bool {
         if self.volume.replace(frame.volume) != Some(frame.volume) {
             // The volume before was not whole.

@@ -1,4 +1,4 @@
-//! A live run as metrics of Prometheus, in a file that is rewritten at intervals.
+//! Metrics of a live run for Prometheus, in a file that is rewritten at intervals.
 
 use super::statistics::Statistics;
 use super::stream::Stream;
@@ -13,7 +13,7 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 /// Time between two writes of the file.
 pub const INTERVAL: Duration = Duration::from_secs(15);
 
-/// What the metrics tell beside statistics.
+/// Values of the metrics that are not part of the statistics.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Conditions {
     /// The subcommand, such as `stream`.
@@ -27,14 +27,14 @@ pub struct Conditions {
     /// Seconds since 1970.
     pub started: f64,
     pub now: f64,
-    /// How often the metrics could not be written.
+    /// Number of times that the metrics could not be written.
     pub write_failures: u64,
     /// Resident memory, bytes; None if it is not known.
     pub memory: Option<u64>,
-    /// How often the device was lost, and how often of these because it did not finish.
+    /// Number of losses of the device, and how many of these happened because it did not finish.
     pub device_losses: u64,
     pub device_stalls: u64,
-    /// How long the device has been at work without finishing anything.
+    /// Time since the device last finished any work, while it is busy.
     pub busy: Duration,
     pub source: SourceStatus,
 }
@@ -44,11 +44,12 @@ pub struct Conditions {
 pub struct SourceStatus {
     pub is_connected: bool,
     pub is_frozen: bool,
-    /// How often it could not be opened.
+    /// Number of times that the source could not be opened.
     pub not_opened: u64,
 }
 
-/// The metrics as text. `totals`: since the run began. Its length does not depend on how long that was, but for the digits of numbers.
+/// The metrics as text. `totals`: statistics since the run began. The length of the text does not grow with the run, except for the digits
+/// of numbers.
 pub fn text(totals: &Statistics, conditions: &Conditions) -> String {
     let Conditions { command, device, driver, vulkan, .. } = conditions;
     let truth = |is: bool| f64::from(u8::from(is));
@@ -96,12 +97,12 @@ pub struct LiveMetrics {
     totals: Statistics,
     /// What does not change, or is counted here.
     kept: Conditions,
-    /// When the file is written next.
+    /// Time of the next write of the file.
     due: Instant,
 }
 
 impl LiveMetrics {
-    /// Metrics of the subcommand `command` in `file`. The first are due at once.
+    /// Metrics of the subcommand `command` in `file`. The first write is due at once.
     ///
     /// # Errors
     /// One line: a thread cannot be started.
@@ -115,18 +116,18 @@ impl LiveMetrics {
         self.totals.add(later);
     }
 
-    /// Counts a device that was lost.
+    /// Counts a lost device.
     pub fn device_lost(&mut self, why: &GpuError) {
         self.kept.device_losses += 1;
         self.kept.device_stalls += u64::from(why.is_given_up());
     }
 
-    /// When the file is written next.
+    /// Time of the next write of the file.
     pub fn due(&self) -> Instant {
         self.due
     }
 
-    /// Writes the file. The next time is an interval after `now`: a delay is not made up for.
+    /// Writes the file. The next write is due one interval after `now`; a delay is not made up for.
     pub fn write(&mut self, now: Instant, stream: &Stream, context: &Context, source: SourceStatus) {
         self.due = now + INTERVAL;
         self.put(true, stream, context, source);

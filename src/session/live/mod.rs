@@ -1,9 +1,10 @@
-//! Live streams: frames arrive on their own clock and go into volume images while the previous volume is drawn.
+//! Live streams: frames arrive at times of their own and go into volume images while the previous volume is drawn.
 //!
-//! One thread listens to the source ([`feed`]), another one drives the device ([`Stream::step`]). [`volume_pool`] assigns volume images,
-//! `session` holds everything that depends on the geometry of the frames, `first_pipelines` what is compiled for the first one, `phase` its state, [`statistics`] the counts and latencies,
-//! [`metrics`] what Prometheus is told, and [`cine`] the last volumes for looking back. After the first frame of a geometry nothing allocates, compiles or waits for the
-//! whole device.
+//! One thread reads the source ([`feed`]), another one drives the device ([`Stream::step`]). [`volume_pool`] assigns volume images.
+//! `session` holds everything that depends on the geometry of the frames, `first_pipelines` compiles the pipelines of the first geometry,
+//! and `phase` is the state of the stream. [`statistics`] has the counts and latencies, [`metrics`] writes them for Prometheus, and
+//! [`cine`] keeps the last volumes for review. After the first frame of a geometry nothing allocates, compiles or waits for the whole
+//! device.
 
 pub mod cine;
 pub mod feed;

@@ -1,5 +1,5 @@
-//! The states of a stream: what its next step does ([`Phase`]), which settings wait ([`Pending`]) and what is on display ([`Display`]).
-//! Pure. The transition diagram is in docs/streaming.md.
+//! The states of a stream: what its next step does ([`Phase`]), which settings wait ([`Pending`]) and what is on display ([`Display`]). It
+//! has no side effects. The transition diagram is in docs/streaming.md.
 
 use super::cine::CineVolume;
 use std::time::Instant;
@@ -159,7 +159,7 @@ impl<T> Pending<T> {
 pub(super) enum Display {
     #[default]
     Empty,
-    /// The last picture shows it as it is.
+    /// The last picture shows it unchanged.
     Current(u32),
     /// It changed, or how it is drawn did, after the last picture began.
     Stale(u32),
@@ -173,7 +173,7 @@ impl Display {
         }
     }
 
-    /// The last picture no longer shows what it should.
+    /// The last picture no longer shows the current state.
     pub fn invalidate(&mut self) {
         if let Display::Current(volume) = *self {
             *self = Display::Stale(volume);

@@ -17,25 +17,25 @@ use std::time::{Duration, Instant};
 /// Frames of a replay that one step sends: a few milliseconds of work.
 const REPLAY_FRAMES: usize = 8;
 
-/// A picture that is done.
+/// A finished picture.
 #[derive(Debug)]
 pub struct FinishedPicture {
     /// The volume that it shows. Rolling: the newest one that has a slice in it.
     pub volume: u32,
     /// None if pictures stay on the device ([`StreamOptions::readback`](super::StreamOptions::readback)).
     pub picture: Option<Picture>,
-    /// From the arrival of the last frame that is new in it to now.
+    /// Time from the arrival of the last frame that is new in the picture to its completion.
     pub latency: Duration,
-    /// From the beginning of its drawing to now.
+    /// Time from the start of its drawing to its completion.
     pub took: Duration,
-    /// How much of it was drawn again.
+    /// The stages that ran again for it.
     pub work: Work,
-    /// It was drawn with few rays, to be there soon ([`StreamOptions::coarse_first`](super::StreamOptions::coarse_first)).
+    /// It was drawn with few rays, to be finished soon ([`StreamOptions::coarse_first`](super::StreamOptions::coarse_first)).
     pub is_coarse: bool,
 }
 
-/// The scenes of a stream: one for each direction of the sweep, and mixtures of both for rolling volumes. All see the same visible
-/// bounds, so that a frame can be filtered before it is known in which scene it will be drawn.
+/// The scenes of a stream: one for each direction of the sweep, and mixtures of both for rolling volumes. All have the same visible bounds,
+/// so that a frame can be filtered before its scene is known.
 pub struct Views {
     forward: Scene,
     backward: Scene,
@@ -47,7 +47,7 @@ pub struct Views {
 
 impl Views {
     /// # Errors
-    /// Settings that this geometry cannot be drawn with.
+    /// The geometry cannot be drawn with the settings.
     pub fn new(header: &Header, settings: &Settings, update: Update) -> Result<Views, SceneError> {
         let input = Input { stored: header.stored, range: header.range };
         let scene = |geometry: &Geometry| Scene::new(geometry.clone(), input, settings.clone());
@@ -58,11 +58,11 @@ impl Views {
         Ok(Views { forward, backward, is_directional, is_mixed: is_directional && update == Update::Rolling })
     }
 
-    /// The same with a stage 1 that also serves pictures of `full`, and of what `lowered` makes of that scene. What of it cannot be drawn is
-    /// left out.
+    /// As [`Views::new`], but the result of stage 1 also serves pictures of `full` and of the scenes that `lowered` makes of it. Scenes
+    /// that cannot be drawn are left out.
     ///
     /// # Errors
-    /// Settings that this geometry cannot be drawn with.
+    /// The geometry cannot be drawn with the settings.
     pub fn sharing(
         self,
         header: &Header,
@@ -87,8 +87,8 @@ impl Views {
         &self.forward
     }
 
-    /// The scene of a volume. `backward`: for each slice, true if it was swept backwards. Where neighbouring slices of different
-    /// directions would cross, all slices get the direction of the majority.
+    /// The scene of a volume. `backward`: for each slice, true if it was swept backwards. If neighbouring slices of different directions
+    /// would cross, all slices get the direction of the majority.
     pub fn of(&self, backward: &[bool]) -> Cow<'_, Scene> {
         let count = backward.iter().filter(|b| **b).count();
         let majority = 2 * count > backward.len();
@@ -102,7 +102,7 @@ impl Views {
     }
 }
 
-/// What a step between pictures led to.
+/// Result of a step between pictures.
 pub(super) enum Begun {
     /// A picture is being drawn.
     Picture,
@@ -176,7 +176,7 @@ impl Session {
         arrived.push(at);
     }
 
-    /// Applies the pending settings when all their pipelines are there. If stage 1 has to run again, whole volumes that were filtered
+    /// Applies the pending settings when all their pipelines are compiled. If stage 1 must run again, whole volumes that were filtered
     /// before are discarded, so that slices of both settings are never mixed. A rolling volume fills again by itself.
     fn apply_pending(&mut self) -> Result<(), GpuError> {
         let Some(next) = self.pending.take() else { return Ok(()) };
@@ -273,7 +273,7 @@ impl Session {
         self.phase.replay().map(|replay| replay.volume.volume)
     }
 
-    /// True if a step has work to do without any event of the source. A replay is not counted.
+    /// True if a step has work to do without any event of the source. A replay does not count.
     pub fn is_busy(&self) -> bool {
         matches!(self.phase, Phase::Drawing { .. } | Phase::Draining { .. })
             || self.pending.is_ready()
@@ -331,7 +331,8 @@ impl Session {
         }
     }
 
-    /// Shows a volume again that changed settings or another device discarded, if the cine loop has it; otherwise the newest of the loop.
+    /// Shows a volume again that was discarded because of changed settings or another device, if it is in the cine loop; otherwise the
+    /// newest volume of the loop.
     pub fn restore(&mut self, volume: u32, cine: &Cine) {
         let volumes = cine.volumes();
         if let Some(volume) = volumes.iter().find(|kept| kept.volume == volume).or(volumes.back()) {

@@ -7,21 +7,21 @@ use hdrhistogram::Histogram;
 use std::fmt::Write as _;
 use std::time::Duration;
 
-/// Largest latency that is distinguished, us: a minute. Latencies have three significant digits.
+/// Largest latency that is resolved, us: one minute. Latencies have three significant digits.
 const MAX_LATENCY: u64 = 60_000_000;
 
-/// Limits of [`Statistics::latencies`], s: from a picture at the rate of a monitor to a sweep that stands still.
+/// Limits of [`Statistics::latencies`], s: from one refresh of a monitor to a sweep that stands still.
 const LATENCY_LIMITS: &[f64] =
     &[0.005, 0.01, 0.02, 0.035, 0.05, 0.075, 0.1, 0.15, 0.2, 0.3, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 5.0, 10.0, 30.0];
 
-/// Faults of a source, by kind.
+/// Counts of the faults of a source, by kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SourceFaults {
-    /// Something was left out, and the source went on.
+    /// A part of the data was left out, and the source went on.
     pub reported: u64,
-    /// It ended unexpectedly.
+    /// The source ended unexpectedly.
     pub ended: u64,
-    /// Its connection was lost or refused.
+    /// The connection was lost or refused.
     pub disconnected: u64,
 }
 
@@ -36,16 +36,16 @@ pub struct Statistics {
     pub lost: u64,
     /// Frames that the renderer refused, for example of the wrong size.
     pub refused: u64,
-    /// Frames that were passed over because the picture is frozen.
+    /// Frames that were ignored because the picture is frozen.
     pub frozen: u64,
     /// Frames that could not be recorded, and other failures of the recording.
     pub unrecorded: u64,
     pub faults: SourceFaults,
     pub pictures: u64,
     pub volumes: VolumeCounts,
-    /// From the arrival of each frame to the end of the first picture that shows it, us.
+    /// Latency from the arrival of each frame to the end of the first picture that shows it, us.
     pub latency: Histogram<u64>,
-    /// The same latencies, s, exactly by fixed limits.
+    /// Counts of the same latencies, s, between fixed limits.
     pub latencies: histogram::Histogram,
     pub passes: Vec<PassTime>,
     /// Passes and copies that could not be timed.
@@ -91,7 +91,8 @@ impl Statistics {
         self.latency.value_at_quantile(share) as f64 / 1e3
     }
 
-    /// The difference to the earlier statistics `before`. Latencies and passes are not subtracted: they are reset when they are taken.
+    /// The difference to the earlier statistics `before`. Latencies and times of passes are not subtracted, because they are reset when
+    /// they are taken.
     pub fn since(&self, before: &Statistics) -> Statistics {
         let counts = |now: VolumeCounts, then: VolumeCounts| VolumeCounts {
             shown: now.shown.saturating_sub(then.shown),
@@ -148,7 +149,7 @@ impl Statistics {
         }
     }
 
-    /// The counts on one line, of statistics since the beginning: every frame that arrived and every volume that ended is in one of them.
+    /// The counts since the beginning on one line. Every frame that arrived and every volume that ended is in one of them.
     pub fn totals(&self) -> String {
         let VolumeCounts { shown, dropped, incomplete, left_out } = self.volumes;
         let frozen =

@@ -20,19 +20,19 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-/// Longest wait for an event while a picture is being drawn: its end is noticed no later than that.
+/// Longest wait for an event while a picture is being drawn. The end of the picture is noticed no later than that.
 const DRAWING_WAIT: Duration = Duration::from_micros(200);
 
-/// What is being done before there is a picture.
+/// A step of the work before the first picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StartStep {
-    /// Nothing has come from the source.
+    /// Nothing has arrived from the source.
     Source,
-    /// So many of the pipelines are compiled.
+    /// `done` of `count` pipelines are compiled.
     Compiling { done: usize, count: usize },
-    /// So many frames of the first volume have come.
+    /// `done` of `count` frames of the first volume have arrived.
     Frames { done: u64, count: u64 },
-    /// The first picture is to be drawn next.
+    /// The first picture is drawn next.
     Picture,
 }
 
@@ -48,17 +48,17 @@ fn coarse(settings: &Settings) -> Settings {
 /// The result of a step.
 #[derive(Debug)]
 pub enum Step {
-    /// A picture is done.
+    /// A picture is finished.
     Picture(FinishedPicture),
     /// A frame or a change of settings was refused, or the source reported a fault: the reason. The stream goes on.
     Fault(String),
     /// Anything else, or nothing, was done.
     Progress,
-    /// The source has ended, with the reason if it ended unexpectedly. Everything that came is in the last picture.
+    /// The source has ended, with the reason if it ended unexpectedly. Everything that arrived is in the last picture.
     End(Option<String>),
 }
 
-/// Why a step or a change of settings failed.
+/// The reason why a step or a change of settings failed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum StreamError {
@@ -68,18 +68,18 @@ pub enum StreamError {
     Scene(#[from] SceneError),
 }
 
-/// A live source that is rendered. The caller drives it by calling [`Stream::step`] again and again, on one thread.
+/// A live source that is rendered. The caller drives it by repeated calls of [`Stream::step`] on one thread.
 pub struct Stream {
     context: Arc<Context>,
     feed: Feed,
-    /// What the feeds before it counted.
+    /// The counts of earlier feeds.
     earlier_feeds: FeedCounts,
     settings: Settings,
     /// The settings at full quality, if [`Stream::settings`] are lowered ones.
     full: Option<Settings>,
     options: StreamOptions,
     first_volume: Option<FirstVolume>,
-    /// What settings follow from, found and not yet returned by [`Stream::take_found`].
+    /// The basis of default settings that was found and not yet returned by [`Stream::take_found`].
     found: Option<Defaults>,
     /// None before the first frame header, and after a geometry that could not be set up.
     session: Option<Session>,
@@ -142,11 +142,10 @@ impl Stream {
         }
     }
 
-    /// Does the next piece of work: finishes or begins a picture, or takes an event of the source. Waits for an event for at most
-    /// `patience`.
+    /// Does the next piece of work: finishes or begins a picture, or takes an event of the source. Waits at most `patience` for an event.
     ///
     /// # Errors
-    /// A device that fails, and settings that a new geometry cannot be drawn with.
+    /// The device fails, or a new geometry cannot be drawn with the settings.
     pub fn step(&mut self, patience: Duration) -> Result<Step, StreamError> {
         self.first_pipelines.forget_ended();
         let result = self.advance(patience);
@@ -337,7 +336,7 @@ impl Stream {
         options
     }
 
-    /// What is being done before there is a picture; none once there is one, or it is being drawn.
+    /// The current step of the work before the first picture. None once a picture exists or is being drawn.
     pub fn start_step(&self) -> Option<StartStep> {
         let Some(session) = &self.session else {
             let progress = self.first_pipelines.progress();
@@ -460,7 +459,8 @@ impl Stream {
         }
     }
 
-    /// What was found from the source since the last call, for the caller to build on. The settings that follow from it are drawn already.
+    /// The basis of default settings that the source has given since the last call, for the caller to build on. Pictures already use the
+    /// settings that follow from it.
     pub fn take_found(&mut self) -> Option<Defaults> {
         self.found.take()
     }
@@ -507,7 +507,7 @@ impl Stream {
     /// Continues on another device, or on the same one after it was lost. The volume on display is sent again from the cine loop.
     ///
     /// # Errors
-    /// A device that cannot hold what the geometry needs.
+    /// The device cannot hold the slots of the geometry.
     pub fn revive(&mut self, context: &Arc<Context>) -> Result<(), StreamError> {
         self.context = context.clone();
         self.losses += 1;
@@ -519,16 +519,16 @@ impl Stream {
         }
     }
 
-    /// Changes the settings. The volume on display is drawn again; if stage 1 has to run again, it is sent again from the cine loop.
+    /// Changes the settings. The volume on display is drawn again. If stage 1 must run again, the volume is sent again from the cine loop.
     ///
     /// # Errors
-    /// Settings that the geometry cannot be drawn with; the previous ones remain. What only the device refuses is reported by a later
-    /// [`Step::Fault`].
+    /// The geometry cannot be drawn with the settings; the previous ones remain. If only the device refuses them, a later [`Step::Fault`]
+    /// reports it.
     pub fn change(&mut self, settings: Settings) -> Result<(), StreamError> {
         self.change_to(settings, None)
     }
 
-    /// As [`Stream::change`], to settings that are lowered from `full` for a while.
+    /// As [`Stream::change`], for settings that temporarily replace `full` at lower quality.
     ///
     /// # Errors
     /// As for [`Stream::change`].
@@ -546,8 +546,8 @@ impl Stream {
         Ok(())
     }
 
-    /// Freezes the display, or continues. While it is frozen, frames that arrive are recorded but not shown; those of a recording that is read come into
-    /// the loop as long as there is room, and then wait.
+    /// Freezes the display, or continues. While it is frozen, frames that arrive are recorded but not shown. Frames of a recording go into
+    /// the loop while it has room, and then wait.
     pub fn freeze(&mut self, is_frozen: bool) {
         if self.is_frozen == is_frozen {
             return;
@@ -566,13 +566,13 @@ impl Stream {
         self.is_frozen
     }
 
-    /// The last volumes, as they arrived.
+    /// The most recent volumes, as they arrived.
     pub fn cine(&self) -> &Cine {
         &self.cine
     }
 
-    /// Position in the cine loop of the volume on display, or of the one that will be next while it is frozen; 0 for the oldest. None if it is
-    /// not in the loop.
+    /// Position in the cine loop of the volume on display, or, while frozen, of the one that will be displayed next; 0 is the oldest. None
+    /// if it is not in the loop.
     pub fn cine_position(&self) -> Option<usize> {
         let session = self.session.as_ref()?;
         // What was sent again waits for the picture that is being drawn.
@@ -588,8 +588,8 @@ impl Stream {
         }
     }
 
-    /// Continues with another source. Its volumes are numbered on from those before. The display stays until the new source has a
-    /// volume to show.
+    /// Continues with another source. The numbers of its volumes continue those of the previous source. The display stays until the new
+    /// source has a volume to show.
     pub fn replace_source(&mut self, feed: Feed) {
         self.earlier_feeds = self.feed_counts();
         (self.feed, self.end) = (feed, None);
@@ -609,10 +609,9 @@ impl Stream {
         }
     }
 
-    /// Compiles in the background, while nothing else is to be compiled, what these settings would need, in this order, instead of those
-    /// given before. Settings that cannot be drawn are left out. Nothing happens before the first header, and without
-    /// [`StreamOptions::wake`].
-    /// Each comes with the settings at full quality that it is lowered from, if it is.
+    /// Compiles the pipelines of these settings in the background while no other pipeline is needed, in this order. They replace the
+    /// settings of an earlier call. Each entry has settings, and the settings at full quality that they replace, if any. Settings that
+    /// cannot be drawn are left out. Nothing happens before the first header, and without [`StreamOptions::wake`].
     pub fn warm(&mut self, next: Vec<(Settings, Option<Settings>)>) {
         let (Some(session), Some(header)) = (&mut self.session, &self.header) else { return };
         let (header, options) = (Arc::new(header.clone()), self.options.clone());
@@ -633,7 +632,7 @@ impl Stream {
         self.session.iter().for_each(|session| session.renderer.stop_warming());
     }
 
-    /// True after [`Stream::warm`], until the geometry or the device is another.
+    /// True after [`Stream::warm`], until the geometry or the device changes.
     pub fn has_warmed(&self) -> bool {
         self.session.as_ref().is_some_and(|session| session.has_warmed)
     }
@@ -653,7 +652,7 @@ impl Stream {
         self.session.as_ref().is_some_and(|session| session.phase.is_drawing())
     }
 
-    /// True if a step has nothing to do until the picture goes on.
+    /// True if a step has nothing to do until the picture in flight makes progress.
     pub fn is_waiting(&self) -> bool {
         let Some(session) = self.session.as_ref().filter(|session| session.phase.is_drawing()) else { return false };
         // A device that fails is reported by the step.
@@ -666,7 +665,7 @@ impl Stream {
         self.end.is_none() && self.feed.disconnected().is_none()
     }
 
-    /// Why the source is not connected at the moment, on one line; None while it is.
+    /// The reason why the source is not connected at present, on one line. None while it is connected.
     pub fn disconnected(&self) -> Option<String> {
         self.feed.disconnected()
     }
@@ -685,12 +684,12 @@ impl Stream {
         !is_busy && !self.is_replaying() && (self.feed.waiting() == 0 || self.is_held())
     }
 
-    /// Dispatches on the device so far, by all its users.
+    /// Number of dispatches on the device so far, by all its users.
     pub fn dispatches(&self) -> u64 {
         self.context.counts.dispatches.load(Ordering::Relaxed)
     }
 
-    /// How long the device has been at work without finishing anything; none before the first frame.
+    /// Time since the device last finished any work, while it is busy. None before the first frame.
     pub fn device_busy_for(&self) -> Option<Duration> {
         self.session.as_ref().map(|session| session.renderer.busy_for())
     }
@@ -721,7 +720,7 @@ impl Stream {
         Ok(since)
     }
 
-    /// As [`Stream::take_statistics`], after all work in flight: every pass of every frame is timed or counted as not timed.
+    /// As [`Stream::take_statistics`], but waits for all work in flight: every pass of every frame is timed or counted as not timed.
     pub fn take_final_statistics(&mut self) -> Result<Statistics, StreamError> {
         let passes = self.session.as_mut().map_or(Ok(Vec::new()), |session| session.renderer.take_times())?;
         let mut since = self.take_statistics()?;
@@ -729,12 +728,13 @@ impl Stream {
         Ok(since)
     }
 
-    /// The counts since the stream was created, as they were when the statistics were last taken.
+    /// The counts since the stream was created, as of the last time that statistics were taken.
     pub fn totals(&self) -> String {
         self.reported.totals()
     }
 
-    /// Number of complete volumes that came, shown or not, if the source does not wait for pictures and they are shown as they come.
+    /// Number of complete volumes that arrived, shown or not. None if the source waits for pictures or has ended, and while the picture is
+    /// frozen.
     pub fn live_volumes(&self) -> Option<u64> {
         let is_live = !self.is_frozen && self.end.is_none() && !self.feed.can_wait();
         self.pool().filter(|_| is_live).map(|pool| pool.counts().shown + pool.counts().dropped)
@@ -759,7 +759,7 @@ impl Stream {
         self.statistics.frames
     }
 
-    /// What the feeds of all sources so far counted.
+    /// The counts of the feeds of all sources so far.
     pub fn feed_counts(&self) -> FeedCounts {
         self.earlier_feeds.plus(self.feed.counts())
     }
@@ -774,7 +774,7 @@ impl Stream {
         self.session.as_ref().map(|session| session.renderer.scene())
     }
 
-    /// The number of the volume that the last picture shows, also if it is being drawn; none without one.
+    /// Number of the volume that the last picture shows, even if the picture is still being drawn. None without a picture.
     pub fn drawn_volume(&self) -> Option<u32> {
         self.session.as_ref().and_then(Session::drawn_volume)
     }

@@ -1,5 +1,5 @@
-//! Assigns volume images: which one a frame goes into, and which one is shown. If volumes are shown whole, no picture ever mixes slices
-//! of two volumes. Pure.
+//! Assigns volume images: which one a frame goes into, and which one is shown. If volumes are shown whole, no picture mixes slices of two
+//! volumes. It has no side effects.
 
 use serde::{Deserialize, Serialize};
 
@@ -14,16 +14,16 @@ pub enum Update {
     Rolling,
 }
 
-/// Counts of volumes. Each volume is counted once, when it is over.
+/// Counts of volumes. Each volume is counted once, when it has ended.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct VolumeCounts {
     /// Shown. Rolling: complete.
     pub shown: u64,
-    /// Complete but replaced by a newer one, or without a free image.
+    /// Complete volumes that a newer one replaced, or for which no image was free.
     pub dropped: u64,
-    /// Over with frames missing.
+    /// Volumes that ended with frames missing.
     pub incomplete: u64,
-    /// Frames (not volumes) that came for a volume that was over or dropped.
+    /// Frames (not volumes) that arrived for a volume that had ended or was dropped.
     pub left_out: u64,
 }
 
@@ -123,7 +123,7 @@ impl VolumePool {
         self.over = None;
     }
 
-    /// An image for a replayed volume: not the one on display, nor the one being filled. If there is no other, the image of a volume
+    /// A free image for a replayed volume: neither the one on display nor the one being filled. If there is no other, the image of a volume
     /// that waits to be shown. None if all are in use.
     pub fn spare(&mut self) -> Option<u32> {
         if self.is_rolling() {
@@ -153,8 +153,8 @@ impl VolumePool {
         self.counts
     }
 
-    /// The image that a frame of this volume goes into; None if the frame is left out. `stale` is called once for a volume that begins:
-    /// true leaves all of it out, because newer ones have arrived.
+    /// The image that a frame of this volume goes into. None if the frame is left out. `stale` is called once for a new volume: if it
+    /// returns true, the whole volume is left out, because newer ones have arrived.
     pub fn place(&mut self, volume: u32, stale: impl FnOnce() -> bool) -> Option<u32> {
         let current = self.filling.as_ref().map(|f| f.volume);
         if current != Some(volume) {
@@ -183,7 +183,7 @@ impl VolumePool {
         self.filling = Some(Filling { volume, image: free, arrived, missing: self.slices });
     }
 
-    /// The volume that is being filled is over: no more of its frames will come.
+    /// Ends the volume that is being filled: no more of its frames will arrive.
     pub fn end(&mut self) {
         let Some(Filling { volume, image, .. }) = self.filling.take() else { return };
         self.over = Some(volume);
@@ -221,8 +221,7 @@ impl VolumePool {
         is_complete
     }
 
-    /// The next volume to show, if there is a new one. The image that was shown before becomes free, so no picture of it may be in
-    /// flight any more.
+    /// The next volume to show, if there is a new one. The image that was shown before becomes free, so no picture of it may be in flight.
     pub fn take(&mut self) -> Option<Ready> {
         let ready = self.ready.take()?;
         self.shown = Some(ready.image);

@@ -28,18 +28,20 @@ pub fn time_line(now: SystemTime) -> String {
     now.replace('T', " ").replace('Z', " UTC")
 }
 
-/// What a written picture is of, where that is no patient but the phantom: when it says so without a bar.
+/// When a picture of the phantom without a bar states that it is not of a patient.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Demo {
-    /// If something else is drawn on it. Otherwise it has the rendered pixels and nothing else.
+    /// Only if something else is drawn on it. Otherwise it has the rendered pixels and nothing else.
     WithOthers,
     /// Always.
     Always,
 }
 
-/// A picture of the scene as its settings ask for it to be saved: with its measurements and body marks, and with marks and a bar if `marks.bar` is set.
-/// `volume`: the number of the volume that it shows; measurements of others are dimmed. `start`:
-/// where its rendering starts, if that follows the fluid. `demo`: None if the volume may be of a patient.
+/// Returns the picture as the settings of its scene ask for it to be saved: with its measurements and body marks, and with marks and a bar
+/// if `marks.bar` is set.
+///
+/// `volume`: number of the volume that it shows; measurements of other volumes are dimmed. `start`: where its rendering starts, if that
+/// follows the fluid. `demo`: None if the volume may be of a patient.
 ///
 /// # Errors
 /// One line: the picture is not of this scene's size, or the drawing failed.
@@ -61,7 +63,7 @@ pub fn as_set<'a>(
     }
 }
 
-/// A picture of the scene with its marks. `time`: when it was made, for the bar. `origin`: what it shows, such as "Demo data (phantom)".
+/// Returns the picture with its marks. `time`: time of the picture, for the bar. `origin`: what it shows, such as "Demo data (phantom)".
 ///
 /// # Errors
 /// One line: the picture is not of this scene's size, or the drawing failed.
@@ -75,7 +77,10 @@ pub fn marked(
 ) -> Result<Picture, String> {
     if [picture.width, picture.height] != scene.picture_size() {
         let [width, height] = scene.picture_size();
-        return Err(format!("a picture of {} x {} is no scene of {width} x {height}", picture.width, picture.height));
+        return Err(format!(
+            "a picture of {} x {} does not fit a scene of {width} x {height}",
+            picture.width, picture.height
+        ));
     }
     let marks = scene.marks();
     let mut marked = measured(picture, scene, volume, start, None)?;
@@ -91,8 +96,10 @@ pub fn marked(
     Ok(marked)
 }
 
-/// A picture of the scene with its measurements, annotations and body marks, the lines of its reference tile, and the line at which rendering starts.
-/// `origin`: what it shows, small in a corner.
+/// Returns the picture with its measurements, annotations and body marks, the lines of its reference tile, and the line at which rendering
+/// starts.
+///
+/// `origin`: what it shows, in small letters in a corner.
 ///
 /// # Errors
 /// One line: the drawing failed.

@@ -1,21 +1,21 @@
-//! Body marks on a picture: where their outlines and the probe on them are, in pixels, and what of them is under the pointer. The viewer and
-//! written pictures draw the same.
+//! Body marks on a picture: the positions of their outlines and of the probe on them, in pixels, and which part is under the pointer. The
+//! viewer and written pictures draw the same.
 
 use super::body_outlines::outline;
 use crate::scene::BodyMark;
 
-/// Half the length of the probe's bar, and the radius of the dot at the end with the marker; the square of a mark is from -1 to 1.
+/// Half the length of the probe's bar, and the radius of the dot at its marked end, in units in which the square of a mark is from -1 to 1.
 const HALF_BAR: f64 = 0.26;
 const DOT: f64 = 0.09;
-/// Between a mark and the edge of the picture, as a share of the picture's shorter edge.
+/// Distance between a mark and the edge of the picture, as a share of the picture's shorter edge.
 const MARGIN: f64 = 0.01;
 
-/// A body mark in pixels of the picture from its upper left corner.
+/// A body mark, in pixels of the picture from its upper left corner.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Drawn {
-    /// Its index in the list.
+    /// Index in the list.
     pub index: usize,
-    /// Its square: upper left corner, and edge.
+    /// Upper left corner of its square, whose edge is `edge`.
     pub corner: [f64; 2],
     pub edge: f64,
     /// The lines of the body.
@@ -26,7 +26,7 @@ pub struct Drawn {
     pub dot: f64,
 }
 
-/// What of a body mark can be grabbed.
+/// A part of a body mark that can be grabbed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
     /// The probe on it.
@@ -44,7 +44,7 @@ fn square(mark: &BodyMark, picture: [f64; 2]) -> ([f64; 2], f64) {
     ([corner(0), corner(1)], edge)
 }
 
-/// What is drawn of body marks on a picture of this size.
+/// Computes the drawing of body marks on a picture of this size, pixels.
 pub fn drawn(marks: &[BodyMark], picture: [f64; 2]) -> Vec<Drawn> {
     let one = |(index, mark): (usize, &BodyMark)| {
         let (corner, edge) = square(mark, picture);
@@ -59,8 +59,8 @@ pub fn drawn(marks: &[BodyMark], picture: [f64; 2]) -> Vec<Drawn> {
     marks.iter().enumerate().map(one).collect()
 }
 
-/// The mark, and what of it is at a pixel of the picture. `reach`: how far from the probe it is grabbed, pixels. Of marks over each other the last
-/// one, which is drawn on top.
+/// The index of the mark at a pixel of the picture, and its part there. `reach`: largest distance from the probe at which it is grabbed,
+/// pixels. Of overlapping marks the last one counts, which is drawn on top.
 pub fn part_at(marks: &[BodyMark], picture: [f64; 2], pixel: [f64; 2], reach: f64) -> Option<(usize, Part)> {
     let part = |drawn: &Drawn| {
         let [a, b] = drawn.probe;
@@ -79,7 +79,7 @@ pub fn part_at(marks: &[BodyMark], picture: [f64; 2], pixel: [f64; 2], reach: f6
     drawn(marks, picture).iter().rev().find_map(|drawn| Some((drawn.index, part(drawn)?)))
 }
 
-/// A mark whose probe is at a pixel of the picture, or at the nearest place of its square.
+/// Returns a mark whose probe is at a pixel of the picture, or at the nearest position within its square.
 pub fn with_probe_at(mark: &BodyMark, picture: [f64; 2], pixel: [f64; 2]) -> BodyMark {
     let (corner, edge) = square(mark, picture);
     let probe = [0, 1].map(|i| short(((pixel[i] - corner[i]) / edge * 2.0 - 1.0).clamp(-1.0, 1.0)));
@@ -98,7 +98,7 @@ pub fn centre_of(mark: &BodyMark, picture: [f64; 2]) -> [f64; 2] {
     corner.map(|from| from + edge / 2.0)
 }
 
-/// A mark whose centre is at a pixel of the picture, or as near to it as the edges of the picture allow.
+/// Returns a mark whose centre is at a pixel of the picture, or as near to it as the edges of the picture allow.
 pub fn moved_to(mark: &BodyMark, picture: [f64; 2], pixel: [f64; 2]) -> BodyMark {
     let at = [0, 1].map(|i| (pixel[i] / picture[i].max(1.0)).clamp(0.0, 1.0));
     // Where it is drawn, so that the next drag begins there.

@@ -1,5 +1,5 @@
-//! The volume of a body from contours of its sections: parallel planes by Cavalieri's principle, planes through one axis by Pappus' theorem (as
-//! rotated contours of an ultrasound system).
+//! The volume of a body from contours of its sections: parallel planes by Cavalieri's principle, and planes through one axis by Pappus'
+//! theorem (the method of rotated contours of ultrasound systems).
 
 use super::shapes::{centroid, vector_area};
 use glam::{DMat3, DVec3};
@@ -14,21 +14,21 @@ const SAME_ANGLE: f64 = 0.002;
 /// Largest distance of the common axis from a plane that is turned about it, mm.
 const OFF_AXIS: f64 = 1.0;
 
-/// How the planes of contours lie.
+/// The arrangement of the planes of contours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stack {
     Parallel,
-    /// Turned about an axis that all of them contain.
+    /// Planes that are rotated about an axis that all of them contain.
     Rotated,
 }
 
-/// The volume that contours enclose, mm^3, and how their planes lie.
+/// The volume that contours enclose, mm^3, and the arrangement of their planes.
 ///
-/// In parallel planes each area counts from halfway to the plane before to halfway to the one after; the outermost reach as far out as in. In
-/// planes through an axis each half of a contour is turned about the axis by its share of half a turn.
+/// In parallel planes each area counts from halfway to the previous plane to halfway to the next one; the outermost areas extend as far
+/// outwards as inwards. In planes through an axis each half of a contour is turned about the axis by its share of half a turn.
 ///
 /// # Errors
-/// In words: fewer than two planes, contours without an area, or planes that are neither.
+/// One line: there are fewer than two planes, a contour has no area, or the planes are neither parallel nor share an axis.
 pub fn volume(contours: &[Vec<DVec3>]) -> Result<(f64, Stack), &'static str> {
     let areas: Vec<DVec3> = contours.iter().map(|contour| vector_area(contour)).collect();
     if areas.len() < 2 {

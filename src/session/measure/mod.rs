@@ -1,5 +1,5 @@
-//! Measurements: the geometry of calipers, contours and volumes in f64, their results as text and CSV, and what is drawn of them and of body marks
-//! over a picture. Needs no device and no window.
+//! Measurements: the geometry of calipers, contours and volumes in f64, their results as text and CSV, and their drawing, with that of body
+//! marks, over a picture. It needs no device and no window.
 
 pub mod body_marks;
 mod body_outlines;

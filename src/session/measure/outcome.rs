@@ -7,12 +7,12 @@ use crate::text::csv_quoted;
 use glam::DVec3;
 use std::fmt::Write as _;
 
-/// A quantity that was measured.
+/// A measured quantity.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Quantity {
     pub name: &'static str,
     pub value: f64,
-    /// mm, cm2, cm3, deg, or nothing for an echo of 0..=255.
+    /// mm, cm2, cm3 or deg; empty for an echo of 0..=255.
     pub unit: &'static str,
 }
 
@@ -21,7 +21,7 @@ impl Quantity {
         Quantity { name, value, unit }
     }
 
-    /// Value and unit for the user: mm and degrees to a tenth, cm^2 and cm^3 to a hundredth.
+    /// Value and unit for users: mm and degrees to a tenth, cm^2 and cm^3 to a hundredth.
     pub fn shown(&self) -> String {
         let value = self.value;
         match self.unit {
@@ -39,10 +39,10 @@ fn places(points: &[[f64; 3]]) -> Vec<DVec3> {
     points.iter().map(|point| DVec3::from(*point)).collect()
 }
 
-/// What a measurement has found, the most important first; nothing for a text and an arrow.
+/// The quantities of a measurement, the most important one first. Texts and arrows have none.
 ///
 /// # Errors
-/// In words: why its points measure nothing.
+/// One line: the reason why its points measure nothing.
 pub fn quantities(measured: &Measurement) -> Result<Vec<Quantity>, &'static str> {
     let points = places(&measured.points);
     Ok(match (measured.kind, &points[..]) {
@@ -89,7 +89,7 @@ pub fn quantities(measured: &Measurement) -> Result<Vec<Quantity>, &'static str>
     })
 }
 
-/// The label of a measurement on the picture: its number, its text and what it found first. A text and an arrow have their text alone.
+/// The label of a measurement on the picture: its number, its text and its first quantity. Texts and arrows have only their text.
 pub fn label(number: usize, measured: &Measurement) -> String {
     if matches!(measured.kind, MeasureKind::Text | MeasureKind::Arrow) {
         return measured.text.clone();
@@ -107,8 +107,8 @@ pub fn label(number: usize, measured: &Measurement) -> String {
     }
 }
 
-/// All results as CSV: a line for each quantity, and on what it was measured, as far as that is known. Numbers have a point and four digits behind it.
-/// `recording`: its name; empty for live volumes.
+/// All results as CSV: a line for each quantity, with the conditions of the measurement if they are known. Numbers have a decimal point and
+/// four decimals. `recording`: its name; empty for live volumes.
 pub fn csv(all: &[Measurement], recording: &str) -> String {
     let mut text = String::from("number,measurement,text,quantity,value,unit,recording,volume,time,plane,settings\n");
     let recording = csv_quoted(recording);

@@ -1,4 +1,4 @@
-//! What is drawn of measurements over a picture: lines, calipers and labels in pixels of the picture, tile by tile. The viewer and written
+//! The drawing of measurements over a picture: lines, calipers and labels in pixels of the picture, tile by tile. The viewer and written
 //! pictures draw the same.
 
 use super::outcome;
@@ -10,31 +10,31 @@ use glam::DVec3;
 
 /// Points of the outline of an ellipse.
 const OUTLINE: usize = 72;
-/// A point lies in the plane of a tile if it is no farther from it, mm; in a slab, half of its thickness.
+/// Largest distance from the plane of a tile, mm, of a point that counts as in the plane. In a slab, half of its thickness is used.
 const IN_PLANE: f64 = 0.5;
 
-/// What is drawn of one measurement on one tile. Positions are in pixels of the picture from its upper left corner.
+/// The drawing of one measurement on one tile. Positions are in pixels of the picture from its upper left corner.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Drawn {
-    /// Its index in the list.
+    /// Index in the list.
     pub index: usize,
     /// The tile that it is drawn on: upper left corner and size.
     pub tile: [[f64; 2]; 2],
     /// Open lines.
     pub lines: Vec<Vec<[f64; 2]>>,
-    /// The points that were set: where crosses are drawn, and what can be grabbed. By their index.
+    /// The points that were set, by their index. Crosses are drawn there, and they can be grabbed.
     pub points: Vec<(usize, [f64; 2])>,
-    /// Where an arrow's head is, and where its shaft comes from.
+    /// The tip of an arrow's head, and a point on its shaft, which gives the direction.
     pub head: Option<[[f64; 2]; 2]>,
     pub label: String,
-    /// It belongs to another volume than the one that is shown: it is dimmed, and cannot be grabbed.
+    /// It belongs to another volume than the one that is shown, so it is dimmed and cannot be grabbed.
     pub is_of_other: bool,
     /// The lower left corner of the label.
     pub at: [f64; 2],
 }
 
-/// Everything that measurements draw over the picture of a scene. `all`: the list, as in [`crate::scene::Settings::measure`]; `volume`: the number of the
-/// volume that the picture shows, where it is known.
+/// The drawing of all measurements over the picture of a scene. `all`: the list, as in [`crate::scene::Settings::measure`]; `volume`:
+/// number of the volume that the picture shows, if it is known.
 pub fn drawn(scene: &Scene, volume: Option<u32>, all: &[Measurement]) -> Vec<Drawn> {
     if all.is_empty() {
         return Vec::new();
@@ -69,8 +69,8 @@ pub fn drawn(scene: &Scene, volume: Option<u32>, all: &[Measurement]) -> Vec<Dra
     found
 }
 
-/// What is drawn of a measurement in work, `hover` being the place of the pointer, which may be on a curved plane: what it would be with
-/// that point.
+/// The drawing of an unfinished measurement as if `hover`, the position of the pointer, were its next point. The pointer may be on a curved
+/// plane.
 pub fn preview(
     scene: &Scene,
     number: usize,
@@ -117,7 +117,7 @@ pub fn spacing_label(tiling: &Tiling) -> String {
     }
 }
 
-/// The two strokes of an arrow's head, pixels. `head`: the tip, and where the shaft comes from.
+/// The two strokes of an arrow's head, pixels. The first argument has the tip and a point on the shaft.
 pub fn arrow_head([tip, tail]: [[f64; 2]; 2], length: f64) -> Vec<[[f64; 2]; 2]> {
     let (x, y) = (tail[0] - tip[0], tail[1] - tip[1]);
     let shaft = x.hypot(y);
@@ -129,7 +129,7 @@ pub fn arrow_head([tip, tail]: [[f64; 2]; 2], length: f64) -> Vec<[[f64; 2]; 2]>
     vec![[tip, turned(0.45)], [tip, turned(-0.45)]]
 }
 
-/// The upper left corner of a label of this size: next to its measurement, within its tile. Pixels.
+/// The upper left corner of a label of this size, next to its measurement and within its tile, pixels.
 pub fn label_corner(drawn: &Drawn, size: [f64; 2]) -> [f64; 2] {
     let [corner, tile] = drawn.tile;
     let wanted = [drawn.at[0], drawn.at[1] - size[1]];

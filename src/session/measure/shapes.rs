@@ -8,7 +8,7 @@ pub fn length(path: &[DVec3]) -> f64 {
     path.windows(2).map(|ends| ends[0].distance(ends[1])).sum()
 }
 
-/// Length of a closed path, mm: its last point is joined with its first.
+/// Length of a closed path, mm. Its last point is joined to its first.
 pub(crate) fn perimeter(contour: &[DVec3]) -> f64 {
     match contour {
         [first, .., last] => length(contour) + last.distance(*first),
@@ -24,14 +24,14 @@ pub fn angle(leg: DVec3, vertex: DVec3, other: DVec3) -> Option<f64> {
     is_one.then(|| a.cross(b).length().atan2(a.dot(b)).to_degrees())
 }
 
-/// The area of a contour as a vector along its normal, mm^2 (Newell): for a contour in a plane its length is the area that it encloses, as by the
-/// shoelace formula; for one that is not flat, the area of its projection onto the plane where that is largest.
+/// The area of a contour as a vector along its normal, mm^2 (Newell). For a plane contour the length of the vector is the enclosed area, as
+/// by the shoelace formula. For another contour it is the area of its projection onto the plane where that is largest.
 pub(crate) fn vector_area(contour: &[DVec3]) -> DVec3 {
     let Some((first, rest)) = contour.split_first() else { return DVec3::ZERO };
     rest.windows(2).map(|ends| (ends[0] - first).cross(ends[1] - first)).sum::<DVec3>() / 2.0
 }
 
-/// The area that a contour in a plane encloses, mm^2. A contour that crosses itself counts the parts of both senses against each other.
+/// The area that a plane contour encloses, mm^2. If a contour crosses itself, parts of opposite sense are subtracted from each other.
 pub fn area(contour: &[DVec3]) -> f64 {
     vector_area(contour).length()
 }
@@ -50,7 +50,8 @@ pub struct Ellipse {
 }
 
 impl Ellipse {
-    /// The ellipse with the ends of one axis and a third point, whose distance from that axis is the other semi-axis. None if an axis has no length.
+    /// The ellipse with the first two points as ends of one axis and a third point whose distance from that axis is the other semi-axis.
+    /// None if an axis has no length.
     pub fn of(points: [DVec3; 3]) -> Option<Ellipse> {
         let [from, to, side] = points;
         let (centre, first) = ((from + to) / 2.0, (to - from) / 2.0);
@@ -88,7 +89,7 @@ impl Ellipse {
         TAU * sum / a
     }
 
-    /// Points on it, `count` of them evenly spaced in its parameter.
+    /// `count` points on the ellipse, evenly spaced in its parameter.
     pub fn outline(&self, count: usize) -> impl Iterator<Item = DVec3> + '_ {
         let [first, second] = self.semi;
         (0..count).map(move |n| {

@@ -1,4 +1,4 @@
-//! The volume of the voxels of a box whose echo reaches a threshold, counted in the frames themselves on the CPU in f64.
+//! The volume of the voxels of a box whose echo reaches a threshold, computed from the frames on the CPU in f64.
 
 use crate::source::convert::Volume;
 use glam::DVec3;
@@ -9,21 +9,21 @@ const MAX_VOXELS: f64 = 4e6;
 /// Most voxels along an edge of the box.
 const MAX_EDGE: f64 = 4096.0;
 
-/// What was counted.
+/// Result of a count.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Counted {
-    /// mm^3.
+    /// Volume of the counted voxels, mm^3.
     pub volume: f64,
-    /// Voxels in the box, and those that count.
+    /// Number of voxels in the box, and of those that reach the threshold.
     pub voxels: u64,
     pub above: u64,
     /// Edges of a voxel, mm.
     pub voxel: DVec3,
 }
 
-/// Counts the voxels of a box, from `low` to `high` in space, mm, whose echo is at least `threshold`, in stored values. The box is divided into
-/// equal voxels of about `pitch` mm, or larger ones if that makes more than 4 million; each counts by the echo at its centre. What is not
-/// insonified does not count. None if the box is empty.
+/// Counts the voxels of a box, from `low` to `high` in space, mm, whose echo is at least `threshold`, in stored values. The box is divided
+/// into equal voxels of about `pitch` mm, or larger ones if that would make more than 4 million. Each voxel is judged by the echo at its
+/// centre. Voxels outside the insonified volume do not count. None if the box is empty.
 pub fn count(volume: &Volume, [low, high]: [DVec3; 2], pitch: f64, threshold: f64) -> Option<Counted> {
     let size = high - low;
     let is_box = size.is_finite() && size.min_element() > 0.0 && pitch.is_finite() && pitch > 0.0;

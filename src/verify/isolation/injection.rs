@@ -1,5 +1,5 @@
-//! Crashes on purpose: a check that ends its process as a faulty driver does, or fails now and then, to show that the rest of a run goes on, and that
-//! a CI which reads the reports sees it.
+//! Deliberate crashes: a check that ends its process as a faulty driver does, or that fails sometimes. They show that the rest of a run
+//! continues, and that a CI system which reads the reports reports the crash.
 
 use crate::files::signals;
 use crate::report::Fault;
@@ -25,8 +25,8 @@ enum Kind {
     Unsynchronized,
 }
 
-/// A check that is to crash: `segv:GROUP / NAME`, or `abort`, `hang`, `exit`, `flake` and `unsynchronized` instead of `segv`. With `start` instead of a
-/// check the process crashes before it opens the device.
+/// A check that must crash: `segv:GROUP / NAME`, or `abort`, `hang`, `exit`, `flake` or `unsynchronized` instead of `segv`. With `start`
+/// instead of a check the process crashes before it opens the device.
 #[derive(Clone, Debug)]
 pub struct InjectedCrash {
     kind: Kind,
@@ -47,7 +47,7 @@ impl FromStr for InjectedCrash {
             "exit" => Kind::Exit,
             "flake" => Kind::Flake,
             "unsynchronized" => Kind::Unsynchronized,
-            _ => return Err(format!("'{kind}' is none of segv, abort, hang, exit, flake, unsynchronized")),
+            _ => return Err(format!("'{kind}' is not one of segv, abort, hang, exit, flake, unsynchronized")),
         };
         Ok(InjectedCrash { kind, check: check.trim().into(), text: text.into() })
     }
@@ -59,14 +59,14 @@ impl InjectedCrash {
         &self.text
     }
 
-    /// Crashes, if that is to happen before the device is opened.
+    /// Crashes, if the crash is requested before the device is opened.
     pub fn at_start(&self) {
         if self.check == START {
             crash(self.kind);
         }
     }
 
-    /// Replaces the work of the check with the crash. Returns whether there is such a check.
+    /// Replaces the work of the check with the crash. Returns false if there is no such check.
     pub fn inject(&self, checks: &mut [Check]) -> bool {
         if self.check == START {
             return true;

@@ -1,5 +1,5 @@
-//! Checks in a process of their own. A worker process runs one check after another; if it crashes or does not come back, the check that it
-//! ran has failed, and a new worker goes on with the next. This process loads no driver.
+//! Runs checks in separate processes. A worker process runs one check after another. If it crashes or exceeds the time limit, the check
+//! that it ran has failed, and a new worker continues with the next. The main process loads no driver.
 
 mod injection;
 mod worker;
@@ -36,12 +36,12 @@ const LINES: usize = 4;
 /// How many workers in a row may fail to start before no more are started.
 const MAX_STARTS: u32 = 3;
 
-/// The first signal that asks this process to end, if any.
+/// Returns the first signal that asks this process to end, if any.
 pub type Signal<'a> = &'a dyn Fn() -> Option<&'static str>;
-/// Prints a line of a worker's own output.
+/// Prints a line that a worker wrote outside the protocol.
 pub type Echo = Arc<dyn Fn(&str) + Send + Sync>;
 
-/// Starts workers and gives them checks.
+/// Starts workers and assigns checks to them.
 pub struct Workers<'a> {
     /// The command of a worker.
     command: &'a dyn Fn() -> Command,
@@ -94,7 +94,7 @@ impl<'a> Workers<'a> {
         }
     }
 
-    /// Runs the check at this place of [`Ready::checks`].
+    /// Runs the check at this index of [`Ready::checks`].
     pub fn run(&mut self, place: usize, name: &CheckName) -> Outcome {
         let (first, has_crashed) = self.attempt(Request { place, waits: false }, name);
         // What failed without a crash the worker has run again itself.
@@ -150,7 +150,7 @@ impl<'a> Workers<'a> {
             Err(Ended::Itself { how, said, .. }) => {
                 has_crashed = true;
                 let mut outcome = failed(format!("its process {how}{}", worker.in_call()));
-                outcome.notes.extend(said.iter().map(|line| format!("it said: {line}")));
+                outcome.notes.extend(said.iter().map(|line| format!("its output: {line}")));
                 outcome
             }
         };

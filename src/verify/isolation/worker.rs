@@ -1,8 +1,8 @@
-//! The worker: a process that runs checks for another one and reports each on its standard output, as one line of JSON behind a mark.
-//! A driver may print there too; lines without the mark are its own.
+//! The worker: a process that runs checks for another process and reports each on its standard output, as one line of JSON behind a mark.
+//! Lines without the mark are not messages, because a driver may print there, too.
 //!
-//! The worker reads the places of checks from its standard input, one a line, and ends with it: when the process that asked has ended,
-//! even if a check hangs.
+//! The worker reads the indices of checks from its standard input, one on each line. It ends when its input ends, also if a check hangs:
+//! then the other process has ended.
 
 use crate::gpu::calls;
 use crate::machine::Device;
@@ -36,13 +36,13 @@ pub(super) enum Message {
     Done(Box<Done>),
 }
 
-/// The device of a worker and the checks that it can run.
+/// The device of a worker, and the checks that it can run.
 #[derive(Serialize, Deserialize)]
 pub struct Ready {
     pub device: Device,
-    /// The validation layer is active and sees something.
+    /// The validation layer is active and detects a missing barrier.
     pub validation: bool,
-    /// What to print before the first check.
+    /// Lines to print before the first check.
     pub lines: Vec<String>,
     pub checks: Vec<CheckName>,
 }
@@ -139,19 +139,19 @@ impl Message {
     }
 }
 
-/// From now on the process that asks is told of the Vulkan calls in which this one may crash.
+/// From now on reports each Vulkan call in which this process may crash to the other process.
 pub fn tell_calls() {
     // Nobody listens any more if this fails, and the next answer says so.
     calls::tell(|call, of| drop(Message::Calls(call.into(), of.into()).send()));
 }
 
-/// Reports that there is nothing to run checks on.
+/// Reports that there is no device to run checks on.
 pub fn refuse(failure: Failure) -> Result<(), String> {
     let code = failure.exit_code();
     Message::Refused { code, message: failure.message() }.send()
 }
 
-/// Runs the checks that standard input asks for until it ends.
+/// Runs the checks that standard input requests until it ends.
 ///
 /// # Errors
 /// One line: standard output is closed.

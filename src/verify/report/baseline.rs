@@ -1,5 +1,5 @@
-//! Compares a run with an earlier one, also within tolerances: a driver whose results differ from those of the previous version is worth
-//! reporting before any check fails.
+//! Compares a run with an earlier one, also within tolerances: if the results of a driver differ from those of its previous version, this
+//! is worth reporting before any check fails.
 
 use super::{Figure, Outcome, Run, Unit, Verdict, amount, change, number};
 use crate::baselines::{Threshold, differing, matched};
@@ -12,7 +12,7 @@ use std::fmt::{Display, Formatter};
 /// Severity of a change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Class {
-    /// Fails the run: a check that did not fail before, an error now beyond its tolerance, a time beyond the threshold.
+    /// Fails the run: a check that did not fail before, an error that now exceeds its tolerance, or a time beyond the threshold.
     Worse,
     /// Reported, without failing the run.
     Changed,
@@ -37,7 +37,7 @@ pub struct Change {
     pub class: Class,
     pub group: String,
     pub name: String,
-    /// One line, old before new.
+    /// One line, the old value before the new one.
     pub what: String,
 }
 
@@ -58,11 +58,11 @@ impl Display for Change {
 pub struct BaselineComparison {
     /// Description of the earlier run.
     pub baseline: String,
-    /// Differences of the conditions, one line each, old before new.
+    /// Differences of the conditions, one line each, the old value before the new one.
     pub differences: Vec<String>,
-    /// What could not be compared and why, and other remarks.
+    /// Items that could not be compared, with the reasons, and other remarks.
     pub notes: Vec<String>,
-    /// The worst first, otherwise in the order of the new run.
+    /// The changes, the worst first, otherwise in the order of the new run.
     pub changes: Vec<Change>,
     /// Number of checks without changes.
     pub same: usize,
@@ -105,7 +105,8 @@ struct Pair<'a> {
     new: &'a Figure,
 }
 
-/// Compares the checks and figures of `new` with those of the same name in `old`. `threshold`: a slower check fails the run above it.
+/// Compares the checks and figures of `new` with those of the same name in `old`. `threshold`: ratio of times above which a slower check
+/// fails the run.
 pub fn compare(old: &Run, new: &Run, threshold: Threshold) -> BaselineComparison {
     let (mut changes, mut notes, mut pairs) = (Vec::new(), Vec::new(), Vec::new());
     let (mut still_failing, mut only_new, mut gone, mut both) = (0, 0, 0, Vec::new());
@@ -337,7 +338,7 @@ fn judge_times(pairs: &[Pair], runs: [&Run; 2], threshold: Threshold) -> TimeCha
             _ => found.changes.extend(time_change(pair, line, threshold, because.is_some())),
         }
     }
-    found.notes.extend(because.map(|why| format!("{why}: times are told, and fail nothing")));
+    found.notes.extend(because.map(|why| format!("{why}: times are reported, but fail nothing")));
     found.notes.extend(left.into_iter().map(|(why, count)| format!("{count} times are not compared: {why}")));
     found.notes.extend(profile::common_shift(&lines));
     found

@@ -17,8 +17,8 @@ use maud::{Markup, html};
 /// Maximum number of checks of a group that is expanded by default.
 const MAX_OPEN: usize = 40;
 
-/// The complete page. Pictures are embedded as long as [`MAX_SETS`] and [`MAX_BYTES`] allow, those of
-/// failures first; the page states how many are omitted.
+/// Writes the complete page. Pictures are embedded up to the limits `MAX_SETS` and [`MAX_BYTES`], those of failures first. The page
+/// states how many are omitted.
 ///
 /// # Errors
 /// One line: [`Run::check`] refuses the run.

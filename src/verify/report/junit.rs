@@ -1,4 +1,4 @@
-//! A run as JUnit XML for CI systems: one suite per group, one case per check.
+//! A run as JUnit XML for CI systems: one suite for each group, one case for each check.
 
 use super::baseline::BaselineComparison;
 use super::{Outcome, Run, Verdict, comparison, failure, value_of_limit};
@@ -6,7 +6,7 @@ use crate::text::escaped;
 use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestRerun, TestSuite};
 use std::time::Duration;
 
-/// The XML file. A comparison adds a suite, whose only case fails if anything is worse.
+/// Writes the XML file. A comparison adds a suite, whose only case fails if anything is worse.
 ///
 /// # Errors
 /// One line: the XML could not be written.

@@ -1,5 +1,5 @@
-//! The result of `echolume verify`: every check with its errors, times and faults, and the device it ran on; and its reports as JSON and as
-//! text for a terminal (here), JUnit XML and HTML. Nothing here runs a device.
+//! The result of `echolume verify`: every check with its errors, times and faults, and the device it ran on. Reports as JSON and as text
+//! for a terminal are here; JUnit XML and HTML have modules of their own. No code here uses a device.
 //!
 //! The text has lines of groups, failures, the summary, and the comparison with a baseline. Numbers with units have as many digits as a
 //! reader needs.
@@ -20,7 +20,7 @@ use std::collections::{HashMap, HashSet};
 use std::fmt::Write as _;
 use std::time::Duration;
 
-/// How much to check.
+/// The extent of the checks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Level {
@@ -46,7 +46,7 @@ pub struct Run {
     pub validation: bool,
     /// Duration of all checks, s.
     pub seconds: f64,
-    /// In running order.
+    /// The outcomes in running order.
     pub outcomes: Vec<Outcome>,
 }
 
@@ -92,7 +92,7 @@ impl Run {
 pub struct Outcome {
     /// Group of checks: `passes`, `modes`, `known answers` ...
     pub group: String,
-    /// Unique in its group, and the same in every run of this version.
+    /// Name of the check, unique in its group and the same in every run of this version.
     pub name: String,
     pub verdict: Verdict,
     /// Duration by the clock of the host, reference included, s.
@@ -102,10 +102,10 @@ pub struct Outcome {
     pub figures: Vec<Figure>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub faults: Vec<Fault>,
-    /// Remarks: why it was left out, which fallbacks were used.
+    /// Remarks, such as the reason why it was skipped, and fallbacks that were used.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,
-    /// Number of runs that failed before the one of this outcome passed: a flake, unless 0.
+    /// Number of runs that failed before the one of this outcome passed. If it is not 0, the check is a flake.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub failed_before: u32,
     /// Comparison pictures, of passed checks too.
@@ -118,7 +118,7 @@ pub struct Outcome {
 #[serde(deny_unknown_fields)]
 pub struct CheckName {
     pub group: String,
-    /// Unique in its group.
+    /// Name, unique in its group.
     pub name: String,
 }
 
@@ -128,7 +128,7 @@ pub struct CheckName {
 pub enum Verdict {
     Passed,
     Failed,
-    /// Not run, because this device or system lacks something; the notes say what.
+    /// Not run, because this device or system lacks something that the notes name.
     LeftOut,
     /// Not run, or not to its end, because a signal ended the run. It says nothing about the device.
     Interrupted,
@@ -138,19 +138,19 @@ pub enum Verdict {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Figure {
-    /// Unique in its check.
+    /// Name, unique in its check.
     pub what: String,
     /// The largest error, or the median of times. NaN if the output was NaN.
     #[serde(with = "any_number")]
     pub value: f64,
-    /// The maximum value that passes; None if any does.
+    /// The largest value that passes. None if every value passes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub allowed: Option<f64>,
     pub unit: Unit,
-    /// Single times, in the order measured.
+    /// Single times, in the order of measurement.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub samples: Vec<f64>,
-    /// Depends on circumstances of the run, not on the device: reported, but never compared.
+    /// True if the figure depends on circumstances of the run, not on the device. It is reported, but never compared.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub fleeting: bool,
 }
@@ -175,9 +175,9 @@ pub enum Unit {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Fault {
-    /// One line: what is wrong.
+    /// One line that describes the fault.
     pub what: String,
-    /// The pass at fault, if known.
+    /// The faulty pass, if known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pass: Option<String>,
     /// Description of the input.
@@ -185,7 +185,7 @@ pub struct Fault {
     pub input: String,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub worst: Option<Worst>,
-    /// Picture files once they are written: actual, expected, difference.
+    /// Files of the pictures once they are written: actual, expected, difference.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub files: Vec<String>,
 }
@@ -196,7 +196,7 @@ pub struct Fault {
 pub struct Worst {
     /// Name of the output in the shader.
     pub output: String,
-    /// Column, row, slice.
+    /// Position: column, row, slice.
     pub at: [usize; 3],
     pub channel: usize,
     #[serde(with = "any_number")]
@@ -236,7 +236,7 @@ impl Figure {
         Figure { what: what.into(), value, allowed: Some(allowed), unit, samples: Vec::new(), fleeting: false }
     }
 
-    /// Times of the same work in the order measured, ns.
+    /// Times of the same work in the order of measurement, ns.
     ///
     /// # Errors
     /// There is no time, or one is not finite.
@@ -256,7 +256,7 @@ impl Figure {
         self.unit == Unit::Ns && self.samples.is_empty()
     }
 
-    /// Value over limit: above 1 fails, and NaN gives infinity. None without limit.
+    /// The value over its limit: above 1 fails, and NaN gives infinity. None without a limit.
     pub fn used(&self) -> Option<f64> {
         let allowed = self.allowed?;
         Some(match self.value {
@@ -287,8 +287,9 @@ impl Outcome {
         }
     }
 
-    /// What became of a check that failed at first: `again` runs it once more, and `waiting` too, while the host waits for each submission before
-    /// the next. One that passes when it is run again is a flake. One that passes only while the host waits lacks synchronization.
+    /// Finds the cause of a failure by repetition. `again` runs the check once more, and `waiting` runs it while the host waits for each
+    /// submission before the next. A check that passes when it is run again is a flake. A check that passes only while the host waits lacks
+    /// synchronization.
     pub(crate) fn explained(self, mut again: impl FnMut() -> Outcome, waiting: impl FnOnce() -> Outcome) -> Outcome {
         let first = self.faults.first().map_or_else(String::new, |fault| format!(": {}", fault.what));
         for failed in 1..=RERUNS {
@@ -312,13 +313,13 @@ impl Outcome {
         outcome
     }
 
-    /// The figure that is closest to its limit, or furthest beyond.
+    /// The figure that is closest to its limit, or exceeds it most.
     pub fn tightest(&self) -> Option<&Figure> {
         let used = self.figures.iter().filter_map(|f| Some((f, f.used()?)));
         used.reduce(|a, b| if b.1 > a.1 { b } else { a }).map(|(figure, _)| figure)
     }
 
-    /// The check that it is the outcome of.
+    /// The name of the check with this outcome.
     pub fn check(&self) -> CheckName {
         CheckName { group: self.group.clone(), name: self.name.clone() }
     }
@@ -588,8 +589,8 @@ pub fn summary(run: &Run) -> String {
     )
 }
 
-/// Changes since an earlier run, the worst first, in lines. Changes that fail the run are all listed; of the others only some, with
-/// the number of the rest.
+/// Changes since an earlier run, the worst first, in lines. All changes that fail the run are listed; of the others only some, with the
+/// number of the rest.
 pub fn comparison(compared: &BaselineComparison) -> String {
     let mut text = format!("compared with {}\n", compared.baseline);
     for line in compared.differences.iter().chain(&compared.notes) {
@@ -698,7 +699,7 @@ pub fn change(old: f64, new: f64, unit: Unit) -> String {
     format!("{old} -> {new}{word}")
 }
 
-/// A figure's value and its limit: `0.8 of 2 levels`.
+/// The value of a figure and its limit: `0.8 of 2 levels`.
 pub fn value_of_limit(figure: &Figure) -> String {
     let Some(allowed) = figure.allowed else { return amount(figure.value, figure.unit) };
     let ([value, allowed], word) = distinguishable([figure.value, allowed], figure.unit);
@@ -706,7 +707,7 @@ pub fn value_of_limit(figure: &Figure) -> String {
     format!("{value} of {allowed}{word}")
 }
 
-/// A share in integer percent; 100 only if exactly 1.
+/// A share in integer percent. It is 100 only if the share is exactly 1.
 pub fn percent(share: f64) -> String {
     match share {
         s if !s.is_finite() || s >= 100.0 => "over 9999 %".into(),

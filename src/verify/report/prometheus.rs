@@ -1,4 +1,4 @@
-//! A run as metrics of Prometheus, one file on each machine of a fleet. Counts are gauges, because each run begins at zero.
+//! A run as metrics for Prometheus, for fleets with one file on each machine. Counts are gauges, because each run begins at zero.
 
 use super::baseline::BaselineComparison;
 use super::{Run, Unit, Verdict};
@@ -6,7 +6,7 @@ use crate::metrics::table;
 use crate::metrics::text_format::Exposition;
 use std::time::UNIX_EPOCH;
 
-/// The file. `compared`: the run's comparison with its baseline, if it has one.
+/// Writes the file. `compared`: the run's comparison with its baseline, if it has one.
 pub fn prometheus(run: &Run, compared: Option<&BaselineComparison>) -> String {
     let device = &run.device;
     let conditions = [

@@ -1,5 +1,5 @@
-//! A dispatch as a script for Amber (google/amber), which runs it on any driver without this program: the shader, its inputs and what is
-//! expected of every texel.
+//! A dispatch as a script for Amber (google/amber), which runs it on any driver without this program: the shader, its inputs and the
+//! expected value of every texel.
 
 use super::{Array, Case, LAYER_SHADER, PARAMS, SHADER};
 use crate::passes::slots::Format;

@@ -1,5 +1,5 @@
-//! One dispatch of a pass as files for a bug report, which need nothing of this program: the shader as the driver gets it, the inputs, the
-//! numbers, what is expected within which tolerance, and a script for Amber where it can express the dispatch.
+//! One dispatch of a pass as files for a bug report, which need nothing of this program: the shader as the driver receives it, the inputs,
+//! the numbers, the expected values with their tolerance, and a script for Amber if it can express the dispatch.
 
 mod amber;
 
@@ -95,18 +95,18 @@ impl Array {
     }
 }
 
-/// What was written.
+/// The written files.
 pub struct Reproduction {
     pub title: String,
-    /// The dispatch differs from its reference on this device.
+    /// True if the dispatch differs from its reference on this device.
     pub fails: bool,
-    /// Why there is no script for Amber.
+    /// The reason why there is no script for Amber. None if there is one.
     pub without_script: Option<String>,
     pub files: Vec<String>,
 }
 
-/// Writes a dispatch of a pass into a folder, which is created when needed: the smallest that fails, otherwise the smallest of at least
-/// [`MIN_TEXELS`] texels.
+/// Writes a dispatch of a pass into a folder, which is created if needed: the smallest that fails, otherwise the smallest with at least
+/// `MIN_TEXELS` texels.
 ///
 /// # Errors
 /// No pass has this name, the device fails, or a file cannot be written.
@@ -119,7 +119,7 @@ pub fn reproduce(dut: &mut DeviceUnderTest, check: &str, folder: &Path) -> Resul
     Ok(Reproduction { title: case.title, fails, without_script, files: written })
 }
 
-/// Why nothing was reproduced.
+/// The reason why nothing was reproduced.
 #[derive(Debug, thiserror::Error)]
 pub enum ReproduceError {
     #[error("'{0}' compares no pass with its reference; those of the group 'passes' do (--list)")]

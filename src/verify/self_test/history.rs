@@ -1,5 +1,5 @@
-//! Bugs of drivers that were met in the field and are public, and the injected fault that recreates each. They show that the checks notice
-//! what has happened, and not only what somebody thought of.
+//! Public bugs of drivers that occurred in practice, and the injected fault that recreates each. They show that the checks detect real
+//! bugs, not only invented ones.
 
 /// A public bug and its recreation.
 pub struct KnownBug {
@@ -7,9 +7,9 @@ pub struct KnownBug {
     pub fault: &'static str,
     /// The driver, or the layer above it.
     pub driver: &'static str,
-    /// What went wrong.
+    /// Description of the wrong behaviour.
     pub what: &'static str,
-    /// Where it was reported.
+    /// Where it was reported: an address or a file.
     pub source: &'static str,
 }
 

@@ -29,13 +29,13 @@ const SCENES: usize = 6;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Detection {
     pub fault: String,
-    /// The kind of defect it stands for.
+    /// The kind of defect that it represents.
     pub what: String,
-    /// Group and name of the check; None if undetected.
+    /// Group and name of the check. None if the fault was not detected.
     pub by: Option<String>,
-    /// Message of the check, or why nothing detected the fault.
+    /// Message of the check, or the reason why nothing detected the fault.
     pub message: String,
-    /// Not tested.
+    /// True if it was not tested.
     pub left_out: bool,
     /// Duration by the clock of the host, s.
     pub seconds: f64,
@@ -47,7 +47,7 @@ impl Detection {
         history::of(&self.fault).map(|bug| format!("as in {}: {} ({})", bug.driver, bug.what, bug.source))
     }
 
-    /// The outcome as of other checks: an undetected fault is a failure.
+    /// The detection as the outcome of a check: an undetected fault is a failure.
     pub fn outcome(&self) -> Outcome {
         let (verdict, faults, note) = match &self.by {
             _ if self.left_out => (Verdict::LeftOut, Vec::new(), Some(self.message.clone())),
@@ -73,7 +73,7 @@ pub fn known_bugs() -> &'static [KnownBug] {
     history::KNOWN_BUGS
 }
 
-/// A check whose process was made to crash, as the run of other checks reports it.
+/// The detection of a deliberate crash from the outcome of the check whose process crashed.
 pub fn crash(outcome: &Outcome) -> Detection {
     let said = outcome.faults.first().map(|fault| fault.what.clone());
     let is_named = outcome.verdict == Verdict::Failed && said.as_ref().is_some_and(|said| said.contains("signal"));
@@ -87,14 +87,14 @@ pub fn crash(outcome: &Outcome) -> Detection {
     }
 }
 
-/// All faults to inject, in running order: those of single passes and commands, then one for each class of instructions. Dropped barriers are tested
-/// in addition.
+/// All faults to inject, in running order: those of single passes and commands, then one for each class of instructions. Dropped barriers
+/// are tested in addition.
 pub fn faults() -> impl Iterator<Item = InjectedFault> {
     injected_faults::FAULTS.iter().copied().chain(injected_faults::of_instructions())
 }
 
-/// Injects every fault and drops every barrier; calls `tell` after each. The last detection states whether the checks that detected
-/// faults pass without any.
+/// Injects every fault and drops every barrier, and calls `tell` after each. The last detection states whether the checks that detected
+/// faults pass without an injected fault.
 ///
 /// # Errors
 /// The device fails without a fault.
@@ -302,11 +302,15 @@ fn by_oracle(options: &ContextOptions) -> Result<Detection, GpuError> {
                 let may_be = !log.submissions[barrier.0].waits.is_empty();
                 implied += usize::from(unseen && may_be);
                 if unseen && !may_be {
-                    missed.get_or_insert(of(format!("barrier {barrier:?} is not missed")));
+                    missed.get_or_insert(of(format!("nothing detects that barrier {barrier:?} is missing")));
                 }
             }
             let unseen = |wait: &(usize, usize)| log.without_wait(*wait).find_hazard(&scene).is_none();
-            missed = missed.or(log.waits().into_iter().find(unseen).map(|w| of(format!("wait {w:?} is not missed"))));
+            missed = missed.or(log
+                .waits()
+                .into_iter()
+                .find(unseen)
+                .map(|w| of(format!("nothing detects that wait {w:?} is missing"))));
             (barriers, waits, runs) = (barriers + log.barriers().len(), waits + log.waits().len(), runs + 1);
         }
     }

@@ -229,7 +229,7 @@ fn too_few_times_and_other_devices_are_not_compared_and_reported() {
     let lines = elsewhere.lines();
     assert_eq!(lines[..2], ["device: simulated -> another", "driver: none 1.0 -> none 2.0"]);
     assert!(lines[2].starts_with("speed / shade: device time 200 % slower (2."), "{lines:?}");
-    assert_eq!(elsewhere.notes, ["the devices differ: times are told, and fail nothing"]);
+    assert_eq!(elsewhere.notes, ["the devices differ: times are reported, but fail nothing"]);
     let unwatched = changed(|new| (new.validation, new.device.clocks) = (false, None));
     assert_eq!(
         unwatched.lines(),

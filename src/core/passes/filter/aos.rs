@@ -1,6 +1,6 @@
 //! Anisotropic diffusion in semi-implicit steps by additive operator splitting (Weickert, ter Haar Romeny and Viergever 1998):
 //! u' = 1/2 sum over both axes of (I - 2 tau A(u))^-1 u, with Perona and Malik's conductance between neighbours. Stable at any
-//! tau, and within the range of what was there. Each axis is solved by one of two methods ([`Solver`]).
+//! tau, and within the range of what was there. Each axis is solved by one of two methods (`Solver`).
 
 use super::estimator::storable_edge;
 use super::perona_malik::{conductance, constant, need};

@@ -7,7 +7,7 @@
 //! the error as far as colours differ at its ends. A ray halves its steps as often as its error needs.
 //!
 //! [`FIRST`] casts a ray through every other pixel of every other row, [`ENLARGE`] takes the means of these for the pixels between and states how far they may be
-//! off by how much the picture bends from ray to ray, [`LIST`] lists the pixels whose error is too large, and [`REFINE`] casts their own rays; as many workgroups of
+//! off by how much the picture bends from ray to ray, [`LIST`] lists the pixels whose error is too large, and `REFINE` casts their own rays; as many workgroups of
 //! it run as the list fills, which the device itself reads. Rays that meet only empty bricks have no error at all, by the bricks' ranges.
 
 use super::cap;

@@ -1,4 +1,4 @@
-//! What drivers tell of a pipeline under names of their own, in common columns.
+//! Converts the driver-specific statistics of a pipeline to common columns.
 
 use super::{Executable, Pipeline};
 
@@ -33,20 +33,20 @@ const INSTRUCTIONS: &[&str] = &["Instruction count", "Instructions", "Instructio
 /// Shared memory of a workgroup, bytes.
 const SHARED: &[&str] = &["SLM size", "LDS size", "Workgroup Memory Size", "ldsUsageSizeInBytes", "Shared Memory Size"];
 
-/// The columns that drivers have in common; `None` where this one tells nothing. Of several executables the worst: which one runs is up
-/// to the driver.
+/// Columns that drivers have in common. `None` if this driver does not report the value. With several executables the worst value counts,
+/// because the driver decides which one runs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Columns {
     /// Registers of an invocation. Half registers count as registers.
     pub registers: Option<f64>,
-    /// Subgroups that a processor can hold at the same time: the occupancy.
+    /// Number of subgroups that a processor can hold at the same time: the occupancy.
     pub waves: Option<f64>,
-    /// What did not fit into registers, in the driver's unit.
+    /// Values that did not fit into registers, in the driver's unit.
     pub spills: Option<f64>,
     pub instructions: Option<f64>,
     /// Shared memory of a workgroup, bytes.
     pub shared: Option<f64>,
-    /// Invocations of a subgroup. Where the driver chooses it by the registers, fewer are a loss of occupancy.
+    /// Number of invocations in a subgroup. If the driver chooses it by the registers, a smaller number is a loss of occupancy.
     pub subgroup: Option<u32>,
 }
 

@@ -1,5 +1,5 @@
-//! Compares the statistics of pipelines with earlier ones of the same device. They are counts without noise: any loss of occupancy and
-//! any spill is a fact, and a few instructions or registers more are not worth a word.
+//! Compares the statistics of pipelines with earlier ones of the same device. They are counts without noise: any loss of occupancy and any
+//! spill is a fact, and small changes of registers or instructions are not reported.
 
 use super::{Pipeline, PipelineProfile};
 use crate::baselines::{differing, matched};
@@ -8,7 +8,7 @@ use serde::Serialize;
 /// Ratio above which more registers or instructions are reported as worse.
 const GROWTH: f64 = 1.05;
 
-/// A pipeline of which a column differs.
+/// A pipeline with a column that differs.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Change {
     pub pipeline: String,
@@ -16,7 +16,7 @@ pub struct Change {
     pub column: &'static str,
     pub old: f64,
     pub new: f64,
-    /// True if it fails the comparison.
+    /// True if the change fails the comparison.
     pub is_worse: bool,
 }
 
@@ -26,24 +26,25 @@ pub struct PipelineComparison {
     pub format: &'static str,
     /// Number of pipelines that both have.
     pub compared: usize,
-    /// Only in the new one, and only in the old one.
+    /// Number of pipelines that only the new one has.
     pub added: usize,
+    /// Number of pipelines that only the old one has.
     pub gone: usize,
-    /// What became worse first.
+    /// The changes, the worse first.
     pub changes: Vec<Change>,
     /// Pipelines that only the new one has and that spill.
     pub(crate) new_spills: Vec<String>,
-    /// Time to compile the pipelines that both have, without any cache, ms: old, new. Told, and never a failure: another machine is
-    /// faster or slower.
+    /// Time to compile the pipelines that both have, without any cache, ms: old, new. It is reported, but never a failure, because another
+    /// machine is faster or slower.
     pub(crate) cold_ms: [f64; 2],
-    /// Other devices, drivers and inputs, one line each.
+    /// Differences of device, driver and input, one line each.
     pub notes: Vec<String>,
 }
 
-/// Why two sets cannot be compared.
+/// The reason why two sets cannot be compared.
 #[derive(Debug, PartialEq, thiserror::Error)]
 pub enum CompareError {
-    #[error("{which} statistics: the device '{device}' told none; there is nothing to compare")]
+    #[error("{which} statistics: the device '{device}' reported none; there is nothing to compare")]
     NoStatistics { which: &'static str, device: String },
     #[error(
         "the devices differ ('{old}', '{new}'), and their statistics have nothing in common; compare runs of one device, or pass --force"
@@ -54,7 +55,7 @@ pub enum CompareError {
 }
 
 impl PipelineComparison {
-    /// The pipelines of which something became worse, each once.
+    /// The pipelines with a column that became worse, each once.
     pub fn worse(&self) -> Vec<&str> {
         let changed = self.changes.iter().filter(|change| change.is_worse).map(|change| &change.pipeline);
         let mut titles: Vec<&str> = changed.chain(&self.new_spills).map(String::as_str).collect();
@@ -63,10 +64,11 @@ impl PipelineComparison {
     }
 }
 
-/// Compares `new` with `old`. Pipelines are the same if shader, constants and formats are. `force`: also those of different devices.
+/// Compares `new` with `old`. Pipelines match if shader, constants and formats are equal. `force`: also compares pipelines of different
+/// devices.
 ///
 /// # Errors
-/// Statistics of different devices unless forced, none at all, or of no pipeline in common.
+/// The devices differ and `force` is not set, there are no statistics, or there is no pipeline in common.
 pub fn compare(old: &PipelineProfile, new: &PipelineProfile, force: bool) -> Result<PipelineComparison, CompareError> {
     for (which, profile) in [("old", old), ("new", new)] {
         if !profile.has_statistics {

@@ -1,6 +1,6 @@
-//! What the driver makes of the pipelines: registers, occupancy, spills, instructions, and the time to compile them. [`measure`] asks a
-//! device, [`compare`] finds what became worse, [`table`] is for people, and [`PipelineProfile`] is the file, small enough to be kept for
-//! a driver that the machine at hand does not have.
+//! The result of compiling the pipelines: registers, occupancy, spills, instructions, and the time to compile them. [`measure`] asks a
+//! device, [`compare`] finds what became worse, and [`table`] writes tables. [`PipelineProfile`] is the file, which is small enough to be
+//! stored for drivers that the current machine lacks.
 
 mod columns;
 pub mod compare;
@@ -30,17 +30,17 @@ pub struct PipelineProfile {
     pub date: String,
     pub device: String,
     pub driver: String,
-    /// What was compiled: the input, and `every mode, preset and filter` or the settings' own.
+    /// Description of the compiled pipelines: the input, and `every mode, preset and filter` or the settings' own.
     pub input: String,
-    /// False if the device does not tell statistics: then there are only times.
+    /// False if the device does not report statistics. Then there are only times.
     pub has_statistics: bool,
-    /// The driver's names of its statistics; the values of an executable are in this order.
+    /// The driver's names of its statistics, in the order of the values of an executable.
     pub statistics: Vec<String>,
-    /// In the order of their first use.
+    /// The pipelines in the order of their first use.
     pub pipelines: Vec<Pipeline>,
 }
 
-/// A pipeline. Shader, constants and formats tell it from others.
+/// A pipeline. Its shader, constants and formats identify it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Pipeline {
@@ -56,12 +56,12 @@ pub struct Pipeline {
     pub formats: Vec<String>,
     /// Time to compile without any cache, ms.
     pub(crate) cold_ms: f64,
-    /// The same from a pipeline cache, ms.
+    /// Time to compile from a pipeline cache, ms.
     pub(crate) warm_ms: f64,
-    /// The driver says that it took it from the cache; `None` if it does not say.
+    /// True if the driver reports that it took the pipeline from the cache. `None` if it does not report it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) from_cache: Option<bool>,
-    /// The programs that the driver made of it; it chooses one for a dispatch.
+    /// The programs that the driver made of it. The driver chooses one for a dispatch.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub executables: Vec<Executable>,
 }
@@ -71,9 +71,9 @@ pub struct Pipeline {
 #[serde(deny_unknown_fields)]
 pub struct Executable {
     pub name: String,
-    /// Invocations of a subgroup.
+    /// Number of invocations in a subgroup.
     pub subgroup: u32,
-    /// By the names of [`PipelineProfile::statistics`]; `None` where this executable lacks one.
+    /// Values in the order of [`PipelineProfile::statistics`]. `None` if this executable lacks one.
     pub values: Vec<Option<f64>>,
 }
 
@@ -89,7 +89,7 @@ impl Pipeline {
 /// Compiles every pipeline that these scenes need with these shaders, twice: without any cache, and from a pipeline cache. Submits nothing.
 ///
 /// # Errors
-/// A scene that the device cannot hold, a shader that does not compile.
+/// The device cannot hold a scene, or a shader does not compile.
 pub fn measure(
     context: &Arc<Context>,
     scenes: &[Scene],
