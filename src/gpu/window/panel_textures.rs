@@ -200,8 +200,11 @@ impl PanelTextures {
                 .image_offset(vk::Offset3D { x: at[0] as i32, y: at[1] as i32, z: 0 })
                 .image_extent(vk::Extent3D { width: size[0], height: size[1], depth: 1 });
             // The memory of a new one may have been that of something else, which is done; layers before 2024 do not know it.
-            let last = if texture.is_filled { read.0 } else { vk::PipelineStageFlags2::ALL_COMMANDS };
-            turn((before, copied), (last, vk::AccessFlags2::NONE), written);
+            let last = match texture.is_filled {
+                true => (read.0, vk::AccessFlags2::NONE),
+                false => (vk::PipelineStageFlags2::ALL_COMMANDS, vk::AccessFlags2::MEMORY_WRITE),
+            };
+            turn((before, copied), last, written);
             // SAFETY: the staging buffer holds the bytes of the region, which egui places inside its texture; both live until the device
             // is done.
             unsafe {

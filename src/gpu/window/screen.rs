@@ -602,7 +602,8 @@ impl Stage {
 
     fn accesses(self) -> vk::AccessFlags2 {
         match self {
-            Stage::New | Stage::Acquired | Stage::Shown => vk::AccessFlags2::NONE,
+            Stage::New => vk::AccessFlags2::MEMORY_WRITE,
+            Stage::Acquired | Stage::Shown => vk::AccessFlags2::NONE,
             Stage::Copied => vk::AccessFlags2::TRANSFER_WRITE,
             Stage::Composed => vk::AccessFlags2::TRANSFER_READ,
             Stage::Drawn => vk::AccessFlags2::COLOR_ATTACHMENT_WRITE | vk::AccessFlags2::COLOR_ATTACHMENT_READ,
