@@ -31,6 +31,7 @@ impl Console {
             is_turning: self.turntable.is_on(),
             exporting: self.exporter.exporting().map(|name| (name, self.exporter.progress())),
             presets: self.presets.shown(),
+            has_small_pictures: self.fixed.small_pictures,
             looks: self.presets.tiles(),
             loop_pictures: &loop_pictures,
             origin: self.origin(),

@@ -95,6 +95,7 @@ fn freeze(ui: &mut Ui, state: &PanelState, area: Rect, execute: &mut dyn FnMut(C
         (false, None) if state.is_live || state.origin.is_some() => {
             (texts::LIVE, texts::TO_FREEZE, SELECTED, ON_SELECTED)
         }
+        (false, None) if state.cine.count == 0 => (texts::WAITING, texts::TO_FREEZE, BUTTON, TEXT),
         (false, None) => (texts::NEWEST, texts::TO_FREEZE, SELECTED, ON_SELECTED),
         (false, Some(_)) => (texts::HAS_ENDED_BUTTON, texts::TO_FREEZE, BUTTON, TEXT),
     };

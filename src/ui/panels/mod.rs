@@ -473,7 +473,9 @@ pub(super) struct PanelState<'a> {
     pub(super) reading: Option<&'a Reading>,
     /// The list of presets, while it is shown.
     pub(super) presets: Option<PresetsShown<'a>>,
-    /// Every preset, and those that can be kept.
+    /// Small pictures of looks and volumes are made.
+    pub(super) has_small_pictures: bool,
+    /// Every preset.
     pub(super) looks: Vec<PresetTile<'a>>,
     /// Small pictures of the volumes of the loop, as far as they are made.
     pub(super) loop_pictures: &'a [Option<Arc<Picture>>],

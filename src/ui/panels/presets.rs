@@ -4,7 +4,7 @@ use super::colours::{ACCENT, BACKGROUND, BUTTON, EDGE, FAULT, PANEL, TEXT, UNCOL
 use super::names::{self, Tell};
 use super::overlays::{LOW_WINDOW, first};
 use super::walking::Walk;
-use super::{PanelState, SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE};
+use super::{PanelState, ROW_HEIGHT, SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE};
 use crate::command::Command;
 use crate::picture::Picture;
 use crate::texts;
@@ -100,6 +100,9 @@ pub(super) fn show_strip(
             });
         });
         ui.spacing_mut().item_spacing = vec2(6.0, 4.0);
+        if !state.has_small_pictures {
+            return names_of_looks(ui, state, width, execute);
+        }
         let each = (width - 6.0 * (COLUMNS - 1) as f32) / COLUMNS as f32;
         // The others are in the list.
         let all: Vec<(usize, &PresetTile)> = state.looks.iter().enumerate().take(ROWS * COLUMNS).collect();
@@ -127,6 +130,22 @@ pub(super) fn show_strip(
             });
         }
     });
+}
+
+/// The looks by their names, where no pictures are made.
+fn names_of_looks(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+    let size = vec2((width - 12.0) / 3.0, ROW_HEIGHT);
+    let all: Vec<(usize, &PresetTile)> = state.looks.iter().enumerate().take(9).collect();
+    for row in all.chunks(3) {
+        ui.horizontal(|ui| {
+            for (n, tile) in row {
+                let button = Button::new(tile.name).truncate().min_size(size);
+                if ui.add_sized(size, button).tell(tile.hint).named(tile.name).clicked() {
+                    execute(Command::Preset(*n));
+                }
+            }
+        });
+    }
 }
 
 /// A picture, or a dark area while there is none.

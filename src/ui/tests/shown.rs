@@ -202,6 +202,7 @@ impl Shown {
             is_turning: false,
             exporting: Some(("Surface", Some(Progress { done: 12, of: 72 }))),
             presets: self.presets.as_ref().map(|(own, naming)| presets(own, naming.as_deref())),
+            has_small_pictures: true,
             looks: presets(&[], None).tiles,
             loop_pictures: &[],
             is_frozen: self.is_frozen,

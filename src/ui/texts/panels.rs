@@ -62,6 +62,7 @@ pub(crate) fn value_of(name: impl Display) -> String {
     format!("Value of {name}")
 }
 pub(crate) const LIVE: &str = "LIVE";
+pub(crate) const WAITING: &str = "WAITING";
 pub(crate) const NEWEST: &str = "NEWEST";
 pub(crate) const HAS_ENDED_BUTTON: &str = "ENDED";
 pub(crate) const TO_FREEZE: &str = "Space: freeze";
