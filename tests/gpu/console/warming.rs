@@ -25,6 +25,25 @@ impl Desk {
         }
         compiled(device) - before
     }
+
+    /// Ticks until all is drawn, while the pointer moves: a user who acts is not taken to rest, however slow the machine is, so that nothing is compiled in
+    /// advance meanwhile.
+    fn draw_in_use(&mut self) {
+        let begun = Instant::now();
+        let mut still = 0;
+        while still <= 20 {
+            assert!(begun.elapsed() < BOUND, "it is never drawn");
+            self.console.input(&Input::Moved([40.0 + f64::from(still % 2), 36.0]));
+            self.tick(Instant::now() + LATER);
+            let drawn = self.drawn();
+            let stream = self.console.stream();
+            let is_drawn = stream.scene().is_none_or(|scene| scene.settings == drawn);
+            still = if stream.is_idle() && is_drawn { still + 1 } else { 0 };
+            if still > 0 {
+                wait::poll();
+            }
+        }
+    }
 }
 
 /// Prevents a view that makes its user wait for a compiler after the first click on a mode, a layout or a preset's settings.
@@ -39,14 +58,14 @@ fn after_a_rest_no_mode_layout_or_preset_compiles_anything() {
     let count = compiled(&device);
     for mode in Mode::ALL {
         desk.console.execute(&Command::Mode(mode), Instant::now());
-        desk.rest();
+        desk.draw_in_use();
         assert_eq!(desk.console.controls().settings().mode, mode);
         assert_eq!(compiled(&device), count, "{mode:?} is compiled when it is chosen");
     }
     desk.console.execute(&Command::Mode(Mode::Surface), Instant::now());
     for layout in [Layout::Four, Layout::Pair, Layout::Single] {
         desk.console.execute(&Command::Layout(layout), Instant::now());
-        desk.rest();
+        desk.draw_in_use();
         assert_eq!(desk.console.controls().settings().layout, layout);
         assert_eq!(compiled(&device), count, "{layout:?} is compiled when it is chosen");
     }
