@@ -65,10 +65,10 @@ impl GeometryArgs {
         origin
     }
 
-    /// These arguments, completed with those of a workspace.
+    /// These arguments, and where they do not state probe file, depth axis or voxel spacing, those of a workspace. Nothing else is taken from it.
     ///
     /// # Errors
-    /// The axis of the workspace is not valid.
+    /// The axis of the workspace is not valid, even if these arguments state one.
     pub fn or(&self, origin: &Origin) -> Result<GeometryArgs, Failure> {
         let kept = origin.depth_axis.as_deref().map(str::parse).transpose();
         let kept = kept.map_err(|e: String| input(format!("workspace.depth_axis: {e}")))?;

@@ -121,6 +121,8 @@ impl Default for Threshold {
 }
 
 impl Threshold {
+    /// Accepts new times of up to `ratio` times the old ones: 1.05 is five percent slower.
+    ///
     /// # Errors
     /// One line: the ratio is not finite or is below 1.
     pub fn new(ratio: f64) -> Result<Threshold, String> {

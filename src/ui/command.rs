@@ -12,7 +12,7 @@ use crate::scene::{
 use crate::texts::keys;
 use Key::{Char, Function};
 
-/// One command.
+/// What a user asks for, by a key, a gesture or a control.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Command {
     Mode(Mode),

@@ -99,7 +99,7 @@ pub(crate) fn reference_pixel(
     [colour[0], colour[1], colour[2], 1.0]
 }
 
-/// A colour after brightness, contrast, gamma and the colour map.
+/// A colour after contrast, brightness, gamma and the colour map.
 pub fn toned(scene: &Scene, colour: [f64; 3]) -> [f64; 3] {
     let post = &scene.settings.post;
     let toned = colour.map(|c| {

@@ -206,7 +206,7 @@ pub struct Scene {
     pub visible_bounds: visible_bounds::VisibleBounds,
     /// The texels that a renderer stores beyond those that this scene shows, from an earlier scene: [`Scene::keeping`].
     pub kept_bounds: visible_bounds::VisibleBounds,
-    /// The work of stage 1 for other pictures of the same volume: [`Scene::sharing`].
+    /// What stage 1 must serve beyond this scene; none if no other scene draws the same volume: [`Scene::sharing`].
     pub shared: Option<Shared>,
 }
 

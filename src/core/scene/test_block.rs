@@ -4,7 +4,11 @@ use crate::probe::{Geometry, Grid, StoredType};
 use crate::scene::load::Layers;
 use crate::scene::{Input, Scene};
 
-/// The scene of settings `key=value` and a Cartesian volume of bytes, of `size` voxels of 1 mm from (-20, 0, -10) on.
+/// The scene of settings `key=value` and a Cartesian volume of bytes. It has `size` voxels of 1 mm along each axis (lateral, depth, elevation),
+/// the first at (-20, 0, -10) mm.
+///
+/// # Panics
+/// A setting is unknown or out of its range, or no scene can be made of them.
 pub fn block(lines: &[&str], size: [usize; 3]) -> Scene {
     let mut layers = Layers::default();
     lines.iter().for_each(|line| layers.set(line).expect(line));

@@ -9,7 +9,7 @@ const ENTRIES_RANGE: [usize; 2] = [16, 4096];
 /// Largest table of pre-integrated compositing, which has its square: 16 MiB.
 const MAX_PRE_INTEGRATED: usize = 1024;
 
-/// Absorption of a fully opaque voxel, in place of the infinite -ln(1 - a): e^-1e6 is 0 in any float format.
+/// Absorption of opacity 1 over one reference length, in place of the infinite -ln(1 - a): e^-1e6 is 0 in any float format.
 pub const OPAQUE: f64 = 1e6;
 
 /// Absorption kappa of opacity a over one reference length: min(-ln(1 - a), 1e6). `ln_1p` keeps all digits of a small a, unlike
@@ -18,8 +18,8 @@ pub fn absorption(opacity: f64) -> f64 {
     (-(-opacity.clamp(0.0, 1.0)).ln_1p()).min(OPAQUE)
 }
 
-/// How opacities of the transfer function become absorption, whatever the values between which they are interpolated: what tables, exact
-/// rays and proven bounds have in common.
+/// The rule by which an opacity of the transfer function becomes absorption. Look-up tables, exact rays and proven bounds take the same rule,
+/// though they interpolate between different values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Absorption {
     /// Absorption per mm of opacity 1, in proportion to the opacity; none: opacities are those of one reference length.

@@ -90,8 +90,9 @@ const CHOICES: [&str; 53] = [
     "mode = 'vr'\nvolume.shading = 'depth-coded'",
 ];
 
-/// Every mode, layout and preset that a user may switch to from these settings, beginning with these. A preset is laid over them. `follow`
-/// adds the settings that follow from another mode or layout.
+/// The settings that a user may switch to from these by one choice, beginning with these: each mode alone, each mode that casts rays in a 4-up
+/// picture too, the pair of surface and volume, and each preset laid over these. `follow` adds the settings that follow from another mode or
+/// layout; presets do not go through it.
 pub fn switches(from: &Settings, follow: impl Fn(Settings) -> Settings) -> Vec<Variant> {
     let mut variants = vec![Variant::new("as it is", from.clone())];
     for (mode, name) in MODES {

@@ -28,7 +28,7 @@ impl VisibleBounds {
         (0..3).any(|a| self.low[a] >= self.high[a])
     }
 
-    /// True if `other` lies within these bounds.
+    /// True if `other` lies within these bounds. An empty box lies within any bounds.
     pub fn holds(&self, other: &VisibleBounds) -> bool {
         other.is_empty() || (0..3).all(|a| self.low[a] <= other.low[a] && other.high[a] <= self.high[a])
     }
@@ -37,7 +37,7 @@ impl VisibleBounds {
         self.low[2]..self.high[2]
     }
 
-    /// The smallest bounds that contain both.
+    /// The smallest bounds that contain both; an empty box adds nothing.
     pub fn with(self, other: VisibleBounds) -> VisibleBounds {
         if self.is_empty() || other.is_empty() {
             return if self.is_empty() { other } else { self };
@@ -49,7 +49,8 @@ impl VisibleBounds {
     }
 }
 
-/// The work of stage 1 for pictures of a volume that are drawn alternately: those of a view at rest and of the same view in motion.
+/// What one run of stage 1 must serve if several scenes draw the same volume alternately, such as a view at rest and in motion:
+/// [`Scene::sharing`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shared {
     /// Step along a ray of the picture at rest, mm.
@@ -60,7 +61,7 @@ pub struct Shared {
     pub(super) taps: f64,
 }
 
-/// Columns and rows of a slice.
+/// A rectangle of texels of a slice: its first column and row, and the number of its columns and rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rectangle {
     pub first: [u32; 2],

@@ -4,12 +4,14 @@
 use super::module::{BOUND, HEADER_WORDS, Instruction, SpirvError, decode, encode, error, op, text};
 use std::collections::HashSet;
 
-/// Instructions of GLSL.std.450.
+/// Number of the instruction FMin in the extended set GLSL.std.450: the smaller of two floats.
 pub const FMIN: u32 = 37;
+/// Number of FMax in that set: the larger of two floats.
 pub const FMAX: u32 = 40;
 
-/// Opcodes of float arithmetic.
+/// Opcode of the addition of floats.
 pub const F_ADD: u32 = op::F_ADD;
+/// Opcode of the subtraction of floats.
 pub const F_SUB: u32 = op::F_SUB;
 
 /// The module with the last instruction `from` of the extended set replaced by `to`, which takes the same operands.

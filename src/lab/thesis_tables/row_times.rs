@@ -247,7 +247,8 @@ fn grain(number: u64) -> f64 {
     sum * 3f64.sqrt()
 }
 
-/// The frames of one volume, u8 for 0..1.
+/// The frames of one volume of the tables' test object: a ball in fluid in front of a wall, with a fine grain. Each has `lines` scan lines of
+/// [`SAMPLES`] samples, the samples of a line in a row, as u8 for 0..1. `frames` and `lines` must be at least 2.
 pub fn sweep_frames(frames: usize, lines: usize) -> Vec<Frame> {
     let probe = sweep_probe(frames, lines);
     let sample = |slice: usize, line: usize, sample: usize| {

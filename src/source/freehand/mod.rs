@@ -228,8 +228,8 @@ impl Compounder {
         changed
     }
 
-    /// A slice as of the last [`Compounder::changed_slices`]: rows of depth, lateral fastest, little-endian. Zero where there are no pixels;
-    /// `None` beyond the last slice.
+    /// Slice `k` as of the last [`Compounder::changed_slices`]: the lattice's rows x columns voxels, rows of depth, lateral fastest, each of the
+    /// type [`Compounder::stored`], little-endian. Zero where there are no pixels. `None` beyond the last slice.
     pub fn slice(&self, k: usize) -> Option<&[u8]> {
         self.slices.get(k).map(|slice| if slice.is_empty() { &self.zero[..] } else { &slice[..] })
     }

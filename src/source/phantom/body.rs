@@ -273,7 +273,7 @@ impl Scatterers {
         }
     }
 
-    /// The echo of each sample of a line.
+    /// Writes the echoes of the samples of a line, in dB re full scale, from sample 0 on: as many as `out` holds.
     pub fn along(&self, beam: &Beam, out: &mut [Echo]) {
         match self {
             Scatterers::Head(head) => head.along(beam, out),

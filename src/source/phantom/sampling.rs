@@ -34,7 +34,7 @@ impl PointSpread {
     }
 }
 
-/// Named sets of options.
+/// Named sets of [`PhantomOptions`]: how densely the head is scanned, how wide the beam is, and whether the fetus moves.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Sampling {
     /// What a live probe acquires in under a second: 37 frames of 128 lines.

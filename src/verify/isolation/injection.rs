@@ -66,7 +66,8 @@ impl InjectedCrash {
         }
     }
 
-    /// Replaces the work of the check with the crash. Returns false if there is no such check.
+    /// Replaces the work of the named check with the crash, or with the failure that `flake` and `unsynchronized` stand for. Returns false if no
+    /// check has that name. With `start`, which [`InjectedCrash::at_start`] serves, all checks stay and it returns true.
     pub fn inject(&self, checks: &mut [Check]) -> bool {
         if self.check == START {
             return true;

@@ -54,10 +54,13 @@ pub struct Workers<'a> {
 }
 
 impl<'a> Workers<'a> {
-    /// Starts the first worker.
+    /// Starts the first worker with `command`, and waits until it has opened the device. `limit` is the time limit of a check; that of this start
+    /// is the same, but at least one minute and at most ten. `signal` is asked during waits and ends them. `echo` gets what a worker prints
+    /// outside the protocol.
     ///
     /// # Errors
-    /// The program cannot be started, there is no device, or the driver crashes when it is opened.
+    /// The program cannot be started, refuses its arguments, finds no device or does not open it in time, the driver crashes when it is opened, or
+    /// a signal came.
     pub fn start(
         command: &'a dyn Fn() -> Command,
         limit: Duration,

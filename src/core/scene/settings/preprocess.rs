@@ -77,7 +77,7 @@ impl Conditioning {
     }
 }
 
-/// Stage 1: how a frame becomes a slice. The filters run in the order of their keys.
+/// Stage 1: how a frame becomes a slice. The filters run in the order in which they are listed.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Slices {

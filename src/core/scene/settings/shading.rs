@@ -8,7 +8,7 @@ use crate::scene::{MAX_WINDOW, Settings};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-/// Stage 3: edge-preserving filters of the distance map, in the order of their keys.
+/// Stage 3: edge-preserving filters of the distance map, which run in the order in which they are listed.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Distance {
@@ -307,7 +307,7 @@ impl Default for Skin {
     }
 }
 
-/// Stage 4, postprocessing. The filters run in the order of their keys, then contrast, brightness, gamma and the colour map.
+/// Stage 4, postprocessing. The filters run in the order in which they are listed, then contrast, brightness, gamma and the colour map.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Post {
