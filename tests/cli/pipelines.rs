@@ -157,7 +157,7 @@ fn a_cache_is_written_used_and_replaced_where_it_is_damaged() {
         (good[..20].to_vec(), "cut off"),
         (
             b"something else that is long enough to have a header, with more and more text after it".to_vec(),
-            "no pipeline",
+            "not a pipeline cache",
         ),
         (vec![], "cut off"),
     ] {
