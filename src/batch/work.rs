@@ -314,8 +314,7 @@ impl Worker<'_> {
                 Made { bytes: None, written, figures, agreement: None }
             }
             Contents::Figures(figures) => {
-                let mut text = serde_json::to_vec_pretty(&figures).map_err(|e| Fault::Failed(e.to_string()))?;
-                text.push(b'\n');
+                let text = stated("echolume-figures-1", &figures)?;
                 Made { figures, ..Made::of(text) }
             }
         };
@@ -375,9 +374,17 @@ fn verified(picture: &Picture, findings: crate::verify::Findings) -> Result<Made
     let mut all = Map::new();
     all.insert("picture".into(), json!([picture.width, picture.height]));
     all.insert("against_reference".into(), figures.into());
+    let text = stated("echolume-verified-1", &all)?;
+    Ok(Made { figures: all, ..Made::of(text) })
+}
+
+/// Figures as a file that states its format.
+fn stated(format: &str, figures: &Map<String, Value>) -> Result<Vec<u8>, Fault> {
+    let mut all = figures.clone();
+    all.insert("format".into(), format.into());
     let mut text = serde_json::to_vec_pretty(&all).map_err(|e| Fault::Failed(e.to_string()))?;
     text.push(b'\n');
-    Ok(Made { figures: all, ..Made::of(text) })
+    Ok(text)
 }
 
 fn of_device(error: GpuError) -> Fault {

@@ -8,6 +8,9 @@ use crate::scene::Scene;
 use glam::DVec3;
 use serde_json::{Value, json};
 
+/// What the files beside the arrays state, with the version.
+const FORMAT: &str = "echolume dump 1";
+
 /// Width and height of a drawn table, pixels.
 const GRAPH: [usize; 2] = [512, 256];
 
@@ -127,6 +130,7 @@ pub fn array(slot: Slot, texels: Option<&Texels>, scene: &Scene) -> (Vec<u8>, Va
     let is_bits = matches!(slot.format(scene), Format::R32u | Format::Rg32u);
     let bytes = npy(&kept.iter().map(|(_, n)| *n).collect::<Vec<_>>(), &values, is_bits);
     let mut about = json!({
+        "format": FORMAT,
         "slot": slot.name(),
         "axes": kept.iter().map(|(axis, _)| *axis).collect::<Vec<_>>(),
         "channels": channels.iter().take(shape[3]).collect::<Vec<_>>(),
@@ -167,7 +171,7 @@ pub fn scene_description(scene: &Scene) -> Value {
     let at = |v: DVec3| json!([v.x, v.y, v.z]);
     let rays = &scene.rays;
     json!({
-        "format": "echolume dump 1",
+        "format": FORMAT,
         "space": "mm; x lateral, y depth, z elevation; y is 0 at the apex of a curved array and at the face of a linear one",
         "geometry": match &scene.geometry {
             Geometry::Sweep(probe) => json!({"sweep": probe}),

@@ -32,7 +32,7 @@ impl PlusConfig {
     }
 
     fn parse(path: &Path, text: &str) -> Result<PlusConfig, InputError> {
-        let options = ParsingOptions { allow_dtd: false, nodes_limit: MAX_NODES };
+        let options = ParsingOptions { allow_dtd: false, nodes_limit: MAX_NODES, ..ParsingOptions::default() };
         let document = Document::parse_with_options(text, options)
             .map_err(|e| InputError::new(path, "file", format!("is no XML: {e}")))?;
         let fault = |field: &str, fault: String| InputError::new(path, field, fault);

@@ -36,6 +36,7 @@ mod soak;
 mod start_curve;
 mod still;
 mod stored_reports;
+mod stored_versions;
 mod supply;
 mod unveil;
 mod user_presets;

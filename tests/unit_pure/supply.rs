@@ -42,14 +42,15 @@ fn words(value: &toml::Value) -> Vec<String> {
     value.as_array().expect("a list").iter().map(|word| word.as_str().expect("a word").to_string()).collect()
 }
 
+fn asked(program: &str, arguments: &[&str]) -> String {
+    let output = Command::new(program).args(arguments).current_dir(repository("")).output();
+    let output = output.expect("it can be started");
+    assert!(output.status.success(), "{program}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).expect("text")
+}
+
 /// The crates that are built on this machine: the others are not downloaded.
 fn packages() -> Vec<Package> {
-    let asked = |program: &str, arguments: &[&str]| {
-        let output = Command::new(program).args(arguments).current_dir(repository("")).output();
-        let output = output.expect("it can be started");
-        assert!(output.status.success(), "{program}: {}", String::from_utf8_lossy(&output.stderr));
-        String::from_utf8(output.stdout).expect("text")
-    };
     let version = asked("rustc", &["-vV"]);
     let host = version.lines().find_map(|line| line.strip_prefix("host: ")).expect("a host");
     let about = ["metadata", "--format-version", "1", "--offline", "--locked", "--filter-platform", host];
@@ -183,4 +184,36 @@ fn the_python_module_is_of_this_version_and_knows_the_presets() {
     let line = types.lines().find(|line| line.starts_with("Preset = ")).expect("the type of presets");
     let named: Vec<&str> = line.split('"').skip(1).step_by(2).collect();
     assert_eq!(named, echolume::low_level::scene::load::PRESETS.iter().map(|preset| preset.0).collect::<Vec<_>>());
+}
+
+/// Prevents pictures and recordings that a build does not need from going with every copy of the sources.
+#[test]
+fn the_package_is_under_10_mb_and_has_what_a_build_needs() {
+    let files = asked(env!("CARGO"), &["package", "--list", "--allow-dirty", "--offline"]);
+    // Cargo makes some of them.
+    let size = |name: &str| std::fs::metadata(repository(name)).map_or(0, |about| about.len());
+    let sizes: u64 = files.lines().map(size).sum();
+    assert!((1_000_000..10_000_000).contains(&sizes), "{sizes} bytes");
+    for needed in ["src/main.rs", "spirv/embedded.rs", "spirv/SOURCES", "docs/licences/lucide.txt", "CITATION.cff"] {
+        assert!(files.lines().any(|name| name == needed), "{needed} is left out");
+    }
+    println!("{} files, {sizes} bytes", files.lines().count());
+}
+
+/// What a user cites is what was built.
+#[test]
+fn the_citation_has_the_version_of_the_program() {
+    let citation = std::fs::read_to_string(repository("CITATION.cff")).expect("CITATION.cff");
+    let of = |key: &str| {
+        let mut values = citation.lines().filter_map(|line| line.strip_prefix(key)?.strip_prefix(": "));
+        values.next().unwrap_or_else(|| panic!("CITATION.cff has no {key}")).to_string()
+    };
+    let manifest: toml::Table = toml("Cargo.toml");
+    assert_eq!(manifest["workspace"]["package"]["version"].as_str(), Some(of("version").as_str()));
+    assert_eq!((of("cff-version").as_str(), of("type").as_str()), ("1.2.0", "software"));
+    // The keys that the format requires.
+    for key in ["message", "title"] {
+        assert!(of(key).len() > 10, "{key}");
+    }
+    assert!(citation.contains("\nauthors:\n  - name: "), "CITATION.cff has no authors");
 }

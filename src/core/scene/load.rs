@@ -1,5 +1,6 @@
 //! Layers of settings: defaults, presets, a scene file and the command line. Each layer overrides the one before.
 
+use super::file_version::FileVersion;
 use super::look::is_look;
 use super::{Settings, TransferPoint};
 use crate::files;
@@ -168,7 +169,10 @@ impl Layers {
 
     fn add(&mut self, layer: &str, text: &str, folder: Option<&Path>) -> Result<(), LoadError> {
         let fault = |e: &NodeError| LoadError::Layer { layer: layer.into(), fault: one_line(e, text) };
-        let table = toml::from_str::<Table>(text).map_err(|e| fault(&e.into()))?;
+        let mut table = toml::from_str::<Table>(text).map_err(|e| fault(&e.into()))?;
+        if let Some(version) = table.remove("version") {
+            FileVersion::deserialize(version).map_err(|e| fault(&NodeError::from(e)))?;
+        }
         // Check this layer alone first: only then can a message name its line.
         if transfer_file(&table).is_none() {
             let mut without_none = Table::new();

@@ -2,7 +2,7 @@
 //! the 14,000 instructions of the surface ray caster 2,000 are left. A validation layer and lavapipe process every instruction of each
 //! pipeline.
 
-use super::module::{HEADER_WORDS, Instruction, SpirvError, decode, encode, error, op};
+use super::module::{HEADER_WORDS, Instruction, Op, SpirvError, decode, encode, error};
 use std::collections::{HashMap, HashSet};
 
 /// The module without branches that its constants never take, and without values that nothing uses. It computes the same.
@@ -11,7 +11,7 @@ use std::collections::{HashMap, HashSet};
 /// A module that breaks the format.
 pub fn remove_dead_code(words: &[u32]) -> Result<Vec<u32>, SpirvError> {
     let instructions = decode(words)?;
-    let Some(begin) = instructions.iter().position(|i| i.opcode == op::FUNCTION) else {
+    let Some(begin) = instructions.iter().position(|i| i.opcode == Op::Function) else {
         return Ok(words.to_vec());
     };
     let (head, code) = instructions.split_at(begin);
@@ -21,7 +21,7 @@ pub fn remove_dead_code(words: &[u32]) -> Result<Vec<u32>, SpirvError> {
     let removed = &results(code) - &kept.iter().filter_map(|(opcode, words)| result_of(*opcode, words)).collect();
     let mut out = words[..HEADER_WORDS].to_vec();
     for i in head {
-        let is_about = matches!(i.opcode, op::NAME | op::DECORATE);
+        let is_about = matches!(i.opcode, Op::Name | Op::Decorate);
         if !is_about || i.operands.first().is_none_or(|of| !removed.contains(of)) {
             out.extend(encode(i.opcode, i.operands));
         }
@@ -33,15 +33,15 @@ pub fn remove_dead_code(words: &[u32]) -> Result<Vec<u32>, SpirvError> {
 /// A constant and its value: 1 for true.
 fn known(i: &Instruction) -> Option<(u32, u32)> {
     match (i.opcode, i.operands) {
-        (op::CONSTANT_TRUE, [_, id]) => Some((*id, 1)),
-        (op::CONSTANT_FALSE, [_, id]) => Some((*id, 0)),
-        (op::CONSTANT, [_, id, value]) => Some((*id, *value)),
+        (Op::ConstantTrue, [_, id]) => Some((*id, 1)),
+        (Op::ConstantFalse, [_, id]) => Some((*id, 0)),
+        (Op::Constant, [_, id, value]) => Some((*id, *value)),
         _ => None,
     }
 }
 
 /// An instruction of the new module.
-type Code = (u32, Vec<u32>);
+type Code = (Op, Vec<u32>);
 
 /// Where control goes after a block.
 struct Exit {
@@ -66,11 +66,11 @@ fn exit(code: &[Instruction], known: &HashMap<u32, u32>) -> Result<Exit, SpirvEr
     let before = code.len().checked_sub(2).map(|n| &code[n]);
     let (mut stubs, mut continues) = (Vec::new(), None);
     let is_selection = match before.map(|i| (i.opcode, i.operands)) {
-        Some((op::SELECTION_MERGE, [merge, ..])) => {
+        Some((Op::SelectionMerge, [merge, ..])) => {
             stubs.push(*merge);
             true
         }
-        Some((op::LOOP_MERGE, [merge, next, ..])) => {
+        Some((Op::LoopMerge, [merge, next, ..])) => {
             stubs.push(*merge);
             continues = Some(*next);
             false
@@ -79,32 +79,32 @@ fn exit(code: &[Instruction], known: &HashMap<u32, u32>) -> Result<Exit, SpirvEr
     };
     let mut written = (last.opcode, last.operands.to_vec());
     let targets = match (last.opcode, last.operands) {
-        (op::BRANCH, [to]) => vec![*to],
-        (op::BRANCH_CONDITIONAL, [condition, yes, no, ..]) => match known.get(condition) {
+        (Op::Branch, [to]) => vec![*to],
+        (Op::BranchConditional, [condition, yes, no, ..]) => match known.get(condition) {
             Some(value) if continues.is_none() => {
                 let (taken, dead) = if *value == 1 { (*yes, *no) } else { (*no, *yes) };
                 if is_selection {
                     // The selection stays, and so does the form of the code around it.
                     stubs.push(dead);
                 } else {
-                    written = (op::BRANCH, vec![taken]);
+                    written = (Op::Branch, vec![taken]);
                 }
                 vec![taken]
             }
             _ => vec![*yes, *no],
         },
-        (op::SWITCH, [selector, default, cases @ ..]) => match known.get(selector) {
+        (Op::Switch, [selector, default, cases @ ..]) => match known.get(selector) {
             Some(value) => {
                 let case = cases.chunks_exact(2).find(|case| case[0] == *value);
                 let taken = case.map_or(*default, |case| case[1]);
-                written = (op::SWITCH, vec![*selector, taken]);
+                written = (Op::Switch, vec![*selector, taken]);
                 vec![taken]
             }
             // Selectors of 32 bits, as in every shader of this project.
             None => cases.chunks_exact(2).map(|case| case[1]).chain([*default]).collect(),
         },
-        (op::KILL | op::RETURN | op::RETURN_VALUE | op::UNREACHABLE, _) => Vec::new(),
-        _ => return error(format!("a block ends with operation {}", last.opcode)),
+        (Op::Kill | Op::Return | Op::ReturnValue | Op::Unreachable, _) => Vec::new(),
+        _ => return error(format!("a block ends with operation {:?}", last.opcode)),
     };
     Ok(Exit { code: written, targets, stubs, continues })
 }
@@ -112,10 +112,10 @@ fn exit(code: &[Instruction], known: &HashMap<u32, u32>) -> Result<Exit, SpirvEr
 /// The blocks of functions, each from its label to before its exit.
 fn blocks<'a>(code: &'a [Instruction<'a>], known: &HashMap<u32, u32>) -> Result<Vec<Block<'a>>, SpirvError> {
     let mut found = Vec::new();
-    let starts = code.iter().enumerate().filter(|(_, i)| i.opcode == op::LABEL);
+    let starts = code.iter().enumerate().filter(|(_, i)| i.opcode == Op::Label);
     for (start, i) in starts {
         let [label] = i.operands else { return error("a label without a name") };
-        let is_end = |i: &Instruction| (op::BRANCH..=op::UNREACHABLE).contains(&i.opcode);
+        let is_end = |i: &Instruction| (Op::Branch..=Op::Unreachable).contains(&i.opcode);
         let Some(length) = code[start..].iter().position(is_end) else { return error("a block without an end") };
         let exit = exit(&code[start + 1..=start + length], known)?;
         found.push(Block { label: *label, code: &code[start..start + length], exit });
@@ -128,8 +128,8 @@ fn without_dead_blocks(code: &[Instruction], known: &HashMap<u32, u32>) -> Resul
     let blocks = blocks(code, known)?;
     let by_label: HashMap<u32, &Block> = blocks.iter().map(|block| (block.label, block)).collect();
     let entries = code.iter().scan(false, |in_function, i| {
-        let is_entry = i.opcode == op::LABEL && !*in_function;
-        *in_function = (*in_function || is_entry) && i.opcode != op::FUNCTION_END;
+        let is_entry = i.opcode == Op::Label && !*in_function;
+        *in_function = (*in_function || is_entry) && i.opcode != Op::FunctionEnd;
         Some((is_entry, i))
     });
     let mut ahead: Vec<u32> = entries.filter(|(is_entry, _)| *is_entry).map(|(_, i)| i.operands[0]).collect();
@@ -146,7 +146,7 @@ fn without_dead_blocks(code: &[Instruction], known: &HashMap<u32, u32>) -> Resul
     // A label that is reached from elsewhere stays a target of a branch that does not go there.
     let targets = |block: &Block| -> Vec<u32> {
         let kept = block.exit.code.1.iter().filter(|to| block.exit.stubs.contains(to) && reached.contains(to));
-        let kept = kept.filter(|_| block.exit.code.0 == op::BRANCH_CONDITIONAL);
+        let kept = kept.filter(|_| block.exit.code.0 == Op::BranchConditional);
         block.exit.targets.iter().chain(kept).copied().collect()
     };
     let mut from: HashMap<u32, HashSet<u32>> = HashMap::new();
@@ -160,17 +160,17 @@ fn without_dead_blocks(code: &[Instruction], known: &HashMap<u32, u32>) -> Resul
     let mut at = blocks.iter();
     for i in code {
         match i.opcode {
-            op::LABEL => {
+            Op::Label => {
                 is_inside = true;
                 let Some(block) = at.next() else { return error("a label too many") };
                 if reached.contains(&block.label) {
                     out.extend(block.code.iter().map(|i| live(i, from.get(&block.label).unwrap_or(&nowhere))));
                     out.push(block.exit.code.clone());
                 } else if stubs.contains(&block.label) {
-                    out.extend([(op::LABEL, vec![block.label]), (op::UNREACHABLE, Vec::new())]);
+                    out.extend([(Op::Label, vec![block.label]), (Op::Unreachable, Vec::new())]);
                 }
             }
-            op::FUNCTION_END => {
+            Op::FunctionEnd => {
                 is_inside = false;
                 out.push((i.opcode, Vec::new()));
             }
@@ -183,11 +183,11 @@ fn without_dead_blocks(code: &[Instruction], known: &HashMap<u32, u32>) -> Resul
 
 /// An instruction of a block that is reached from these.
 fn live(i: &Instruction, from: &HashSet<u32>) -> Code {
-    let (op::PHI, [of, id, pairs @ ..]) = (i.opcode, i.operands) else {
+    let (Op::Phi, [of, id, pairs @ ..]) = (i.opcode, i.operands) else {
         return (i.opcode, i.operands.to_vec());
     };
     let kept = pairs.chunks_exact(2).filter(|pair| from.contains(&pair[1])).flatten();
-    (op::PHI, [*of, *id].iter().chain(kept).copied().collect())
+    (Op::Phi, [*of, *id].iter().chain(kept).copied().collect())
 }
 
 /// The value of an instruction within a function.
@@ -195,30 +195,30 @@ fn result(i: &Instruction) -> Option<u32> {
     result_of(i.opcode, i.operands)
 }
 
-fn result_of(opcode: u32, operands: &[u32]) -> Option<u32> {
+fn result_of(opcode: Op, operands: &[u32]) -> Option<u32> {
     match opcode {
-        op::LABEL => operands.first().copied(),
-        op::VARIABLE => operands.get(1).copied(),
+        Op::Label => operands.first().copied(),
+        Op::Variable => operands.get(1).copied(),
         _ if is_pure(opcode) => operands.get(1).copied(),
         _ => None,
     }
 }
 
 /// True of operations that do nothing but make a value. Functions of GLSL that write through a pointer are none of this project's.
-fn is_pure(opcode: u32) -> bool {
-    matches!(
-        opcode,
-        op::UNDEF | op::LOAD | op::EXT_INST | op::ARRAY_LENGTH | op::COPY_OBJECT | op::PHI | op::SAMPLED_IMAGE
-            // Access chains, vectors and composites, images, conversions, arithmetic, comparisons, bits.
-            | op::ACCESS_CHAIN..=op::PTR_ACCESS_CHAIN
-            | op::VECTOR_EXTRACT_DYNAMIC..=op::TRANSPOSE
-            | op::IMAGE_SAMPLE_EXPLICIT_LOD..=op::IMAGE_READ
-            | op::IMAGE..=op::IMAGE_QUERY_SAMPLES
-            | op::CONVERT_F_TO_U..=op::BITCAST
-            | op::S_NEGATE..=op::S_MUL_EXTENDED
-            | op::ANY..=op::F_UNORD_GREATER_THAN_EQUAL
-            | op::SHIFT_RIGHT_LOGICAL..=op::BIT_COUNT
-    )
+fn is_pure(opcode: Op) -> bool {
+    // Access chains, vectors and composites, images, conversions, arithmetic, comparisons, bits.
+    let runs = [
+        Op::AccessChain..=Op::PtrAccessChain,
+        Op::VectorExtractDynamic..=Op::Transpose,
+        Op::ImageSampleExplicitLod..=Op::ImageRead,
+        Op::Image..=Op::ImageQuerySamples,
+        Op::ConvertFToU..=Op::Bitcast,
+        Op::SNegate..=Op::SMulExtended,
+        Op::Any..=Op::FUnordGreaterThanEqual,
+        Op::ShiftRightLogical..=Op::BitCount,
+    ];
+    let others = [Op::Undef, Op::Load, Op::ExtInst, Op::ArrayLength, Op::CopyObject, Op::Phi, Op::SampledImage];
+    others.contains(&opcode) || runs.iter().any(|run| run.contains(&opcode))
 }
 
 /// The code without values that nothing uses. A literal that looks like a value keeps one too many at worst.
@@ -256,7 +256,7 @@ mod tests {
     }
 
     fn code(words: &[u32]) -> Vec<Instruction<'_>> {
-        decode(words).unwrap().into_iter().skip_while(|i| i.opcode != op::FUNCTION).collect()
+        decode(words).unwrap().into_iter().skip_while(|i| i.opcode != Op::Function).collect()
     }
 
     /// Every shader, with all constants as they are, 0, 1 and 2: what is left has the form of a module, and stays what it is the second time.
@@ -272,13 +272,13 @@ mod tests {
                 let code = code(&pruned);
                 let from = predecessors(&code);
                 let labels: HashSet<u32> =
-                    code.iter().filter(|i| i.opcode == op::LABEL).map(|i| i.operands[0]).collect();
+                    code.iter().filter(|i| i.opcode == Op::Label).map(|i| i.operands[0]).collect();
                 assert_eq!(labels, from.keys().copied().collect(), "{name} {value:?}: targets without a label");
                 let mut block = 0;
                 for i in &code {
                     match (i.opcode, i.operands) {
-                        (op::LABEL, [label]) => block = *label,
-                        (op::PHI, [_, _, pairs @ ..]) => {
+                        (Op::Label, [label]) => block = *label,
+                        (Op::Phi, [_, _, pairs @ ..]) => {
                             let of: HashSet<u32> = pairs.chunks_exact(2).map(|pair| pair[1]).collect();
                             assert_eq!(of, from[&block], "{name} {value:?}: a phi of block {block}");
                         }
@@ -294,11 +294,11 @@ mod tests {
     fn a_variant_of_the_ray_caster_is_a_quarter_of_its_code() {
         let whole = specialize(&words(embedded("raycast/surface").unwrap()), &[]).unwrap();
         let pruned = remove_dead_code(&whole).unwrap();
-        let count = |words: &[u32], opcode: Option<u32>| {
+        let count = |words: &[u32], opcode: Option<Op>| {
             code(words).iter().filter(|i| opcode.is_none_or(|of| i.opcode == of)).count()
         };
         assert!(4 * count(&pruned, None) < count(&whole, None), "{}", count(&pruned, None));
-        let writes = [&whole, &pruned].map(|words| count(words, Some(op::IMAGE_WRITE)));
+        let writes = [&whole, &pruned].map(|words| count(words, Some(Op::ImageWrite)));
         assert!(writes[1] > 0 && writes[1] <= writes[0], "{writes:?}");
     }
 

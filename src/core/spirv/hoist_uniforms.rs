@@ -4,7 +4,7 @@
 //! is made.
 
 use super::module::{
-    BOUND, HEADER_WORDS, Instruction, MAX_BOUND, SpirvError, decode, encode, error, op, storage_class,
+    BOUND, HEADER_WORDS, Instruction, MAX_BOUND, Op, SpirvError, decode, encode, error, storage_class,
 };
 use std::collections::{HashMap, HashSet};
 
@@ -39,19 +39,19 @@ pub(crate) fn hoist_uniforms(words: &[u32]) -> Result<Vec<u32>, SpirvError> {
     for i in &instructions {
         let a = i.operands;
         // The loads go after the function's first label and its variables.
-        let is_head = !in_function || matches!(i.opcode, op::LINE | op::VARIABLE | op::LABEL | op::NO_LINE);
+        let is_head = !in_function || matches!(i.opcode, Op::Line | Op::Variable | Op::Label | Op::NoLine);
         if in_function && !is_head && !is_loaded {
             is_loaded = true;
             for member in &loads.members {
                 let chain = [&[member.pointer_type, bound][..], &member.path].concat();
-                out.extend(encode(op::ACCESS_CHAIN, &chain));
-                out.extend(encode(op::LOAD, &[member.value_type, bound + 1, bound]));
+                out.extend(encode(Op::AccessChain, &chain));
+                out.extend(encode(Op::Load, &[member.value_type, bound + 1, bound]));
                 bound += 2;
             }
         }
-        in_function |= i.opcode == op::LABEL;
+        in_function |= i.opcode == Op::Label;
         match loads.member(i).and_then(|member| values.get(&member)) {
-            Some(value) => out.extend(encode(op::COPY_OBJECT, &[a[0], a[1], *value])),
+            Some(value) => out.extend(encode(Op::CopyObject, &[a[0], a[1], *value])),
             None => out.extend(encode(i.opcode, a)),
         }
     }
@@ -74,17 +74,17 @@ impl UniformLoads {
         let (mut constants, mut blocks, mut found) = (HashSet::new(), HashSet::new(), HashSet::new());
         for i in instructions {
             match (i.opcode, i.operands) {
-                (op::CONSTANT, [_, id, ..]) => drop(constants.insert(*id)),
-                (op::VARIABLE, [_, id, storage_class::UNIFORM, ..]) => drop(blocks.insert(*id)),
-                (op::FUNCTION, _) => loads.functions += 1,
-                (op::ACCESS_CHAIN | op::IN_BOUNDS_ACCESS_CHAIN, [pointer, id, path @ ..])
+                (Op::Constant, [_, id, ..]) => drop(constants.insert(*id)),
+                (Op::Variable, [_, id, storage_class::UNIFORM, ..]) => drop(blocks.insert(*id)),
+                (Op::Function, _) => loads.functions += 1,
+                (Op::AccessChain | Op::InBoundsAccessChain, [pointer, id, path @ ..])
                     if path.split_first().is_some_and(|(base, indices)| {
                         blocks.contains(base) && indices.iter().all(|index| constants.contains(index))
                     }) =>
                 {
                     loads.chains.insert(*id, (*pointer, path.to_vec()));
                 }
-                (op::LOAD, _) => {
+                (Op::Load, _) => {
                     if let Some(member) = loads.member(i)
                         && found.insert(member.clone())
                     {
@@ -100,7 +100,7 @@ impl UniformLoads {
     /// The member that an instruction loads. Loads with memory access operands are left alone.
     fn member(&self, i: &Instruction) -> Option<Member> {
         match (i.opcode, i.operands) {
-            (op::LOAD, [value_type, _, from]) => self.chains.get(from).map(|(pointer_type, path)| Member {
+            (Op::Load, [value_type, _, from]) => self.chains.get(from).map(|(pointer_type, path)| Member {
                 value_type: *value_type,
                 pointer_type: *pointer_type,
                 path: path.clone(),
@@ -116,15 +116,11 @@ mod tests {
     use crate::spirv::module::{EMBEDDED, embedded, malformed, words};
     use crate::spirv::reflect::reflect;
 
-    /// The first and the last of the branch and return instructions.
-    const BRANCH: u32 = 249;
-    const RETURN_VALUE: u32 = 254;
-
     /// Loads of uniform blocks before the first branch and after it.
     fn count_loads(words: &[u32]) -> (usize, usize) {
         let instructions = decode(words).unwrap();
         let loads = UniformLoads::find(&instructions);
-        let first = instructions.iter().position(|i| (BRANCH..=RETURN_VALUE).contains(&i.opcode)).unwrap();
+        let first = instructions.iter().position(|i| (Op::Branch..=Op::ReturnValue).contains(&i.opcode)).unwrap();
         let count = |part: &[Instruction]| part.iter().filter(|i| loads.member(i).is_some()).count();
         (count(&instructions[..first]), count(&instructions[first..]))
     }
@@ -139,7 +135,7 @@ mod tests {
             assert_eq!(count_loads(&after), (members, 0), "{name}");
             let (old, new) = (decode(&before).unwrap(), decode(&after).unwrap());
             assert_eq!(new.len(), old.len() + 2 * members, "{name}");
-            let kept = |i: &&Instruction| !matches!(i.opcode, op::LOAD | op::ACCESS_CHAIN | op::COPY_OBJECT);
+            let kept = |i: &&Instruction| !matches!(i.opcode, Op::Load | Op::AccessChain | Op::CopyObject);
             let same = old.iter().filter(kept).zip(new.iter().filter(kept));
             assert!(same.clone().count() > 0 && same.into_iter().all(|(o, n)| o.operands == n.operands), "{name}");
         }

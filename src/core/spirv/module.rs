@@ -1,130 +1,38 @@
-//! A SPIR-V module as words: the embedded shaders, and the decoding and encoding of instructions. Numbers are those of the
-//! SPIR-V 1.5 specification.
+//! A SPIR-V module as words: the embedded shaders, and the decoding and encoding of instructions. Operations are those of the
+//! SPIR-V specification, whose registry the crate `spirv` is made from.
+
+pub(super) use ::spirv::Op;
 
 /// Every embedded shader: its name and variant, and its words as bytes.
 pub const EMBEDDED: &[(&str, &[u8])] = include!("../../../spirv/embedded.rs");
 
-/// Opcodes.
-pub(super) mod op {
-    pub(crate) const UNDEF: u32 = 1;
-    pub const NAME: u32 = 5;
-    pub(crate) const MEMBER_NAME: u32 = 6;
-    pub const LINE: u32 = 8;
-    pub(crate) const EXT_INST: u32 = 12;
-    pub(crate) const ENTRY_POINT: u32 = 15;
-    pub(crate) const EXECUTION_MODE: u32 = 16;
-    pub const CAPABILITY: u32 = 17;
-    pub(crate) const TYPE_VOID: u32 = 19;
-    pub(crate) const TYPE_BOOL: u32 = 20;
-    pub(crate) const TYPE_INT: u32 = 21;
-    pub(crate) const TYPE_FLOAT: u32 = 22;
-    pub(crate) const TYPE_VECTOR: u32 = 23;
-    pub(crate) const TYPE_IMAGE: u32 = 25;
-    pub(crate) const TYPE_SAMPLER: u32 = 26;
-    pub(crate) const TYPE_SAMPLED_IMAGE: u32 = 27;
-    pub(crate) const TYPE_ARRAY: u32 = 28;
-    pub(crate) const TYPE_RUNTIME_ARRAY: u32 = 29;
-    pub(crate) const TYPE_STRUCT: u32 = 30;
-    pub(crate) const TYPE_POINTER: u32 = 32;
-    pub(crate) const CONSTANT_TRUE: u32 = 41;
-    pub(crate) const CONSTANT_FALSE: u32 = 42;
-    pub const CONSTANT: u32 = 43;
-    pub(crate) const CONSTANT_COMPOSITE: u32 = 44;
-    pub(crate) const SPEC_CONSTANT: u32 = 50;
-    pub(crate) const SPEC_CONSTANT_COMPOSITE: u32 = 51;
-    pub(crate) const SPEC_CONSTANT_OP: u32 = 52;
-    pub(crate) const FUNCTION: u32 = 54;
-    pub(crate) const FUNCTION_END: u32 = 56;
-    pub(crate) const FUNCTION_CALL: u32 = 57;
-    pub const VARIABLE: u32 = 59;
-    pub const LOAD: u32 = 61;
-    pub const STORE: u32 = 62;
-    pub(crate) const COPY_MEMORY_SIZED: u32 = 64;
-    pub(crate) const ACCESS_CHAIN: u32 = 65;
-    pub(crate) const IN_BOUNDS_ACCESS_CHAIN: u32 = 66;
-    pub(crate) const PTR_ACCESS_CHAIN: u32 = 67;
-    pub(crate) const ARRAY_LENGTH: u32 = 68;
-    pub(crate) const DECORATE: u32 = 71;
-    pub(crate) const MEMBER_DECORATE: u32 = 72;
-    pub(crate) const VECTOR_EXTRACT_DYNAMIC: u32 = 77;
-    pub(crate) const VECTOR_SHUFFLE: u32 = 79;
-    pub(crate) const COMPOSITE_CONSTRUCT: u32 = 80;
-    pub(crate) const COMPOSITE_EXTRACT: u32 = 81;
-    pub(crate) const COPY_OBJECT: u32 = 83;
-    pub(crate) const TRANSPOSE: u32 = 84;
-    pub const SAMPLED_IMAGE: u32 = 86;
-    pub(crate) const IMAGE_SAMPLE_EXPLICIT_LOD: u32 = 88;
-    pub(crate) const IMAGE_FETCH: u32 = 95;
-    pub(crate) const IMAGE_READ: u32 = 98;
-    pub(crate) const IMAGE_WRITE: u32 = 99;
-    pub const IMAGE: u32 = 100;
-    pub(crate) const IMAGE_QUERY_SIZE_LOD: u32 = 103;
-    pub(crate) const IMAGE_QUERY_SIZE: u32 = 104;
-    pub(crate) const IMAGE_QUERY_SAMPLES: u32 = 107;
-    pub(crate) const CONVERT_F_TO_U: u32 = 109;
-    pub(crate) const QUANTIZE_TO_F16: u32 = 116;
-    pub(crate) const BITCAST: u32 = 124;
-    pub(crate) const S_NEGATE: u32 = 126;
-    pub(crate) const I_ADD: u32 = 128;
-    pub const F_ADD: u32 = 129;
-    pub(crate) const I_SUB: u32 = 130;
-    pub const F_SUB: u32 = 131;
-    pub(crate) const I_MUL: u32 = 132;
-    pub(crate) const F_MUL: u32 = 133;
-    pub(crate) const S_DIV: u32 = 135;
-    pub(crate) const F_DIV: u32 = 136;
-    pub(crate) const VECTOR_TIMES_SCALAR: u32 = 142;
-    pub(crate) const S_MUL_EXTENDED: u32 = 152;
-    pub const ANY: u32 = 154;
-    pub(crate) const LOGICAL_OR: u32 = 166;
-    pub(crate) const LOGICAL_AND: u32 = 167;
-    pub(crate) const LOGICAL_NOT: u32 = 168;
-    pub(crate) const SELECT: u32 = 169;
-    pub(crate) const I_EQUAL: u32 = 170;
-    pub(crate) const I_NOT_EQUAL: u32 = 171;
-    pub(crate) const S_GREATER_THAN: u32 = 173;
-    pub(crate) const S_GREATER_THAN_EQUAL: u32 = 175;
-    pub(crate) const S_LESS_THAN: u32 = 177;
-    pub(crate) const S_LESS_THAN_EQUAL: u32 = 179;
-    pub(crate) const F_UNORD_GREATER_THAN_EQUAL: u32 = 191;
-    pub(crate) const SHIFT_RIGHT_LOGICAL: u32 = 194;
-    pub(crate) const BIT_COUNT: u32 = 205;
-    pub(crate) const PHI: u32 = 245;
-    pub(crate) const LOOP_MERGE: u32 = 246;
-    pub(crate) const SELECTION_MERGE: u32 = 247;
-    pub(crate) const LABEL: u32 = 248;
-    pub(crate) const BRANCH: u32 = 249;
-    pub(crate) const BRANCH_CONDITIONAL: u32 = 250;
-    pub(crate) const SWITCH: u32 = 251;
-    pub const KILL: u32 = 252;
-    pub const RETURN: u32 = 253;
-    pub(crate) const RETURN_VALUE: u32 = 254;
-    pub(crate) const UNREACHABLE: u32 = 255;
-    pub(crate) const NO_LINE: u32 = 317;
-    pub(crate) const EXECUTION_MODE_ID: u32 = 331;
-}
-
 /// Decorations.
 pub(super) mod decoration {
-    pub(crate) const SPEC_ID: u32 = 1;
-    pub(crate) const NON_WRITABLE: u32 = 24;
-    pub(crate) const NON_READABLE: u32 = 25;
-    pub const BINDING: u32 = 33;
-    pub(crate) const OFFSET: u32 = 35;
-    pub(crate) const ARRAY_STRIDE: u32 = 6;
+    use ::spirv::Decoration;
+
+    pub(crate) const SPEC_ID: u32 = Decoration::SpecId as u32;
+    pub(crate) const NON_WRITABLE: u32 = Decoration::NonWritable as u32;
+    pub(crate) const NON_READABLE: u32 = Decoration::NonReadable as u32;
+    pub const BINDING: u32 = Decoration::Binding as u32;
+    pub(crate) const OFFSET: u32 = Decoration::Offset as u32;
+    pub(crate) const ARRAY_STRIDE: u32 = Decoration::ArrayStride as u32;
 }
 
 /// Capabilities.
 pub(super) mod capability {
-    pub(crate) const IMAGE_BUFFER: u32 = 47;
-    pub(crate) const STORAGE_IMAGE_EXTENDED_FORMATS: u32 = 49;
+    use ::spirv::Capability;
+
+    pub(crate) const IMAGE_BUFFER: u32 = Capability::ImageBuffer as u32;
+    pub(crate) const STORAGE_IMAGE_EXTENDED_FORMATS: u32 = Capability::StorageImageExtendedFormats as u32;
 }
 
 /// Storage classes.
 pub(super) mod storage_class {
-    pub(crate) const UNIFORM_CONSTANT: u32 = 0;
-    pub(crate) const UNIFORM: u32 = 2;
-    pub const STORAGE_BUFFER: u32 = 12;
+    use ::spirv::StorageClass;
+
+    pub(crate) const UNIFORM_CONSTANT: u32 = StorageClass::UniformConstant as u32;
+    pub(crate) const UNIFORM: u32 = StorageClass::Uniform as u32;
+    pub const STORAGE_BUFFER: u32 = StorageClass::StorageBuffer as u32;
 }
 
 /// The upper limit of identifiers that every consumer of SPIR-V accepts.
@@ -196,7 +104,7 @@ pub(super) fn text(words: &[u32]) -> String {
 
 /// One instruction: its opcode and its operands.
 pub(super) struct Instruction<'a> {
-    pub opcode: u32,
+    pub opcode: Op,
     pub operands: &'a [u32],
 }
 
@@ -212,27 +120,30 @@ pub(super) fn decode(words: &[u32]) -> Result<Vec<Instruction<'_>>, SpirvError> 
         let Some(instruction) = words.get(at..at + length).filter(|i| !i.is_empty()) else {
             return error(format!("the instruction at word {at} runs past the end"));
         };
-        let (opcode, operands) = (words[at] & 0xffff, &instruction[1..]);
+        let operands = &instruction[1..];
+        let Some(opcode) = Op::from_u32(words[at] & 0xffff) else {
+            return error(format!("the instruction at word {at} is none of the specification"));
+        };
         let required = match opcode {
-            op::NAME | op::TYPE_VOID | op::TYPE_BOOL | op::TYPE_SAMPLER | op::TYPE_STRUCT => 1,
-            op::MEMBER_NAME
-            | op::EXECUTION_MODE
-            | op::TYPE_INT
-            | op::TYPE_FLOAT
-            | op::TYPE_SAMPLED_IMAGE
-            | op::FUNCTION
-            | op::DECORATE
-            | op::EXECUTION_MODE_ID => 2,
-            op::TYPE_VECTOR
-            | op::TYPE_ARRAY
-            | op::TYPE_POINTER
-            | op::CONSTANT
-            | op::SPEC_CONSTANT
-            | op::VARIABLE
-            | op::MEMBER_DECORATE
-            | op::IMAGE_QUERY_SIZE_LOD => 3,
-            op::IMAGE_SAMPLE_EXPLICIT_LOD | op::IMAGE_FETCH => 4,
-            op::TYPE_IMAGE => 8,
+            Op::Name | Op::TypeVoid | Op::TypeBool | Op::TypeSampler | Op::TypeStruct => 1,
+            Op::MemberName
+            | Op::ExecutionMode
+            | Op::TypeInt
+            | Op::TypeFloat
+            | Op::TypeSampledImage
+            | Op::Function
+            | Op::Decorate
+            | Op::ExecutionModeId => 2,
+            Op::TypeVector
+            | Op::TypeArray
+            | Op::TypePointer
+            | Op::Constant
+            | Op::SpecConstant
+            | Op::Variable
+            | Op::MemberDecorate
+            | Op::ImageQuerySizeLod => 3,
+            Op::ImageSampleExplicitLod | Op::ImageFetch => 4,
+            Op::TypeImage => 8,
             _ => 0,
         };
         if operands.len() < required {
@@ -244,9 +155,14 @@ pub(super) fn decode(words: &[u32]) -> Result<Vec<Instruction<'_>>, SpirvError> 
     Ok(instructions)
 }
 
+/// True of operations on images: samples, fetches, reads, writes and queries.
+pub(super) fn is_of_images(opcode: Op) -> bool {
+    (Op::SampledImage..=Op::ImageQuerySamples).contains(&opcode)
+}
+
 /// Encodes one instruction.
-pub(super) fn encode(opcode: u32, operands: &[u32]) -> Vec<u32> {
-    let mut words = vec![(operands.len() as u32 + 1) << 16 | opcode];
+pub(super) fn encode(opcode: Op, operands: &[u32]) -> Vec<u32> {
+    let mut words = vec![(operands.len() as u32 + 1) << 16 | opcode as u32];
     words.extend_from_slice(operands);
     words
 }

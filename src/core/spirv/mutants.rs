@@ -2,7 +2,7 @@
 //! module with one such change. It is valid and terminates.
 
 use super::classes::class;
-use super::module::{BOUND, HEADER_WORDS, Instruction, SpirvError, decode, encode, error, op};
+use super::module::{BOUND, HEADER_WORDS, Instruction, Op, SpirvError, decode, encode, error};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// What replaces an instruction.
@@ -10,7 +10,7 @@ enum Change {
     /// Nothing.
     Dropped,
     /// This opcode, with the same operands.
-    Opcode(u32),
+    Opcode(Op),
     /// This instruction of GLSL.std.450, with the same operands.
     Extended(u32),
     /// The operands at these two places change places.
@@ -29,7 +29,7 @@ pub struct Mutation {
     pub what: &'static str,
     /// Not where a module has loops, which might not end.
     spares_loops: bool,
-    change: fn(opcode: u32, operands: &[u32]) -> Option<Change>,
+    change: fn(opcode: Op, operands: &[u32]) -> Option<Change>,
 }
 
 /// The instruction of GLSL.std.450 becomes the other of a pair.
@@ -39,31 +39,52 @@ fn extended(operands: &[u32], pairs: &[(u32, u32)]) -> Option<Change> {
 }
 
 /// The opcode becomes the other of a pair, in either direction.
-fn paired(opcode: u32, pairs: &[(u32, u32)]) -> Option<Change> {
-    let other = |(a, b): &(u32, u32)| if *a == opcode { Some(*b) } else { (*b == opcode).then_some(*a) };
+fn paired(opcode: Op, pairs: &[(Op, Op)]) -> Option<Change> {
+    let other = |(a, b): &(Op, Op)| if *a == opcode { Some(*b) } else { (*b == opcode).then_some(*a) };
     pairs.iter().find_map(other).map(Change::Opcode)
 }
 
-const fn of(class: &'static str, what: &'static str, change: fn(u32, &[u32]) -> Option<Change>) -> Mutation {
+const fn of(class: &'static str, what: &'static str, change: fn(Op, &[u32]) -> Option<Change>) -> Mutation {
     Mutation { class, what, spares_loops: false, change }
 }
 
 /// One fault for each class. A class that is not here has none that leaves every module valid.
 pub const MUTATIONS: &[Mutation] = &[
     of("comparisons of floats", "equal numbers compare the other way", |opcode, _| {
-        paired(opcode, &[(184, 188), (185, 189), (186, 190), (187, 191), (180, 182), (181, 183)])
+        paired(
+            opcode,
+            &[
+                (Op::FOrdLessThan, Op::FOrdLessThanEqual),
+                (Op::FUnordLessThan, Op::FUnordLessThanEqual),
+                (Op::FOrdGreaterThan, Op::FOrdGreaterThanEqual),
+                (Op::FUnordGreaterThan, Op::FUnordGreaterThanEqual),
+                (Op::FOrdEqual, Op::FOrdNotEqual),
+                (Op::FUnordEqual, Op::FUnordNotEqual),
+            ],
+        )
     }),
     of("comparisons of integers", "equal numbers compare the other way", |opcode, _| {
-        paired(opcode, &[(172, 174), (173, 175), (176, 178), (177, 179), (170, 171)])
+        paired(
+            opcode,
+            &[
+                (Op::UGreaterThan, Op::UGreaterThanEqual),
+                (Op::SGreaterThan, Op::SGreaterThanEqual),
+                (Op::ULessThan, Op::ULessThanEqual),
+                (Op::SLessThan, Op::SLessThanEqual),
+                (Op::IEqual, Op::INotEqual),
+            ],
+        )
     }),
     of("barriers in a workgroup", "a barrier is left out", |_, _| Some(Change::Dropped)),
-    of("votes of a subgroup", "any and all are mixed up", |opcode, _| paired(opcode, &[(334, 335)])),
+    of("votes of a subgroup", "any and all are mixed up", |opcode, _| {
+        paired(opcode, &[(Op::GroupNonUniformAll, Op::GroupNonUniformAny)])
+    }),
     of("logic", "any and all, or and and, are mixed up", |opcode, _| {
-        paired(opcode, &[(154, 155), (166, 167), (164, 165)])
+        paired(opcode, &[(Op::Any, Op::All), (Op::LogicalOr, Op::LogicalAnd), (Op::LogicalEqual, Op::LogicalNotEqual)])
     }),
     of("selections", "the other value is selected", |_, _| Some(Change::Swapped(3, 4))),
     of("conversions of numbers", "a float is rounded to the nearest integer instead of towards zero", |opcode, _| {
-        matches!(opcode, 109 | 110).then_some(Change::Rounded)
+        matches!(opcode, Op::ConvertFToU | Op::ConvertFToS).then_some(Change::Rounded)
     }),
     of("floats rounded to integers", "rounding goes in another direction", |_, operands| {
         extended(operands, &[(1, 8), (2, 8), (3, 9), (8, 9), (9, 8)])
@@ -94,22 +115,22 @@ pub const MUTATIONS: &[Mutation] = &[
         class: "arithmetic of floats",
         what: "a sum is a difference",
         spares_loops: true,
-        change: |opcode, _| paired(opcode, &[(op::F_ADD, op::F_SUB)]),
+        change: |opcode, _| paired(opcode, &[(Op::FAdd, Op::FSub)]),
     },
     Mutation {
         class: "arithmetic of integers",
         what: "a sum is a difference",
         spares_loops: true,
-        change: |opcode, _| paired(opcode, &[(op::I_ADD, op::I_SUB)]),
+        change: |opcode, _| paired(opcode, &[(Op::IAdd, Op::ISub)]),
     },
     of("quotients of floats", "a quotient is a product", |opcode, _| {
-        (opcode == op::F_DIV).then_some(Change::Opcode(op::F_MUL))
+        (opcode == Op::FDiv).then_some(Change::Opcode(Op::FMul))
     }),
     of("quotients of integers", "quotient and remainder are mixed up", |opcode, _| {
-        paired(opcode, &[(134, 137), (135, 138)])
+        paired(opcode, &[(Op::UDiv, Op::UMod), (Op::SDiv, Op::SRem)])
     }),
     of("bits of integers", "shifts go the other way, or and and are mixed up", |opcode, _| {
-        paired(opcode, &[(op::SHIFT_RIGHT_LOGICAL, 196), (197, 199)])
+        paired(opcode, &[(Op::ShiftRightLogical, Op::ShiftLeftLogical), (Op::BitwiseOr, Op::BitwiseAnd)])
     }),
     of("sizes of images", "the wrong component of an image's size", |_, _| Some(Change::Reversed)),
     of("reads of texels", "the components of a texel are reversed", |_, _| Some(Change::Reversed)),
@@ -119,7 +140,7 @@ pub const MUTATIONS: &[Mutation] = &[
 
 /// The instructions of a module that a mutation can change, by place.
 fn sites(instructions: &[Instruction], mutation: &Mutation) -> Vec<usize> {
-    let has_loops = || instructions.iter().any(|i| i.opcode == op::LOOP_MERGE);
+    let has_loops = || instructions.iter().any(|i| i.opcode == Op::LoopMerge);
     if mutation.spares_loops && has_loops() {
         return Vec::new();
     }
@@ -155,16 +176,15 @@ impl Types {
         let mut types = Types::default();
         for i in instructions {
             match (i.opcode, i.operands) {
-                (op::TYPE_FLOAT, [id, ..]) => drop(types.floats.insert(*id)),
-                (op::TYPE_VECTOR, [id, of, count, ..]) => {
+                (Op::TypeFloat, [id, ..]) => drop(types.floats.insert(*id)),
+                (Op::TypeVector, [id, of, count, ..]) => {
                     types.vectors.insert(*id, *count);
                     if types.floats.contains(of) {
                         types.floats.insert(*id);
                     }
                 }
-                (11, [id, ..]) => types.extended = *id,
-                // Those that yield something.
-                (12 | 41..=61 | 65..=70 | 77..=98 | 100..=223 | 227..=245 | 333..=366, [of, id, ..]) => {
+                (Op::ExtInstImport, [id, ..]) => types.extended = *id,
+                (operation, [of, id, ..]) if yields(operation) => {
                     types.of_result.insert(*id, *of);
                 }
                 _ => {}
@@ -177,6 +197,20 @@ impl Types {
     fn of_float(&self, result: u32) -> Option<u32> {
         self.of_result.get(&result).copied().filter(|of| self.floats.contains(of))
     }
+}
+
+/// True of instructions with a type and a result.
+fn yields(operation: Op) -> bool {
+    let runs = [
+        Op::ExtInst..=Op::ExtInst,
+        Op::ConstantTrue..=Op::Load,
+        Op::AccessChain..=Op::InBoundsPtrAccessChain,
+        Op::VectorExtractDynamic..=Op::ImageRead,
+        Op::Image..=Op::FwidthCoarse,
+        Op::AtomicLoad..=Op::Phi,
+        Op::GroupNonUniformElect..=Op::GroupNonUniformQuadSwap,
+    ];
+    runs.iter().any(|run| run.contains(&operation))
 }
 
 /// Number of mutants of a module by this mutation. 0 if the words are not a module.
@@ -217,18 +251,18 @@ pub fn mutant(words: &[u32], mutation: &Mutation, number: usize) -> Result<Vec<u
             }
             Some(Change::Negated) => {
                 out.extend(encode(i.opcode, &with(1, new)));
-                out.extend(encode(F_NEGATE, &[i.operands[0], i.operands[1], new]));
+                out.extend(encode(Op::FNegate, &[i.operands[0], i.operands[1], new]));
             }
             Some(Change::Reversed) => {
                 let components = types.vectors.get(&i.operands[0]).copied().unwrap_or(0);
                 out.extend(encode(i.opcode, &with(1, new)));
                 let order: Vec<u32> = (0..components).rev().collect();
                 let shuffle = [&[i.operands[0], i.operands[1], new, new][..], &order].concat();
-                out.extend(encode(op::VECTOR_SHUFFLE, &shuffle));
+                out.extend(encode(Op::VectorShuffle, &shuffle));
             }
             Some(Change::Rounded) => {
                 let of = types.of_float(i.operands[2]).unwrap_or(0);
-                out.extend(encode(op::EXT_INST, &[of, new, types.extended, ROUND, i.operands[2]]));
+                out.extend(encode(Op::ExtInst, &[of, new, types.extended, ROUND, i.operands[2]]));
                 out.extend(encode(i.opcode, &with(2, new)));
             }
         }
@@ -237,7 +271,6 @@ pub fn mutant(words: &[u32], mutation: &Mutation, number: usize) -> Result<Vec<u
     Ok(out)
 }
 
-const F_NEGATE: u32 = 127;
 /// Of GLSL.std.450.
 const ROUND: u32 = 1;
 

@@ -1,7 +1,7 @@
 //! Fault injection into shaders: modules that compute slightly different values, as the output of a faulty driver compiler
 //! would.
 
-use super::module::{BOUND, HEADER_WORDS, Instruction, SpirvError, decode, encode, error, op, text};
+use super::module::{BOUND, HEADER_WORDS, Instruction, Op, SpirvError, decode, encode, error, text};
 use std::collections::HashSet;
 
 /// Number of the instruction FMin in the extended set GLSL.std.450: the smaller of two floats.
@@ -9,10 +9,10 @@ pub const FMIN: u32 = 37;
 /// Number of FMax in that set: the larger of two floats.
 pub const FMAX: u32 = 40;
 
-/// Opcode of the addition of floats.
-pub const F_ADD: u32 = op::F_ADD;
-/// Opcode of the subtraction of floats.
-pub const F_SUB: u32 = op::F_SUB;
+/// The addition of floats.
+pub const F_ADD: Op = Op::FAdd;
+/// The subtraction of floats.
+pub const F_SUB: Op = Op::FSub;
 
 /// The module with the last instruction `from` of the extended set replaced by `to`, which takes the same operands.
 ///
@@ -20,7 +20,7 @@ pub const F_SUB: u32 = op::F_SUB;
 /// A module that breaks the format or has no such instruction.
 pub fn replace_last(words: &[u32], from: u32, to: u32) -> Result<Vec<u32>, SpirvError> {
     let instructions = decode(words)?;
-    let matches = |i: &Instruction| i.opcode == op::EXT_INST && i.operands.get(3) == Some(&from);
+    let matches = |i: &Instruction| i.opcode == Op::ExtInst && i.operands.get(3) == Some(&from);
     let Some(last) = instructions.iter().rposition(matches) else { return error("no such instruction") };
     let mut out = words[..HEADER_WORDS].to_vec();
     for (n, i) in instructions.iter().enumerate() {
@@ -37,7 +37,7 @@ pub fn replace_last(words: &[u32], from: u32, to: u32) -> Result<Vec<u32>, Spirv
 ///
 /// # Errors
 /// A module that breaks the format or has no such instruction.
-pub fn replace_last_opcode(words: &[u32], from: u32, to: u32) -> Result<Vec<u32>, SpirvError> {
+pub fn replace_last_opcode(words: &[u32], from: Op, to: Op) -> Result<Vec<u32>, SpirvError> {
     let instructions = decode(words)?;
     let Some(last) = instructions.iter().rposition(|i| i.opcode == from) else { return error("no such instruction") };
     let mut out = words[..HEADER_WORDS].to_vec();
@@ -58,10 +58,10 @@ pub fn add_to_writes(words: &[u32], image: &str, amount: [f32; 4]) -> Result<Vec
     let mut vectors = HashSet::new();
     for i in &instructions {
         match (i.opcode, i.operands) {
-            (op::NAME, [id, name @ ..]) if text(name) == image => drop(images.insert(*id)),
-            (op::TYPE_FLOAT, [id, 32, ..]) => float = Some(*id),
-            (op::TYPE_VECTOR, [id, of, 4]) if Some(*of) == float => vector = Some(*id),
-            (op::LOAD, [_, id, from, ..]) if images.contains(from) => drop(images.insert(*id)),
+            (Op::Name, [id, name @ ..]) if text(name) == image => drop(images.insert(*id)),
+            (Op::TypeFloat, [id, 32, ..]) => float = Some(*id),
+            (Op::TypeVector, [id, of, 4]) if Some(*of) == float => vector = Some(*id),
+            (Op::Load, [_, id, from, ..]) if images.contains(from) => drop(images.insert(*id)),
             (_, [of, id, ..]) if Some(*of) == vector => drop(vectors.insert(*id)),
             _ => {}
         }
@@ -76,18 +76,18 @@ pub fn add_to_writes(words: &[u32], image: &str, amount: [f32; 4]) -> Result<Vec
     let mut out = words[..HEADER_WORDS].to_vec();
     let (mut is_declared, mut writes) = (false, 0);
     for i in &instructions {
-        if i.opcode == op::FUNCTION && !is_declared {
+        if i.opcode == Op::Function && !is_declared {
             is_declared = true;
             for (id, component) in components.iter().zip(amount) {
-                out.extend(encode(op::CONSTANT, &[float, *id, component.to_bits()]));
+                out.extend(encode(Op::Constant, &[float, *id, component.to_bits()]));
             }
-            out.extend(encode(op::CONSTANT_COMPOSITE, &[&[vector, offset][..], &components].concat()));
+            out.extend(encode(Op::ConstantComposite, &[&[vector, offset][..], &components].concat()));
         }
         match (i.opcode, i.operands) {
-            (op::IMAGE_WRITE, [to, at, texel, rest @ ..]) if images.contains(to) && vectors.contains(texel) => {
+            (Op::ImageWrite, [to, at, texel, rest @ ..]) if images.contains(to) && vectors.contains(texel) => {
                 let sum = next();
-                out.extend(encode(op::F_ADD, &[vector, sum, *texel, offset]));
-                out.extend(encode(op::IMAGE_WRITE, &[&[*to, *at, sum][..], rest].concat()));
+                out.extend(encode(Op::FAdd, &[vector, sum, *texel, offset]));
+                out.extend(encode(Op::ImageWrite, &[&[*to, *at, sum][..], rest].concat()));
                 writes += 1;
             }
             _ => out.extend(encode(i.opcode, i.operands)),
@@ -107,9 +107,9 @@ pub fn round_to_half(words: &[u32]) -> Result<Vec<u32>, SpirvError> {
     let mut out = words[..HEADER_WORDS].to_vec();
     for i in &instructions {
         match (i.opcode, i.operands) {
-            (op::F_ADD | op::F_SUB | op::F_MUL | op::F_DIV | op::VECTOR_TIMES_SCALAR, [of, id, a, b]) => {
+            (Op::FAdd | Op::FSub | Op::FMul | Op::FDiv | Op::VectorTimesScalar, [of, id, a, b]) => {
                 out.extend(encode(i.opcode, &[*of, bound, *a, *b]));
-                out.extend(encode(op::QUANTIZE_TO_F16, &[*of, *id, bound]));
+                out.extend(encode(Op::QuantizeToF16, &[*of, *id, bound]));
                 bound += 1;
             }
             _ => out.extend(encode(i.opcode, i.operands)),
@@ -144,7 +144,7 @@ mod tests {
         let light = words(embedded("shade/light").unwrap());
         let after = replace_last_opcode(&light, F_ADD, F_SUB).unwrap();
         assert_eq!(after.iter().zip(&light).filter(|(a, b)| a != b).count(), 1);
-        assert!(replace_last_opcode(&light, 0xffff, F_SUB).is_err());
+        assert!(replace_last_opcode(&light, Op::Kill, F_SUB).is_err());
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Turns arrays of two-dimensional images that a module declares into single images, which hold one layer: for programs that run a shader and
 //! have no arrays of images.
 
-use super::module::{BOUND, HEADER_WORDS, Instruction, SpirvError, decode, encode, error, op};
+use super::module::{BOUND, HEADER_WORDS, Instruction, Op, SpirvError, decode, encode, error, is_of_images};
 use std::collections::{HashMap, HashSet};
 
 /// Operand of an image type: whether it is an array.
@@ -59,11 +59,11 @@ impl Rewrite {
         for i in instructions {
             let a = i.operands;
             match i.opcode {
-                op::TYPE_INT if a.get(1..3) == Some(&[32, 1]) => self.int = a[0],
-                op::TYPE_VECTOR if self.int != 0 && a[1..3] == [self.int, 2] => self.pair = a[0],
-                op::TYPE_VECTOR if self.int != 0 && a[1..3] == [self.int, 3] => self.triple = a[0],
-                op::TYPE_IMAGE | op::TYPE_SAMPLED_IMAGE => {
-                    if is_array(i.opcode, a) || i.opcode == op::TYPE_SAMPLED_IMAGE && self.layered.contains(&a[1]) {
+                Op::TypeInt if a.get(1..3) == Some(&[32, 1]) => self.int = a[0],
+                Op::TypeVector if self.int != 0 && a[1..3] == [self.int, 2] => self.pair = a[0],
+                Op::TypeVector if self.int != 0 && a[1..3] == [self.int, 3] => self.triple = a[0],
+                Op::TypeImage | Op::TypeSampledImage => {
+                    if is_array(i.opcode, a) || i.opcode == Op::TypeSampledImage && self.layered.contains(&a[1]) {
                         self.layered.insert(a[0]);
                     }
                     let becomes = self.type_of_image(i.opcode, a)[1..].to_vec();
@@ -82,10 +82,10 @@ impl Rewrite {
     }
 
     /// The operands of the type of an image, or of one with a sampler.
-    fn type_of_image(&self, opcode: u32, a: &[u32]) -> Vec<u32> {
+    fn type_of_image(&self, opcode: Op, a: &[u32]) -> Vec<u32> {
         let mut operands = a.to_vec();
         match opcode {
-            op::TYPE_SAMPLED_IMAGE => operands[1] = self.kept(a[1]),
+            Op::TypeSampledImage => operands[1] = self.kept(a[1]),
             _ if is_array(opcode, a) => operands[ARRAYED] = 0,
             _ => {}
         }
@@ -102,33 +102,33 @@ impl Rewrite {
     }
 
     /// Appends the rewritten instruction, after whatever it needs.
-    fn instruction(&mut self, opcode: u32, a: &[u32], out: &mut Vec<u32>) -> Result<(), SpirvError> {
+    fn instruction(&mut self, opcode: Op, a: &[u32], out: &mut Vec<u32>) -> Result<(), SpirvError> {
         let is_loaded = |id: &u32| self.loaded.contains(id);
         let rewritten = match (opcode, a) {
-            (op::NAME | op::TYPE_IMAGE | op::TYPE_SAMPLED_IMAGE, [id, ..]) if self.same.contains_key(id) => {
+            (Op::Name | Op::TypeImage | Op::TypeSampledImage, [id, ..]) if self.same.contains_key(id) => {
                 return Ok(());
             }
-            (op::TYPE_IMAGE | op::TYPE_SAMPLED_IMAGE, _) => encode(opcode, &self.type_of_image(opcode, a)),
-            (op::TYPE_POINTER, [id, class, to]) => encode(opcode, &[*id, *class, self.kept(*to)]),
-            (op::FUNCTION, _) => {
+            (Op::TypeImage | Op::TypeSampledImage, _) => encode(opcode, &self.type_of_image(opcode, a)),
+            (Op::TypePointer, [id, class, to]) => encode(opcode, &[*id, *class, self.kept(*to)]),
+            (Op::Function, _) => {
                 self.declare(out)?;
                 encode(opcode, a)
             }
-            (op::LOAD | op::IMAGE, [of, id, rest @ ..]) => {
+            (Op::Load | Op::Image, [of, id, rest @ ..]) => {
                 if self.layered.contains(of) {
                     self.loaded.insert(*id);
                 }
                 encode(opcode, &[&[self.kept(*of), *id], rest].concat())
             }
-            (op::IMAGE_FETCH | op::IMAGE_READ, [of, id, image, at, rest @ ..]) if is_loaded(image) => {
+            (Op::ImageFetch | Op::ImageRead, [of, id, image, at, rest @ ..]) if is_loaded(image) => {
                 let place = self.place(*at, out)?;
                 encode(opcode, &[&[*of, *id, *image, place], rest].concat())
             }
-            (op::IMAGE_WRITE, [image, at, rest @ ..]) if is_loaded(image) => {
+            (Op::ImageWrite, [image, at, rest @ ..]) if is_loaded(image) => {
                 let place = self.place(*at, out)?;
                 encode(opcode, &[&[*image, place], rest].concat())
             }
-            (op::IMAGE_QUERY_SIZE | op::IMAGE_QUERY_SIZE_LOD, [of, id, rest @ ..])
+            (Op::ImageQuerySize | Op::ImageQuerySizeLod, [of, id, rest @ ..])
                 if rest.first().is_some_and(is_loaded) =>
             {
                 if *of != self.triple {
@@ -136,24 +136,20 @@ impl Rewrite {
                 }
                 let size = self.next_id();
                 out.extend(encode(opcode, &[&[self.pair, size], rest].concat()));
-                encode(op::COMPOSITE_CONSTRUCT, &[*of, *id, size, self.one])
+                encode(Op::CompositeConstruct, &[*of, *id, size, self.one])
             }
             // Any other use: calls, copies, selections, samples.
-            (
-                op::FUNCTION_CALL
-                | op::COPY_OBJECT
-                | op::SAMPLED_IMAGE..=op::IMAGE_QUERY_SAMPLES
-                | op::SELECT
-                | op::PHI,
-                [_, _, used @ ..],
-            ) if used.iter().any(is_loaded) => {
-                return error(format!("operation {opcode} uses an array of images"));
+            (of, [_, _, used @ ..])
+                if (is_of_images(of) || matches!(of, Op::FunctionCall | Op::CopyObject | Op::Select | Op::Phi))
+                    && used.iter().any(is_loaded) =>
+            {
+                return error(format!("operation {opcode:?} uses an array of images"));
             }
             _ => encode(opcode, a),
         };
         // Of these no other operand than a type can have the number of one.
-        let is_value = opcode >= op::CONSTANT_TRUE && !matches!(opcode, op::DECORATE | op::MEMBER_DECORATE);
-        if let ([of, id, ..], true) = (a, is_value || opcode == op::UNDEF)
+        let is_value = opcode >= Op::ConstantTrue && !matches!(opcode, Op::Decorate | Op::MemberDecorate);
+        if let ([of, id, ..], true) = (a, is_value || opcode == Op::Undef)
             && *of == self.triple
         {
             self.triples.insert(*id);
@@ -171,10 +167,10 @@ impl Rewrite {
             return error("a module with arrays of images has no vectors of three integers");
         }
         if self.declares_pair {
-            out.extend(encode(op::TYPE_VECTOR, &[self.pair, self.int, 2]));
+            out.extend(encode(Op::TypeVector, &[self.pair, self.int, 2]));
         }
         self.one = self.next_id();
-        out.extend(encode(op::CONSTANT, &[self.int, self.one, 1]));
+        out.extend(encode(Op::Constant, &[self.int, self.one, 1]));
         Ok(())
     }
 
@@ -184,14 +180,14 @@ impl Rewrite {
             return error("a texel of an array of images has other than three integers as its place");
         }
         let place = self.next_id();
-        out.extend(encode(op::VECTOR_SHUFFLE, &[self.pair, place, at, at, 0, 1]));
+        out.extend(encode(Op::VectorShuffle, &[self.pair, place, at, at, 0, 1]));
         Ok(place)
     }
 }
 
 /// `a`: operands of the type of an image.
-fn is_array(opcode: u32, a: &[u32]) -> bool {
-    opcode == op::TYPE_IMAGE && (a[2], a[ARRAYED]) == (DIMENSION_2D, 1)
+fn is_array(opcode: Op, a: &[u32]) -> bool {
+    opcode == Op::TypeImage && (a[2], a[ARRAYED]) == (DIMENSION_2D, 1)
 }
 
 #[cfg(test)]
@@ -226,12 +222,12 @@ mod tests {
                 assert_eq!(new, old, "{name}");
                 let count =
                     |words: &[u32], opcode| decode(words).unwrap().iter().filter(|i| i.opcode == opcode).count();
-                for opcode in [op::IMAGE_FETCH, op::IMAGE_WRITE, op::IMAGE_QUERY_SIZE, op::IMAGE_QUERY_SIZE_LOD] {
+                for opcode in [Op::ImageFetch, Op::ImageWrite, Op::ImageQuerySize, Op::ImageQuerySizeLod] {
                     assert_eq!(count(&after, opcode), count(&before, opcode), "{name}");
                 }
                 let types = decode(&after).unwrap();
                 let images: Vec<_> =
-                    types.iter().filter(|i| i.opcode == op::TYPE_IMAGE).map(|i| &i.operands[1..]).collect();
+                    types.iter().filter(|i| i.opcode == Op::TypeImage).map(|i| &i.operands[1..]).collect();
                 assert_eq!(
                     images.iter().collect::<HashSet<_>>().len(),
                     images.len(),

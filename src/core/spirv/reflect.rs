@@ -2,7 +2,7 @@
 //! slots by these names, never by order. Only the instructions that this needs are read. A module that breaks the format is
 //! an error, not a panic.
 
-use super::module::{SpirvError, decode, decoration, error, op, storage_class, text};
+use super::module::{Op, SpirvError, decode, decoration, error, storage_class, text};
 use std::collections::HashMap;
 
 /// Name of the uniform block that holds the numbers of a pass.
@@ -166,31 +166,31 @@ fn scan(words: &[u32]) -> Result<Declarations, SpirvError> {
 }
 
 impl Declarations {
-    fn add(&mut self, opcode: u32, a: &[u32]) {
+    fn add(&mut self, opcode: Op, a: &[u32]) {
         match opcode {
-            op::NAME => drop(self.names.insert(a[0], text(&a[1..]))),
-            op::MEMBER_NAME => drop(self.member_names.insert((a[0], a[1]), text(&a[2..]))),
-            op::EXECUTION_MODE if a[1] == LOCAL_SIZE && a.len() >= 5 => self.local_size = [a[2], a[3], a[4]],
-            op::EXECUTION_MODE_ID if a[1] == LOCAL_SIZE_ID && a.len() >= 5 => {
+            Op::Name => drop(self.names.insert(a[0], text(&a[1..]))),
+            Op::MemberName => drop(self.member_names.insert((a[0], a[1]), text(&a[2..]))),
+            Op::ExecutionMode if a[1] == LOCAL_SIZE && a.len() >= 5 => self.local_size = [a[2], a[3], a[4]],
+            Op::ExecutionModeId if a[1] == LOCAL_SIZE_ID && a.len() >= 5 => {
                 self.local_size_ids = Some([a[2], a[3], a[4]]);
             }
-            op::TYPE_INT => drop(self.types.insert(a[0], Type::Int { signed: a.get(2) == Some(&1) })),
-            op::TYPE_FLOAT => drop(self.types.insert(a[0], Type::Float)),
-            op::TYPE_VECTOR => drop(self.types.insert(a[0], Type::Vector(a[1], a[2]))),
-            op::TYPE_ARRAY => drop(self.types.insert(a[0], Type::Array(a[1], a[2]))),
-            op::TYPE_IMAGE => {
+            Op::TypeInt => drop(self.types.insert(a[0], Type::Int { signed: a.get(2) == Some(&1) })),
+            Op::TypeFloat => drop(self.types.insert(a[0], Type::Float)),
+            Op::TypeVector => drop(self.types.insert(a[0], Type::Vector(a[1], a[2]))),
+            Op::TypeArray => drop(self.types.insert(a[0], Type::Array(a[1], a[2]))),
+            Op::TypeImage => {
                 let image = Type::Image { dimension: a[2], arrayed: a[4] == 1, sampled: a[6], format: a[7] };
                 self.types.insert(a[0], image);
             }
-            op::TYPE_SAMPLED_IMAGE => drop(self.types.insert(a[0], Type::SampledImage(a[1]))),
-            op::TYPE_STRUCT => drop(self.types.insert(a[0], Type::Struct(a[1..].to_vec()))),
-            op::TYPE_POINTER => drop(self.types.insert(a[0], Type::Pointer(a[2]))),
-            op::TYPE_VOID | op::TYPE_BOOL | op::TYPE_SAMPLER | op::TYPE_RUNTIME_ARRAY if !a.is_empty() => {
+            Op::TypeSampledImage => drop(self.types.insert(a[0], Type::SampledImage(a[1]))),
+            Op::TypeStruct => drop(self.types.insert(a[0], Type::Struct(a[1..].to_vec()))),
+            Op::TypePointer => drop(self.types.insert(a[0], Type::Pointer(a[2]))),
+            Op::TypeVoid | Op::TypeBool | Op::TypeSampler | Op::TypeRuntimeArray if !a.is_empty() => {
                 self.types.insert(a[0], Type::Other);
             }
-            op::CONSTANT | op::SPEC_CONSTANT => drop(self.constants.insert(a[1], a[2])),
-            op::VARIABLE => self.variables.push((a[1], a[0], a[2])),
-            op::DECORATE => match (a[1], a.get(2)) {
+            Op::Constant | Op::SpecConstant => drop(self.constants.insert(a[1], a[2])),
+            Op::Variable => self.variables.push((a[1], a[0], a[2])),
+            Op::Decorate => match (a[1], a.get(2)) {
                 (decoration::BINDING, Some(&binding)) => drop(self.bindings.insert(a[0], binding)),
                 (decoration::SPEC_ID, Some(&id)) => drop(self.constant_ids.insert(a[0], id)),
                 (decoration::ARRAY_STRIDE, Some(&stride)) => drop(self.strides.insert(a[0], stride)),
@@ -198,7 +198,7 @@ impl Declarations {
                 (decoration::NON_READABLE, _) => self.not_readable.push(a[0]),
                 _ => {}
             },
-            op::MEMBER_DECORATE => match (a[2], a.get(3)) {
+            Op::MemberDecorate => match (a[2], a.get(3)) {
                 (decoration::OFFSET, Some(&offset)) => drop(self.offsets.insert((a[0], a[1]), offset)),
                 (decoration::NON_WRITABLE, _) => *self.read_only_members.entry(a[0]).or_default() += 1,
                 _ => {}

@@ -1,7 +1,7 @@
 //! Makes specialization constants of a module constants. A validation layer specializes and validates a module again for each of its
 //! pipelines; without specialization constants it validates the module once, and remembers it.
 
-use super::module::{HEADER_WORDS, SpirvError, decode, decoration, encode, error, op};
+use super::module::{HEADER_WORDS, Op, SpirvError, decode, decoration, encode, error};
 use std::collections::HashMap;
 
 /// A constant that is known.
@@ -23,37 +23,37 @@ pub fn specialize(words: &[u32], values: &[(u32, i32)]) -> Result<Vec<u32>, Spir
     let mut out = words[..HEADER_WORDS].to_vec();
     for i in &instructions {
         match (i.opcode, i.operands) {
-            (op::DECORATE, [id, decoration::SPEC_ID, constant]) => {
+            (Op::Decorate, [id, decoration::SPEC_ID, constant]) => {
                 if let Some((_, value)) = values.iter().find(|(of, _)| of == constant) {
                     given.insert(*id, *value as u32);
                 }
                 continue;
             }
-            (op::CONSTANT_TRUE | op::CONSTANT_FALSE, [_, id]) => {
-                known.insert(*id, Value::Bool(i.opcode == op::CONSTANT_TRUE));
+            (Op::ConstantTrue | Op::ConstantFalse, [_, id]) => {
+                known.insert(*id, Value::Bool(i.opcode == Op::ConstantTrue));
             }
-            (op::CONSTANT, [_, id, value]) => drop(known.insert(*id, Value::Word(*value))),
-            (op::SPEC_CONSTANT, [of, id, default]) => {
+            (Op::Constant, [_, id, value]) => drop(known.insert(*id, Value::Word(*value))),
+            (Op::SpecConstant, [of, id, default]) => {
                 let value = given.get(id).copied().unwrap_or(*default);
                 known.insert(*id, Value::Word(value));
-                out.extend(encode(op::CONSTANT, &[*of, *id, value]));
+                out.extend(encode(Op::Constant, &[*of, *id, value]));
                 continue;
             }
-            (op::SPEC_CONSTANT_OP, [of, id, operation, operands @ ..]) => {
+            (Op::SpecConstantOp, [of, id, operation, operands @ ..]) => {
                 let operands: Option<Vec<Value>> = operands.iter().map(|o| known.get(o).copied()).collect();
-                let Some(value) = operands.and_then(|operands| evaluate(*operation, &operands)) else {
+                let Some(value) = operands.and_then(|operands| evaluate(Op::from_u32(*operation)?, &operands)) else {
                     return error(format!("no value of an expression with operation {operation}"));
                 };
                 known.insert(*id, value);
                 out.extend(match value {
-                    Value::Bool(true) => encode(op::CONSTANT_TRUE, &[*of, *id]),
-                    Value::Bool(false) => encode(op::CONSTANT_FALSE, &[*of, *id]),
-                    Value::Word(word) => encode(op::CONSTANT, &[*of, *id, word]),
+                    Value::Bool(true) => encode(Op::ConstantTrue, &[*of, *id]),
+                    Value::Bool(false) => encode(Op::ConstantFalse, &[*of, *id]),
+                    Value::Word(word) => encode(Op::Constant, &[*of, *id, word]),
                 });
                 continue;
             }
-            (op::SPEC_CONSTANT_COMPOSITE, parts) => {
-                out.extend(encode(op::CONSTANT_COMPOSITE, parts));
+            (Op::SpecConstantComposite, parts) => {
+                out.extend(encode(Op::ConstantComposite, parts));
                 continue;
             }
             _ => {}
@@ -64,28 +64,28 @@ pub fn specialize(words: &[u32], values: &[(u32, i32)]) -> Result<Vec<u32>, Spir
 }
 
 /// The value of an expression. None: an operation or kinds of operands that are not known here, or a division by zero.
-fn evaluate(operation: u32, operands: &[Value]) -> Option<Value> {
+fn evaluate(operation: Op, operands: &[Value]) -> Option<Value> {
     use Value::{Bool, Word};
     let word = |value: i32| Word(value as u32);
     Some(match (operation, operands) {
-        (op::S_NEGATE, [Word(a)]) => Word(a.wrapping_neg()),
-        (op::LOGICAL_NOT, [Bool(a)]) => Bool(!a),
-        (op::LOGICAL_OR, [Bool(a), Bool(b)]) => Bool(*a || *b),
-        (op::LOGICAL_AND, [Bool(a), Bool(b)]) => Bool(*a && *b),
-        (op::SELECT, [Bool(which), yes, no]) => *(if *which { yes } else { no }),
+        (Op::SNegate, [Word(a)]) => Word(a.wrapping_neg()),
+        (Op::LogicalNot, [Bool(a)]) => Bool(!a),
+        (Op::LogicalOr, [Bool(a), Bool(b)]) => Bool(*a || *b),
+        (Op::LogicalAnd, [Bool(a), Bool(b)]) => Bool(*a && *b),
+        (Op::Select, [Bool(which), yes, no]) => *(if *which { yes } else { no }),
         (_, [Word(a), Word(b)]) => {
             let (a, b) = (*a as i32, *b as i32);
             match operation {
-                op::I_ADD => word(a.wrapping_add(b)),
-                op::I_SUB => word(a.wrapping_sub(b)),
-                op::I_MUL => word(a.wrapping_mul(b)),
-                op::S_DIV => word(a.checked_div(b)?),
-                op::I_EQUAL => Bool(a == b),
-                op::I_NOT_EQUAL => Bool(a != b),
-                op::S_GREATER_THAN => Bool(a > b),
-                op::S_GREATER_THAN_EQUAL => Bool(a >= b),
-                op::S_LESS_THAN => Bool(a < b),
-                op::S_LESS_THAN_EQUAL => Bool(a <= b),
+                Op::IAdd => word(a.wrapping_add(b)),
+                Op::ISub => word(a.wrapping_sub(b)),
+                Op::IMul => word(a.wrapping_mul(b)),
+                Op::SDiv => word(a.checked_div(b)?),
+                Op::IEqual => Bool(a == b),
+                Op::INotEqual => Bool(a != b),
+                Op::SGreaterThan => Bool(a > b),
+                Op::SGreaterThanEqual => Bool(a >= b),
+                Op::SLessThan => Bool(a < b),
+                Op::SLessThanEqual => Bool(a <= b),
                 _ => return None,
             }
         }
@@ -109,15 +109,15 @@ mod tests {
             let after = specialize(&before, &values).unwrap();
             assert_eq!(reflect(&after).unwrap().constants, [], "{name}");
             let instructions = decode(&after).unwrap();
-            let is_special = |opcode| (op::SPEC_CONSTANT..=op::SPEC_CONSTANT_OP).contains(&opcode);
+            let is_special = |opcode| (Op::SpecConstant..=Op::SpecConstantOp).contains(&opcode);
             assert!(instructions.iter().all(|i| !is_special(i.opcode)), "{name}");
-            let of = |opcode: u32, words: &[u32]| -> HashMap<u32, u32> {
+            let of = |opcode: Op, words: &[u32]| -> HashMap<u32, u32> {
                 let all = decode(words).unwrap();
                 all.iter().filter(|i| i.opcode == opcode).map(|i| (i.operands[1], i.operands[2])).collect()
             };
-            let (defaults, made) = (of(op::SPEC_CONSTANT, &before), of(op::CONSTANT, &after));
+            let (defaults, made) = (of(Op::SpecConstant, &before), of(Op::Constant, &after));
             let special = decode(&before).unwrap();
-            let special = special.iter().filter(|i| i.opcode == op::DECORATE && i.operands[1] == decoration::SPEC_ID);
+            let special = special.iter().filter(|i| i.opcode == Op::Decorate && i.operands[1] == decoration::SPEC_ID);
             let special: Vec<_> = special.map(|i| (i.operands[0], i.operands[2])).collect();
             assert_eq!(special.len(), module.constants.len(), "{name}");
             for (id, constant) in special {
@@ -136,18 +136,18 @@ mod tests {
             Some(Bool(value)) => Some(i32::from(value)),
             None => None,
         };
-        let binary = [op::I_ADD, op::I_SUB, op::I_MUL, op::S_DIV];
+        let binary = [Op::IAdd, Op::ISub, Op::IMul, Op::SDiv];
         assert_eq!(binary.map(|of| number(of, -7, 2)), [Some(-5), Some(-9), Some(-14), Some(-3)]);
-        let order = [op::S_LESS_THAN, op::S_LESS_THAN_EQUAL, op::S_GREATER_THAN, op::S_GREATER_THAN_EQUAL];
+        let order = [Op::SLessThan, Op::SLessThanEqual, Op::SGreaterThan, Op::SGreaterThanEqual];
         assert_eq!(order.map(|of| number(of, -1, 1)), [Some(1), Some(1), Some(0), Some(0)]);
         assert_eq!(order.map(|of| number(of, 3, 3)), [Some(0), Some(1), Some(0), Some(1)]);
-        assert_eq!([op::I_EQUAL, op::I_NOT_EQUAL].map(|of| number(of, 4, 4)), [Some(1), Some(0)]);
-        assert_eq!((number(op::S_DIV, 1, 0), number(op::SELECT, 1, 2)), (None, None));
-        assert!(matches!(evaluate(op::S_NEGATE, &[Word(5)]), Some(Word(0xffff_fffb))));
-        assert!(matches!(evaluate(op::LOGICAL_OR, &[Bool(false), Bool(true)]), Some(Bool(true))));
-        assert!(matches!(evaluate(op::LOGICAL_AND, &[Bool(false), Bool(true)]), Some(Bool(false))));
-        assert!(matches!(evaluate(op::LOGICAL_NOT, &[Bool(false)]), Some(Bool(true))));
-        assert!(matches!(evaluate(op::SELECT, &[Bool(false), Word(1), Word(2)]), Some(Word(2))));
+        assert_eq!([Op::IEqual, Op::INotEqual].map(|of| number(of, 4, 4)), [Some(1), Some(0)]);
+        assert_eq!((number(Op::SDiv, 1, 0), number(Op::Select, 1, 2)), (None, None));
+        assert!(matches!(evaluate(Op::SNegate, &[Word(5)]), Some(Word(0xffff_fffb))));
+        assert!(matches!(evaluate(Op::LogicalOr, &[Bool(false), Bool(true)]), Some(Bool(true))));
+        assert!(matches!(evaluate(Op::LogicalAnd, &[Bool(false), Bool(true)]), Some(Bool(false))));
+        assert!(matches!(evaluate(Op::LogicalNot, &[Bool(false)]), Some(Bool(true))));
+        assert!(matches!(evaluate(Op::Select, &[Bool(false), Word(1), Word(2)]), Some(Word(2))));
     }
 
     #[test]

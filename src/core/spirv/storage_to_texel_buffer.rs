@@ -3,7 +3,7 @@
 //! the pipeline is made, so that a shader needs no second variant.
 
 use super::module::{
-    BOUND, HEADER_WORDS, Instruction, SpirvError, capability, decode, decoration, encode, error, op, storage_class,
+    BOUND, HEADER_WORDS, Instruction, Op, SpirvError, capability, decode, decoration, encode, error, storage_class,
     text,
 };
 use std::collections::HashMap;
@@ -57,8 +57,8 @@ pub(crate) fn storage_to_texel_buffer(
         required.push(capability::STORAGE_IMAGE_EXTENDED_FORMATS);
     }
     for capability in required {
-        if !instructions.iter().any(|i| i.opcode == op::CAPABILITY && i.operands == [capability]) {
-            out.extend(encode(op::CAPABILITY, &[capability]));
+        if !instructions.iter().any(|i| i.opcode == Op::Capability && i.operands == [capability]) {
+            out.extend(encode(Op::Capability, &[capability]));
         }
     }
     for i in &instructions {
@@ -88,19 +88,19 @@ impl Tables {
         for i in instructions {
             let a = i.operands;
             match i.opcode {
-                op::NAME => drop(names.insert(a[0], text(&a[1..]))),
-                op::DECORATE if a[1] == decoration::NON_WRITABLE => read_only.push(a[0]),
-                op::TYPE_FLOAT if a[1] == 32 => tables.float = a[0],
-                op::TYPE_VECTOR if a[1] == tables.float => {
+                Op::Name => drop(names.insert(a[0], text(&a[1..]))),
+                Op::Decorate if a[1] == decoration::NON_WRITABLE => read_only.push(a[0]),
+                Op::TypeFloat if a[1] == 32 => tables.float = a[0],
+                Op::TypeVector if a[1] == tables.float => {
                     vectors.insert(a[0], a[2]);
                     if a[2] == 4 {
                         tables.vec4 = a[0];
                     }
                 }
-                op::TYPE_RUNTIME_ARRAY if a.len() >= 2 => drop(arrays.insert(a[0], a[1])),
-                op::TYPE_STRUCT if a.len() == 2 => drop(structs.insert(a[0], a[1])),
-                op::TYPE_POINTER => drop(pointees.insert(a[0], a[2])),
-                op::VARIABLE if a[2] == storage_class::STORAGE_BUFFER && read_only.contains(&a[1]) => {
+                Op::TypeRuntimeArray if a.len() >= 2 => drop(arrays.insert(a[0], a[1])),
+                Op::TypeStruct if a.len() == 2 => drop(structs.insert(a[0], a[1])),
+                Op::TypePointer => drop(pointees.insert(a[0], a[2])),
+                Op::Variable if a[2] == storage_class::STORAGE_BUFFER && read_only.contains(&a[1]) => {
                     let member = pointees.get(&a[0]).and_then(|block| structs.get(block));
                     let Some(&entry_type) = member.and_then(|array| arrays.get(array)) else { continue };
                     let components = match vectors.get(&entry_type) {
@@ -145,27 +145,27 @@ impl Rewrite {
     }
 
     /// Appends the rewritten instruction, after whatever it needs declared.
-    fn instruction(&mut self, opcode: u32, a: &[u32], out: &mut Vec<u32>) -> Result<(), SpirvError> {
+    fn instruction(&mut self, opcode: Op, a: &[u32], out: &mut Vec<u32>) -> Result<(), SpirvError> {
         let table = |at: usize| a.get(at).and_then(|id| self.tables.by_variable.get(id)).map(|(_, entry)| *entry);
         match opcode {
-            op::VARIABLE if table(1).is_some() => {
+            Op::Variable if table(1).is_some() => {
                 let pointer = self.declare(table(1).map_or(0, Entry::format), out);
                 out.extend(encode(opcode, &[pointer, a[1], 0]));
             }
             // Indices: the only member of the block, an entry, and possibly a component.
-            op::ACCESS_CHAIN if table(2).is_some() => {
+            Op::AccessChain if table(2).is_some() => {
                 let (Some(&index), 5..=6) = (a.get(4), a.len()) else {
                     return error("a table is not read entry by entry");
                 };
                 self.pointees.insert(a[1], Pointee { variable: a[2], index, component: a.get(5).copied() });
             }
-            op::LOAD if a.len() >= 3 && self.pointees.contains_key(&a[2]) => self.load(a[0], a[1], a[2], out),
-            op::ARRAY_LENGTH if table(2).is_some() => {
+            Op::Load if a.len() >= 3 && self.pointees.contains_key(&a[2]) => self.load(a[0], a[1], a[2], out),
+            Op::ArrayLength if table(2).is_some() => {
                 let image = self.image(a[2], out);
-                out.extend(encode(op::IMAGE_QUERY_SIZE, &[a[0], a[1], image]));
+                out.extend(encode(Op::ImageQuerySize, &[a[0], a[1], image]));
             }
             _ if self.points_at_table(opcode, a) => {
-                return error(format!("operation {opcode} uses a table that is to become a texel buffer"));
+                return error(format!("operation {opcode:?} uses a table that is to become a texel buffer"));
             }
             _ => out.extend(encode(opcode, a)),
         }
@@ -174,11 +174,11 @@ impl Rewrite {
 
     /// True if a pointer operand points at a table. That is any other use: loads of all of it, stores, calls, copies,
     /// selections.
-    fn points_at_table(&self, opcode: u32, a: &[u32]) -> bool {
+    fn points_at_table(&self, opcode: Op, a: &[u32]) -> bool {
         let pointers = match opcode {
-            op::LOAD | op::ACCESS_CHAIN..=op::ARRAY_LENGTH => a.get(2..3),
-            op::STORE..=op::COPY_MEMORY_SIZED => a.get(..2),
-            op::FUNCTION_CALL | op::COPY_OBJECT | op::SELECT | op::PHI => a.get(2..),
+            Op::Load | Op::AccessChain | Op::InBoundsAccessChain | Op::PtrAccessChain | Op::ArrayLength => a.get(2..3),
+            Op::Store | Op::CopyMemory | Op::CopyMemorySized => a.get(..2),
+            Op::FunctionCall | Op::CopyObject | Op::Select | Op::Phi => a.get(2..),
             _ => None,
         };
         let is_table = |id: &u32| self.tables.by_variable.contains_key(id) || self.pointees.contains_key(id);
@@ -190,15 +190,15 @@ impl Rewrite {
     fn declare(&mut self, format: u32, out: &mut Vec<u32>) -> u32 {
         if self.tables.vec4 == 0 {
             self.tables.vec4 = self.next_id();
-            out.extend(encode(op::TYPE_VECTOR, &[self.tables.vec4, self.tables.float, 4]));
+            out.extend(encode(Op::TypeVector, &[self.tables.vec4, self.tables.float, 4]));
         }
         if let Some((_, pointer)) = self.new_types.get(&format) {
             return *pointer;
         }
         let (image, pointer) = (self.next_id(), self.next_id());
         // Dimension Buffer (5), no depth, not arrayed, not multisampled, used as storage (2).
-        out.extend(encode(op::TYPE_IMAGE, &[image, self.tables.float, 5, 0, 0, 0, 2, format]));
-        out.extend(encode(op::TYPE_POINTER, &[pointer, 0, image]));
+        out.extend(encode(Op::TypeImage, &[image, self.tables.float, 5, 0, 0, 0, 2, format]));
+        out.extend(encode(Op::TypePointer, &[pointer, 0, image]));
         self.new_types.insert(format, (image, pointer));
         pointer
     }
@@ -208,7 +208,7 @@ impl Rewrite {
         let format = self.tables.by_variable[&variable].1.format();
         let image_type = self.new_types.get(&format).map_or(0, |types| types.0);
         let image = self.next_id();
-        out.extend(encode(op::LOAD, &[image_type, image, variable]));
+        out.extend(encode(Op::Load, &[image_type, image, variable]));
         image
     }
 
@@ -218,13 +218,13 @@ impl Rewrite {
         let image = self.image(variable, out);
         // A read returns four components; those that the format lacks are 0 and 1.
         let texel = if entry.components == 4 && component.is_none() { result } else { self.next_id() };
-        out.extend(encode(op::IMAGE_READ, &[self.tables.vec4, texel, image, index]));
+        out.extend(encode(Op::ImageRead, &[self.tables.vec4, texel, image, index]));
         match (component, entry.components) {
             (Some(component), _) => {
-                out.extend(encode(op::VECTOR_EXTRACT_DYNAMIC, &[value_type, result, texel, component]));
+                out.extend(encode(Op::VectorExtractDynamic, &[value_type, result, texel, component]));
             }
-            (None, 1) => out.extend(encode(op::COMPOSITE_EXTRACT, &[value_type, result, texel, 0])),
-            (None, 2) => out.extend(encode(op::VECTOR_SHUFFLE, &[value_type, result, texel, texel, 0, 1])),
+            (None, 1) => out.extend(encode(Op::CompositeExtract, &[value_type, result, texel, 0])),
+            (None, 2) => out.extend(encode(Op::VectorShuffle, &[value_type, result, texel, texel, 0, 1])),
             (None, _) => {}
         }
     }

@@ -1,7 +1,9 @@
 //! Removes bindings of textures and tables that a module declares but a scene does not have. Specialization constants keep them from
 //! being read or written. Without this rewrite either a dummy would be bound or each combination would need a shader variant of its own.
 
-use super::module::{HEADER_WORDS, Instruction, SpirvError, decode, encode, error, op, storage_class, text};
+use super::module::{
+    HEADER_WORDS, Instruction, Op, SpirvError, decode, encode, error, is_of_images, storage_class, text,
+};
 use std::collections::HashSet;
 
 /// The module without the textures and storage buffers of these names. Texels fetched, samples taken, numbers loaded and lengths become
@@ -39,23 +41,21 @@ impl Stripped {
         let mut named = HashSet::new();
         for i in instructions {
             match (i.opcode, i.operands) {
-                (op::NAME, [id, name @ ..]) if names.contains(&text(name).as_str()) => drop(named.insert(*id)),
-                (op::VARIABLE, [_, id, storage_class::UNIFORM_CONSTANT | storage_class::STORAGE_BUFFER, ..])
+                (Op::Name, [id, name @ ..]) if names.contains(&text(name).as_str()) => drop(named.insert(*id)),
+                (Op::Variable, [_, id, storage_class::UNIFORM_CONSTANT | storage_class::STORAGE_BUFFER, ..])
                     if named.contains(id) =>
                 {
                     stripped.variables.insert(*id);
                 }
-                (op::LOAD, [_, id, from, ..]) if stripped.variables.contains(from) => {
+                (Op::Load, [_, id, from, ..]) if stripped.variables.contains(from) => {
                     stripped.parts.insert(*id);
                 }
-                (op::ACCESS_CHAIN | op::IN_BOUNDS_ACCESS_CHAIN, [_, id, from, ..])
-                    if stripped.variables.contains(from) =>
-                {
+                (Op::AccessChain | Op::InBoundsAccessChain, [_, id, from, ..]) if stripped.variables.contains(from) => {
                     stripped.parts.insert(*id);
                     stripped.pointers.insert(*id);
                 }
                 // The image of a texture that is also sampled.
-                (op::IMAGE, [_, id, from]) if stripped.parts.contains(from) => {
+                (Op::Image, [_, id, from]) if stripped.parts.contains(from) => {
                     stripped.parts.insert(*id);
                 }
                 _ => {}
@@ -68,44 +68,46 @@ impl Stripped {
         let a = i.operands;
         let is_stripped = |id: &u32| self.variables.contains(id) || self.parts.contains(id);
         match (i.opcode, a) {
-            (op::NAME | op::DECORATE, [id, ..])
-            | (op::VARIABLE | op::LOAD | op::IMAGE | op::ACCESS_CHAIN | op::IN_BOUNDS_ACCESS_CHAIN, [_, id, ..])
+            (Op::Name | Op::Decorate, [id, ..])
+            | (Op::Variable | Op::Load | Op::Image | Op::AccessChain | Op::InBoundsAccessChain, [_, id, ..])
                 if is_stripped(id) => {}
-            (op::LOAD, [of, result, from, ..]) if self.pointers.contains(from) => {
-                out.extend(encode(op::UNDEF, &[*of, *result]));
+            (Op::Load, [of, result, from, ..]) if self.pointers.contains(from) => {
+                out.extend(encode(Op::Undef, &[*of, *result]));
             }
-            (op::ARRAY_LENGTH, [of, result, from, ..]) if self.variables.contains(from) => {
-                out.extend(encode(op::UNDEF, &[*of, *result]));
+            (Op::ArrayLength, [of, result, from, ..]) if self.variables.contains(from) => {
+                out.extend(encode(Op::Undef, &[*of, *result]));
             }
             // Operands: execution model, function, name, and the variables of its interface.
-            (op::ENTRY_POINT, [_, _, named @ ..]) => {
+            (Op::EntryPoint, [_, _, named @ ..]) => {
                 let ends = |word: &u32| word.to_le_bytes().contains(&0);
                 let interface = 3 + named.iter().position(ends).unwrap_or(named.len());
                 let (head, used) = a.split_at(interface.min(a.len()));
                 let used = used.iter().copied().filter(|id| !is_stripped(id));
-                out.extend(encode(op::ENTRY_POINT, &head.iter().copied().chain(used).collect::<Vec<_>>()));
+                out.extend(encode(Op::EntryPoint, &head.iter().copied().chain(used).collect::<Vec<_>>()));
             }
-            (op::IMAGE_FETCH | op::IMAGE_QUERY_SIZE_LOD | op::IMAGE_SAMPLE_EXPLICIT_LOD, [of, result, image, ..])
+            (Op::ImageFetch | Op::ImageQuerySizeLod | Op::ImageSampleExplicitLod, [of, result, image, ..])
                 if is_stripped(image) =>
             {
-                out.extend(encode(op::UNDEF, &[*of, *result]));
+                out.extend(encode(Op::Undef, &[*of, *result]));
             }
-            (op::IMAGE_WRITE, [image, ..]) if is_stripped(image) => {}
+            (Op::ImageWrite, [image, ..]) if is_stripped(image) => {}
             _ => {
                 // Any other use: calls, stores, copies, samples, selections.
                 let used = match i.opcode {
-                    op::STORE..=op::COPY_MEMORY_SIZED => a,
-                    op::FUNCTION_CALL
-                    | op::ACCESS_CHAIN..=op::PTR_ACCESS_CHAIN
-                    | op::COPY_OBJECT
-                    | op::SELECT
-                    | op::PHI => a.get(2..).unwrap_or_default(),
+                    Op::Store | Op::CopyMemory | Op::CopyMemorySized => a,
+                    Op::FunctionCall
+                    | Op::AccessChain
+                    | Op::InBoundsAccessChain
+                    | Op::PtrAccessChain
+                    | Op::CopyObject
+                    | Op::Select
+                    | Op::Phi => a.get(2..).unwrap_or_default(),
                     // Only the image can be one. Behind the coordinates are flags, which may equal an identifier.
-                    op::SAMPLED_IMAGE..=op::IMAGE_QUERY_SAMPLES => a.get(2..3).unwrap_or_default(),
+                    of if is_of_images(of) => a.get(2..3).unwrap_or_default(),
                     _ => &[],
                 };
                 if used.iter().any(is_stripped) {
-                    return error(format!("operation {} uses a texture or a table that is to be removed", i.opcode));
+                    return error(format!("operation {:?} uses a texture or a table that is to be removed", i.opcode));
                 }
                 out.extend(encode(i.opcode, a));
             }
@@ -138,10 +140,10 @@ mod tests {
     #[test]
     fn the_flags_of_a_fetch_are_no_identifiers() {
         let (gone, kept) = (8194, 20);
-        let variable = |id| encode(op::VARIABLE, &[9, id, storage_class::UNIFORM_CONSTANT]);
-        let load = |id, from| encode(op::LOAD, &[8, id, from]);
-        let fetch = encode(op::IMAGE_FETCH, &[6, 22, 21, 5, 8194, 4]);
-        let name = encode(op::NAME, &[30, u32::from_le_bytes(*b"gon\0")]);
+        let variable = |id| encode(Op::Variable, &[9, id, storage_class::UNIFORM_CONSTANT]);
+        let load = |id, from| encode(Op::Load, &[8, id, from]);
+        let fetch = encode(Op::ImageFetch, &[6, 22, 21, 5, 8194, 4]);
+        let name = encode(Op::Name, &[30, u32::from_le_bytes(*b"gon\0")]);
         let stays = [variable(kept), load(21, kept), fetch].concat();
         let header = [0x0723_0203, 0x0001_0300, 0, 9000, 0];
         let module = [&header[..], &name, &variable(30), &load(gone, 30), &stays].concat();

@@ -4,7 +4,8 @@
 //! rewritten when the pipeline is made: types, loads and fetches, one instruction for one.
 
 use super::module::{
-    BOUND, HEADER_WORDS, Instruction, MAX_BOUND, SpirvError, capability, decode, decoration, encode, error, op, text,
+    BOUND, HEADER_WORDS, Instruction, MAX_BOUND, Op, SpirvError, capability, decode, decoration, encode, error,
+    is_of_images, text,
 };
 use std::collections::HashMap;
 
@@ -56,9 +57,9 @@ pub(crate) fn texture_to_storage(words: &[u32], textures: &[(&str, ImageFormat)]
     if textures.iter().any(|(_, format)| format.is_extended())
         && !instructions
             .iter()
-            .any(|i| i.opcode == op::CAPABILITY && i.operands == [capability::STORAGE_IMAGE_EXTENDED_FORMATS])
+            .any(|i| i.opcode == Op::Capability && i.operands == [capability::STORAGE_IMAGE_EXTENDED_FORMATS])
     {
-        out.extend(encode(op::CAPABILITY, &[capability::STORAGE_IMAGE_EXTENDED_FORMATS]));
+        out.extend(encode(Op::Capability, &[capability::STORAGE_IMAGE_EXTENDED_FORMATS]));
     }
     for i in &instructions {
         rewrite.instruction(i.opcode, i.operands, &mut out)?;
@@ -88,11 +89,11 @@ impl Rewrite {
             (HashMap::new(), HashMap::new(), HashMap::new(), HashMap::new());
         for i in instructions {
             match i.opcode {
-                op::NAME => drop(names.insert(i.operands[0], text(&i.operands[1..]))),
-                op::TYPE_IMAGE => drop(images.insert(i.operands[0], &i.operands[1..])),
-                op::TYPE_SAMPLED_IMAGE => drop(sampled.insert(i.operands[0], i.operands[1])),
-                op::TYPE_POINTER => drop(pointees.insert(i.operands[0], i.operands[2])),
-                op::VARIABLE => {
+                Op::Name => drop(names.insert(i.operands[0], text(&i.operands[1..]))),
+                Op::TypeImage => drop(images.insert(i.operands[0], &i.operands[1..])),
+                Op::TypeSampledImage => drop(sampled.insert(i.operands[0], i.operands[1])),
+                Op::TypePointer => drop(pointees.insert(i.operands[0], i.operands[2])),
+                Op::Variable => {
                     let pointee = pointees.get(&i.operands[0]).copied().unwrap_or(0);
                     let image = sampled.get(&pointee).copied().unwrap_or(pointee);
                     let Some(shape) = images.get(&image) else { continue };
@@ -121,50 +122,47 @@ impl Rewrite {
     }
 
     /// Appends the rewritten instruction, after whatever it needs declared.
-    fn instruction(&mut self, opcode: u32, a: &[u32], out: &mut Vec<u32>) -> Result<(), SpirvError> {
+    fn instruction(&mut self, opcode: Op, a: &[u32], out: &mut Vec<u32>) -> Result<(), SpirvError> {
         let loaded = |at: usize| a.get(at).and_then(|id| self.loaded.get(id)).copied();
         let rewritten = match opcode {
             // Every variable has exactly one Binding decoration.
-            op::DECORATE if a.get(1) == Some(&decoration::BINDING) && self.formats.contains_key(&a[0]) => {
-                out.extend(encode(op::DECORATE, &[a[0], decoration::NON_WRITABLE]));
+            Op::Decorate if a.get(1) == Some(&decoration::BINDING) && self.formats.contains_key(&a[0]) => {
+                out.extend(encode(Op::Decorate, &[a[0], decoration::NON_WRITABLE]));
                 encode(opcode, a)
             }
-            op::VARIABLE if self.formats.contains_key(&a[1]) => {
+            Op::Variable if self.formats.contains_key(&a[1]) => {
                 let pointer = self.declare(a[1], out);
                 encode(opcode, &[pointer, a[1], a[2]])
             }
-            op::LOAD if a.len() >= 3 && self.types.contains_key(&a[2]) => {
+            Op::Load if a.len() >= 3 && self.types.contains_key(&a[2]) => {
                 let of = self.types[&a[2]];
                 self.loaded.insert(a[1], of);
                 encode(opcode, &[of, a[1], a[2]])
             }
             // Extracts the texture of a combined one: now a copy of the storage image.
-            op::IMAGE => match loaded(2) {
+            Op::Image => match loaded(2) {
                 Some(of) => {
                     self.loaded.insert(a[1], of);
-                    encode(op::COPY_OBJECT, &[of, a[1], a[2]])
+                    encode(Op::CopyObject, &[of, a[1], a[2]])
                 }
                 None => encode(opcode, a),
             },
             // There is only one mip level. The operands that say how integers are extended are kept.
-            op::IMAGE_FETCH if loaded(2).is_some() => {
+            Op::ImageFetch if loaded(2).is_some() => {
                 match a.get(4).map(|operands| (operands & !(LOD | EXTEND), operands & EXTEND)) {
-                    None | Some((0, 0)) => encode(op::IMAGE_READ, &a[..4]),
-                    Some((0, extend)) => encode(op::IMAGE_READ, &[&a[..4], &[extend]].concat()),
+                    None | Some((0, 0)) => encode(Op::ImageRead, &a[..4]),
+                    Some((0, extend)) => encode(Op::ImageRead, &[&a[..4], &[extend]].concat()),
                     Some(_) => return error("a fetch with an offset cannot become an image load"),
                 }
             }
-            op::IMAGE_QUERY_SIZE_LOD if loaded(2).is_some() => encode(op::IMAGE_QUERY_SIZE, &a[..3]),
-            op::IMAGE_SAMPLE_EXPLICIT_LOD if loaded(2).is_some() => encode(op::UNDEF, &a[..2]),
+            Op::ImageQuerySizeLod if loaded(2).is_some() => encode(Op::ImageQuerySize, &a[..3]),
+            Op::ImageSampleExplicitLod if loaded(2).is_some() => encode(Op::Undef, &a[..2]),
             // Any other use of an image: calls, copies, selections, other samples.
-            op::FUNCTION_CALL
-            | op::COPY_OBJECT
-            | op::SAMPLED_IMAGE..=op::IMAGE_QUERY_SAMPLES
-            | op::SELECT
-            | op::PHI
-                if (2..a.len()).any(|at| loaded(at).is_some()) =>
+            _ if (is_of_images(opcode)
+                || matches!(opcode, Op::FunctionCall | Op::CopyObject | Op::Select | Op::Phi))
+                && (2..a.len()).any(|at| loaded(at).is_some()) =>
             {
-                return error(format!("operation {opcode} uses a texture that is to become a storage image"));
+                return error(format!("operation {opcode:?} uses a texture that is to become a storage image"));
             }
             _ => encode(opcode, a),
         };
@@ -183,8 +181,8 @@ impl Rewrite {
                 let mut operands = vec![image];
                 operands.extend(&key.0);
                 operands.extend([2, format as u32]);
-                out.extend(encode(op::TYPE_IMAGE, &operands));
-                out.extend(encode(op::TYPE_POINTER, &[pointer, 0, image]));
+                out.extend(encode(Op::TypeImage, &operands));
+                out.extend(encode(Op::TypePointer, &[pointer, 0, image]));
                 self.new_types.insert(key, (image, pointer));
                 (image, pointer)
             }
@@ -214,9 +212,9 @@ mod tests {
         }
         assert_eq!((old.params, old.constants, old.local_size), (new.params, new.constants, new.local_size));
         let count = |words: &[u32], opcode| decode(words).unwrap().iter().filter(|i| i.opcode == opcode).count();
-        assert_eq!(count(&before, op::IMAGE_FETCH), count(&after, op::IMAGE_FETCH) + count(&after, op::IMAGE_READ));
+        assert_eq!(count(&before, Op::ImageFetch), count(&after, Op::ImageFetch) + count(&after, Op::ImageRead));
         assert_eq!(
-            count(&after, op::IMAGE_FETCH),
+            count(&after, Op::ImageFetch),
             6,
             "cut faces, surface, composited volume (three times) and occlusion stay textures"
         );

@@ -2,7 +2,7 @@
 //! type of the image differs. Without this rewrite a shader that works on slices would have to be compiled once for those of a volume
 //! and once for those of a batch.
 
-use super::module::{HEADER_WORDS, Instruction, SpirvError, decode, encode, error, op, text};
+use super::module::{HEADER_WORDS, Instruction, Op, SpirvError, decode, encode, error, text};
 use std::collections::{HashMap, HashSet};
 
 /// Operands of an image type behind its identifier and the type of its samples: dimension, depth, arrayed.
@@ -27,7 +27,7 @@ pub(crate) fn volumes_to_layers(words: &[u32], names: &[&str]) -> Result<Vec<u32
     let mut out = words[..HEADER_WORDS].to_vec();
     for i in &instructions {
         let mut operands = i.operands.to_vec();
-        if i.opcode == op::TYPE_IMAGE {
+        if i.opcode == Op::TypeImage {
             if layered.contains(&operands[0]) {
                 operands[DIMENSION] = DIMENSION_2D;
                 operands[ARRAYED] = 1;
@@ -48,11 +48,11 @@ fn layered_types(instructions: &[Instruction], names: &[&str]) -> Result<HashSet
     let (mut layered, mut kept) = (HashSet::new(), HashSet::new());
     for i in instructions {
         match (i.opcode, i.operands) {
-            (op::NAME, [id, name @ ..]) if names.contains(&text(name).as_str()) => drop(named.insert(*id)),
-            (op::TYPE_IMAGE, [id, _, DIMENSION_3D, _, 0, ..]) => drop(volumes.insert(*id)),
-            (op::TYPE_SAMPLED_IMAGE, [id, image]) => drop(sampled.insert(*id, *image)),
-            (op::TYPE_POINTER, [id, _, to]) => drop(pointees.insert(*id, *to)),
-            (op::VARIABLE, [of, id, ..]) => {
+            (Op::Name, [id, name @ ..]) if names.contains(&text(name).as_str()) => drop(named.insert(*id)),
+            (Op::TypeImage, [id, _, DIMENSION_3D, _, 0, ..]) => drop(volumes.insert(*id)),
+            (Op::TypeSampledImage, [id, image]) => drop(sampled.insert(*id, *image)),
+            (Op::TypePointer, [id, _, to]) => drop(pointees.insert(*id, *to)),
+            (Op::Variable, [of, id, ..]) => {
                 let Some(pointee) = pointees.get(of) else { continue };
                 let (image, is_sampled) = match sampled.get(pointee) {
                     Some(image) => (image, true),
@@ -113,10 +113,10 @@ mod tests {
         assert!(volumes_to_layers(&ambient, &["pyramid_1"]).is_err(), "another volume has the same type");
         // The source of layers has the type that the second texture would get.
         let mut twice = words(embedded("filter/gaussian").unwrap());
-        let at = decode(&twice).unwrap().iter().find(|i| i.opcode == op::TYPE_IMAGE).unwrap().operands.to_vec();
+        let at = decode(&twice).unwrap().iter().find(|i| i.opcode == Op::TypeImage).unwrap().operands.to_vec();
         let place = twice.windows(at.len()).position(|w| w == at).unwrap() + at.len();
         let other = [&[twice[super::super::module::BOUND], at[1], DIMENSION_2D, at[3], 1][..], &at[5..]].concat();
-        twice.splice(place..place, encode(op::TYPE_IMAGE, &other));
+        twice.splice(place..place, encode(Op::TypeImage, &other));
         assert!(volumes_to_layers(&twice, &["source", "target"]).is_err(), "two equal types");
     }
 

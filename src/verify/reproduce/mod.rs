@@ -363,6 +363,7 @@ fn described(case: &Case, device: &machine::Device) -> String {
     let constants: Vec<_> =
         constants.map(|((id, value), name)| json!({ "id": id, "name": name, "value": value })).collect();
     let all = json!({
+        "format": "echolume-dispatch-1",
         "title": case.title,
         "pass": case.pass,
         "scene": case.scene,

@@ -539,7 +539,8 @@ fn generated_settings_page_is_what_the_types_say() {
                 ```toml\n[surface]\nwindow = [0.1, 0.9]\n```\n\n\
                 Lengths are in mm, angles in degrees, samples and opacities in 0..1 unless a key says otherwise. Settings come in layers: \
                 the\ndefaults below, presets, the scene file, flags, `--set`; each overrides the one before. `none` switches off what an \
-                earlier layer set\n(`--set light.shadow=none`). An unknown key is refused. The presets are at the [end](#presets).\n\nWithout a preset, mode, \
+                earlier layer set\n(`--set light.shadow=none`). An unknown key is refused. A scene file may state its version,\n`version = 1`; a later one is \
+                refused. The presets are at the [end](#presets).\n\nWithout a preset, mode, \
                 windows, ramp and filters that nothing sets follow from the recording: `--explain` says which.\n\n\
                 ## Top level\n\n";
     let text = page.text.trim_end();

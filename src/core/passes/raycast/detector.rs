@@ -425,6 +425,7 @@ impl Noise {
 mod tests {
     use super::*;
     use crate::scene::Edge;
+    use libm::erf;
 
     /// Up to MEMORY samples these are the mean and the unbiased variance of all; then the oldest lose their weight.
     #[test]
@@ -439,25 +440,6 @@ mod tests {
         assert!((noise.mean - mean).abs() < 1e-12 && (noise.variance - variance).abs() < 1e-12, "{noise:?}");
         (0..200).for_each(|_| noise.learn(&[0.9; 4]));
         assert!((noise.mean - 0.9).abs() < 1e-4 && noise.variance < 1e-4, "{noise:?}");
-    }
-
-    /// The error function to 1.2e-7 (Numerical Recipes, 6.2.2): enough for places to a thousandth of an edge.
-    fn erf(x: f64) -> f64 {
-        let t = 1.0 / (1.0 + 0.5 * x.abs());
-        let series = [
-            -1.26551223,
-            1.00002368,
-            0.37409196,
-            0.09678418,
-            -0.18628806,
-            0.27886807,
-            -1.13520398,
-            1.48851587,
-            -0.82215223,
-            0.17087277,
-        ];
-        let exponent = series.iter().rev().fold(0.0, |sum, c| sum * t + c);
-        (1.0 - t * (exponent - x * x).exp()).copysign(x)
     }
 
     /// The mean of (1 + erf(x / sqrt 2 sd)) / 2 over 0..h, times two, minus one: the largest difference of an edge of height 1.

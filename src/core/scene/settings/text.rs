@@ -2,6 +2,7 @@
 //! members call these functions.
 
 use super::Settings;
+use crate::scene::file_version::FileVersion;
 use crate::tree::{Node, NodeError};
 use serde::Deserialize;
 use std::sync::Once;
@@ -33,6 +34,7 @@ impl Settings {
     /// # Errors
     /// A value does not fit its setting. The error has the position in the text.
     pub fn from_node(mut node: Node) -> Result<Settings, NodeError> {
+        node.take("version").map(FileVersion::deserialize).transpose()?;
         if let Some(ray) = node.at("ray") {
             let pixels = subsampling(|name| {
                 let is_set = ray.at(name).and_then(|flag| flag.as_bool())?;

@@ -6,8 +6,8 @@
 
 use super::chord::Chord;
 use crate::live::Update;
-use crate::scene::Settings;
 use crate::scene::load::{self, Layers, LoadError, line_of, transfer_file};
+use crate::scene::{FileVersion, Settings};
 use crate::text::printable;
 use crate::tree::{self, Node, NodeError};
 use serde::de::Error;
@@ -32,6 +32,8 @@ pub const PHANTOM: &str = "phantom";
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Config {
+    /// The version of this file's keys. Default: 1, the only one.
+    version: FileVersion,
     /// `phantom` (the default), a recording, or `igtl://HOST[:PORT]`.
     pub source: String,
     /// Geometry of the probe (TOML), if the source does not contain it. Default: none.
@@ -185,6 +187,7 @@ pub struct Files {
 impl Default for Config {
     fn default() -> Config {
         Config {
+            version: FileVersion,
             source: PHANTOM.into(),
             probe: None,
             rate: None,
@@ -665,6 +668,7 @@ fn collect_keys(above: &str, table: &DeTable, text: &str, keys: &mut Vec<KeyLoca
 
 /// The allowed values of each key, for error messages. The ranges of the source's keys are those of the flags, which `cli` checks.
 const ALLOWED: &[(&str, &str)] = &[
+    ("version", "1"),
     ("source", "\"phantom\", the file of a recording or \"igtl://HOST[:PORT]\""),
     ("probe", "a file, as \"probe.toml\""),
     ("rate", "volumes a second, above 0, at most 1e6"),
