@@ -159,7 +159,9 @@ fn show(
                     tools::start_line(ui, state, content, execute);
                     match tab {
                         InspectorTab::Tools => {
-                            recordings::show_list(ui, state, content, execute);
+                            if !state.room.has_top {
+                                recordings::show_list(ui, state, content, execute);
+                            }
                             top::show_buttons(ui, state, content, execute);
                             rail::show_grid(ui, state, content, execute);
                         }

@@ -29,6 +29,16 @@ fn told(desk: &mut Desk) -> String {
     }
 }
 
+/// A window with panels, which are told to a screen reader, and two volumes.
+fn with_panels(device: &Device) -> Desk {
+    let mut desk = Desk::new(device, ConsoleOptions { panels: true, ..options() });
+    desk.console.resize([1000, 700]);
+    desk.begin();
+    (0..2).for_each(|number| _ = desk.live(number));
+    desk.console.describe(true);
+    desk
+}
+
 /// Ticks until a picture is being drawn.
 fn until_drawing(desk: &mut Desk) {
     let begun = Instant::now();
@@ -42,11 +52,7 @@ fn until_drawing(desk: &mut Desk) {
 #[test]
 fn the_panels_are_about_the_picture_that_is_shown_until_the_next_one_is_there() {
     let device = Device::alone();
-    let mut desk = Desk::new(&device, ConsoleOptions { panels: true, ..options() });
-    desk.console.resize([1000, 700]);
-    desk.begin();
-    (0..2).for_each(|number| _ = desk.live(number));
-    desk.console.describe(true);
+    let mut desk = with_panels(&device);
     let changes: [Command; 10] = [
         Command::Layout(Layout::Four),
         Command::Mode(Mode::Mip),
@@ -81,11 +87,7 @@ fn the_panels_are_about_the_picture_that_is_shown_until_the_next_one_is_there() 
 #[test]
 fn a_picture_that_takes_long_is_said_to_be_drawn() {
     let device = Device::alone();
-    let mut desk = Desk::new(&device, ConsoleOptions { panels: true, ..options() });
-    desk.console.resize([1000, 700]);
-    desk.begin();
-    (0..2).for_each(|number| _ = desk.live(number));
-    desk.console.describe(true);
+    let mut desk = with_panels(&device);
     let says = |desk: &mut Desk, at: Instant| {
         _ = desk.console.take_tree();
         let begun = Instant::now();
