@@ -309,7 +309,6 @@ impl View {
             origin: Some(source.origin()),
             plays_once: source.plays_once(),
             opening: OpeningOptions { recent: recent_list().filter(|_| !self.kiosk), ..OpeningOptions::default() },
-            small_pictures: !self.kiosk && !self.no_ui,
             first_steps: first_steps().filter(|_| !self.kiosk && !self.no_ui && !self.no_panels),
             presets: presets_file().filter(|_| !self.kiosk),
             budget: self.budget()?,

@@ -178,6 +178,8 @@ impl Console {
             ..options.stream
         };
         let cine_volumes = stream_options.cine.volumes;
+        // The device of a kiosk is for its picture alone.
+        let small_pictures = options.small_pictures && options.overlay && !options.is_kiosk;
         let mut faults = Faults::new(options.startup_fault, now);
         let watch_fault = stream_options.shaders.as_ref().and_then(|folder| faults.watch(folder, wake.clone()).err());
         let metrics = options.prometheus.as_deref().map(|file| LiveMetrics::new(file, "view")).transpose();
@@ -199,7 +201,7 @@ impl Console {
             leaving: Leaving::new(options.source, is_recorded),
             exporter: Exporter::new(options.folder, wake.clone()),
             opening: Opening::new(options.opening, wake.clone()),
-            presets: Presets::new(options.presets, options.small_pictures, wake.clone()),
+            presets: Presets::new(options.presets, small_pictures, wake.clone()),
             reel: Reel::new(wake.clone()),
             replay: Replay::new(frozen),
             survey: Survey::new(wake),
@@ -215,7 +217,7 @@ impl Console {
                 is_kiosk: options.is_kiosk,
                 origin: options.origin,
                 plays_once: options.plays_once,
-                small_pictures: options.small_pictures,
+                small_pictures,
                 cine_volumes,
                 is_kept,
                 follows_another: display.is_some(),

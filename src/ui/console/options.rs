@@ -59,7 +59,7 @@ pub struct ConsoleOptions {
     pub startup_fault: Option<StartupFault>,
     /// Compiles the pipelines of every mode, layout and preset in advance while the user rests.
     pub warms: bool,
-    /// While the user rests, makes small pictures of looks and of the volumes of the loop for the panels.
+    /// While the user rests, makes small pictures of looks and of the volumes of the loop for the panels. A kiosk makes none.
     pub small_pictures: bool,
 }
 
