@@ -1,7 +1,6 @@
 // The picture from the rendering: the mean of several rays per pixel; or what is near and what is far at an edge of a surface, by the share of the pixel
-// that each covers; or interpolation between the rays where one ray makes several pixels, without mixing what is near with what lies far behind it; in a
-// 4-up picture, the rendering next to the planes; in a pair, the composited
-// volume next to the lit surface.
+// that each covers; or interpolation between the rays where one ray makes several pixels, without mixing what is near with what lies far behind it; the
+// rendering next to planes; in a pair, the composited volume next to the lit surface.
 // TONED: writes the final 8 bits directly, where stage 4 only tones what was assembled.
 // variants: plain; toned TONED
 #version 460
@@ -9,12 +8,12 @@
 layout(constant_id = 0) const int RAYS = 1; // along each edge of a pixel
 layout(constant_id = 1) const int APART = 1; // pixels between two rays along each axis
 layout(constant_id = 2) const int LAYOUT = 0;
-const int FOUR = 1, PAIR = 2; // 0 the rendering alone
+const int FOUR = 1, PAIR = 2, BESIDE = 3; // 0 the rendering alone
 layout(constant_id = 4) const int REFINED = 0; // 1: only marked pixels have several rays
 layout(constant_id = 3) const int GUIDED = 0; // 1: edges are where distances differ
 #ifdef TONED
 #include "tone_constants.glsl"
-layout(constant_id = 33) const int LINES = 0; // 1: over planes
+layout(constant_id = 33) const int LINES = 0; // not 0: over planes
 #endif
 layout(scalar) uniform Params {
     float cliff; // distances that differ by more belong to different things, mm
@@ -26,7 +25,7 @@ layout(scalar) uniform Params {
 #endif
 };
 uniform texture2D rendered;
-uniform texture2D planes;     // of a 4-up picture
+uniform texture2D planes;     // of FOUR: as large as the picture; of BESIDE: its right or lower part
 uniform texture2D composited; // of a pair
 uniform texture2D marks;      // of REFINED: 1 in pixels that have several rays
 uniform texture2D single;     // of REFINED: the colour of one ray through the middle of each pixel
@@ -43,11 +42,22 @@ uniform writeonly image2D picture;
 #define TARGET picture
 #endif
 
+const bool HAS_PLANES = LAYOUT == FOUR || LAYOUT == BESIDE;
+// The first column and row of planes, and the first ones of the rendering and those after it.
+ivec2 tiles_first(ivec2 size) { return LAYOUT == BESIDE ? size - textureSize(planes, 0) : ivec2(0); }
+ivec2 rendering_first(ivec2 size) { return LAYOUT == FOUR ? size / 2 : ivec2(0); }
+ivec2 rendering_end(ivec2 size) {
+    if (LAYOUT != BESIDE) return size;
+    ivec2 tiles = tiles_first(size);
+    return ivec2(tiles.x > 0 ? tiles.x : size.x, tiles.y > 0 ? tiles.y : size.y);
+}
+
 void store(ivec2 pixel, vec4 colour) {
 #ifdef TONED
     // Pixels without a hit stay black, whatever the brightness.
     vec3 c = colour.a > 0.0 ? toned(colour.rgb) : vec3(0.0);
-    if (LINES == 1) c = with_lines(c, pixel, imageSize(TARGET));
+    ivec2 size = imageSize(TARGET), first = tiles_first(size);
+    if (LINES != 0 && all(greaterThanEqual(pixel, first))) c = with_lines(c, pixel - first, size - first);
     colour = vec4(c, 1.0);
 #endif
     imageStore(TARGET, pixel, colour);
@@ -72,7 +82,7 @@ float sum_of(vec4 v) { return v.x + v.y + v.z + v.w; }
 // edge that is smooth: where a mean over more rays, weighted by (1 - x^2)^2 along each axis, says that as many are near as far. What depends on the rays
 // alone is found once for all of the pixels.
 void enlarge(ivec2 cell, ivec2 size) {
-    ivec2 corner = LAYOUT == FOUR ? size / 2 : ivec2(0); // of the rendering
+    ivec2 corner = rendering_first(size), end = rendering_end(size), tiles = tiles_first(size);
     if (LAYOUT == PAIR) {
         // The volume is the left half.
         is_volume = cell.x < size.x / 2;
@@ -110,7 +120,7 @@ void enlarge(ivec2 cell, ivec2 size) {
             gap = fourth - third;
             limit = 0.5 * third + 0.5 * fourth;
         }
-        is_edge = gap > cliff && cell.x >= corner.x;
+        is_edge = gap > cliff && cell.x >= corner.x && cell.x < end.x;
         // Around an outline or a cut face, what is near is all that is hit or cut. Between two surfaces only the nearest rays tell: further away both may
         // have the distance of the other.
         reach = is_hit(fourth) && first > 0.0 ? 2 : 4;
@@ -119,8 +129,9 @@ void enlarge(ivec2 cell, ivec2 size) {
         int y = top + n;
         float along = clamp(first_place + float(n) / float(APART), 0.0, float(last.y)) - float(low.y);
         vec4 colour = (1.0 - along) * upper + along * lower;
-        bool is_plane = LAYOUT == FOUR && (cell.x < corner.x || y < corner.y);
-        if (is_plane) colour = texelFetch(planes, clamp(ivec2(cell.x, y), ivec2(0), size - 1), 0);
+        ivec2 at = ivec2(cell.x, y);
+        bool is_plane = HAS_PLANES && (any(lessThan(at, corner)) || any(greaterThanEqual(at, end)));
+        if (is_plane) colour = texelFetch(planes, clamp(at - tiles, ivec2(0), size - tiles - 1), 0);
         if ((is_plane || !is_edge) && y >= 0 && y < size.y) store(ivec2(cell.x, y), colour);
     }
     if (GUIDED == 0 && CAPPED == 0) return;
@@ -168,7 +179,7 @@ void enlarge(ivec2 cell, ivec2 size) {
         vec4 far = (fars.x * a + fars.y * b + fars.z * c + fars.w * d) / sum_of(fars);
         vec4 colour = mix(far, near, clamp(0.5 + inside * float(APART), 0.0, 1.0));
         int y = top + n;
-        if (is_edge && y >= corner.y && y < size.y) store(ivec2(cell.x, y), colour);
+        if (is_edge && y >= corner.y && y < end.y) store(ivec2(cell.x, y), colour);
     }
 }
 
@@ -214,11 +225,10 @@ void main() {
     }
     if (any(greaterThanEqual(pixel, size))) return;
     ivec2 at = pixel;
-    if (LAYOUT == FOUR) {
-        // The rendering is the lower right tile.
-        at = pixel - size / 2;
-        if (any(lessThan(at, ivec2(0)))) {
-            store(pixel, texelFetch(planes, pixel, 0));
+    if (HAS_PLANES) {
+        at = pixel - rendering_first(size);
+        if (any(lessThan(at, ivec2(0))) || any(greaterThanEqual(pixel, rendering_end(size)))) {
+            store(pixel, texelFetch(planes, pixel - tiles_first(size), 0));
             return;
         }
     }

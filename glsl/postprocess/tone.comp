@@ -2,12 +2,14 @@
 #version 460
 #include "common.glsl"
 #include "tone_constants.glsl"
-layout(constant_id = 33) const int LINES = 0; // 1: over planes
+layout(constant_id = 33) const int LINES = 0; // over planes: 1 in all of the picture, 2 in a part of it
 layout(scalar) uniform Params {
 #include "tone_params.glsl"
     int columns; // of planes
     int rows;
     float line_strength; // 0..1
+    int tiles_x; // the first column and row of planes
+    int tiles_y;
 };
 uniform texture2D picture;
 uniform writeonly image2D screen;
@@ -22,6 +24,7 @@ void main() {
     vec4 lit = texelFetch(picture, pixel, 0);
     // Pixels without a hit stay black, whatever the brightness.
     vec3 c = lit.a > 0.0 ? toned(lit.rgb) : vec3(0.0);
-    if (LINES == 1) c = with_lines(c, pixel, size);
+    ivec2 first = LINES == 2 ? ivec2(tiles_x, tiles_y) : ivec2(0);
+    if (LINES != 0 && all(greaterThanEqual(pixel, first))) c = with_lines(c, pixel - first, size - first);
     imageStore(screen, pixel, vec4(c, 1.0));
 }

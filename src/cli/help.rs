@@ -265,7 +265,7 @@ pub fn completed(program: Command) -> Command {
 fn with_values(arg: Arg) -> Arg {
     let values: Vec<&'static str> = match arg.get_id().as_str() {
         "mode" => vec!["vr", "sr", "mixed", "mip", "minip", "xray", "mpr", "orthogonal", "tomography", "cube"],
-        "layout" => vec!["single", "4up", "pair"],
+        "layout" => vec!["single", "4up", "beside", "pair"],
         "preset" => PRESETS.iter().map(|(name, _)| *name).collect(),
         "body" => Body::ALL.map(Body::name).to_vec(),
         "sampling" => vec!["live", "gallery"],

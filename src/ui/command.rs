@@ -369,6 +369,7 @@ pub const KEY_BINDINGS: &[Binding] = &[
     on(Char('0'), keys::CUBE, Command::Mode(Mode::Cube)),
     on(Key::Tab, keys::LAYOUT_FOUR, Command::Layout(Layout::Four)),
     on(Function(4), keys::LAYOUT_FOUR, Command::Layout(Layout::Four)),
+    shift(Char('v'), keys::LAYOUT_BESIDE, Command::Layout(Layout::Beside)),
     on(Char('v'), keys::LAYOUT_PAIR, Command::Layout(Layout::Pair)),
     shift(Key::Tab, keys::LAYOUT_SINGLE, Command::Layout(Layout::Single)),
     shift(Function(4), keys::LAYOUT_SINGLE, Command::Layout(Layout::Single)),
@@ -601,7 +602,7 @@ mod tests {
             Tool::BodyMark,
         ]
         .map(Command::Tool);
-        let layouts = [Layout::Single, Layout::Four, Layout::Pair].map(Command::Layout);
+        let layouts = [Layout::Single, Layout::Four, Layout::Beside, Layout::Pair].map(Command::Layout);
         let planes = [PlaneName::A, PlaneName::B, PlaneName::C].map(Command::Plane);
         for command in modes.iter().chain(&tools).chain(&layouts).chain(&planes) {
             assert!(KEY_BINDINGS.iter().any(|b| b.command == *command), "{command:?}");

@@ -272,8 +272,8 @@ impl Gestures {
         if !scene.shows_three() {
             return self.back.take().into_iter().collect();
         }
-        let is_four = scene.settings.layout == Layout::Four;
-        self.back = Some(if is_four { Command::Layout(Layout::Four) } else { Command::Mode(Mode::Orthogonal) });
+        let layout = scene.settings.layout;
+        self.back = Some(if layout.has_planes() { Command::Layout(layout) } else { Command::Mode(Mode::Orthogonal) });
         match pane {
             Pane::Rendering => vec![Command::Layout(Layout::Single)],
             Pane::Plane(n) => {

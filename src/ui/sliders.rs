@@ -1,8 +1,6 @@
 //! The sliders of the view: those that the rows of the settings declare, and here those of no single setting.
 
-use crate::scene::{
-    Group, Layout, MAX_DEVIATION, Mode, Scene, Settings, Slider, Smooth, Transfer, numbers, start_depths,
-};
+use crate::scene::{Group, MAX_DEVIATION, Mode, Scene, Settings, Slider, Smooth, Transfer, numbers, start_depths};
 use crate::texts;
 use std::sync::LazyLock;
 
@@ -117,7 +115,7 @@ const OF_SEVERAL: [(&str, &[Slider]); 5] = [
                 |s, take| take(s.planes.window[0]),
                 |s, v| set_low(&mut s.planes.window, v),
             )
-            .when(|s| s.layout == Layout::Four),
+            .when(|s| s.layout.has_planes()),
             share(
                 "planes.window.high",
                 texts::PLANES_WINDOW_HIGH,
@@ -125,7 +123,7 @@ const OF_SEVERAL: [(&str, &[Slider]); 5] = [
                 |s, take| take(s.planes.window[1]),
                 |s, v| set_high(&mut s.planes.window, v),
             )
-            .when(|s| s.layout == Layout::Four),
+            .when(|s| s.layout.has_planes()),
         ],
     ),
     (

@@ -302,7 +302,7 @@ pub fn body_frames(scene: &Scene, body: impl Fn(DVec3) -> f64) -> Vec<Texels> {
 }
 
 /// Names of modes with their settings.
-const MODES: [(&str, &str); 16] = [
+const MODES: [(&str, &str); 17] = [
     ("vr", "mode = 'vr'"),
     ("vr, pre-integrated", "mode = 'vr'\nvolume = { compositing = 'pre-integrated', shading = 'depth-coded' }"),
     ("vr, exponential", "mode = 'vr'\nvolume = { compositing = 'exponential', transfer = 'bone' }"),
@@ -318,6 +318,7 @@ const MODES: [(&str, &str); 16] = [
     ("cube", "mode = 'cube'"),
     ("4-up, sr", "mode = 'sr'\nlayout = 'four'"),
     ("4-up, vr", "mode = 'vr'\nlayout = 'four'"),
+    ("3D + planes, vr", "mode = 'vr'\nlayout = 'beside'"),
     ("pair", "mode = 'sr'\nlayout = 'pair'"),
 ];
 
@@ -806,6 +807,10 @@ fn ray_scenes() -> Vec<SceneSpec> {
         (
             "4-up, half the rays, filters in their pixels",
             "layout = 'four'\nslices = { pixels = 12 }\ndistance = { median = 9, sigma = { window = 7 } }\nray = { subsampling = 2 }",
+        ),
+        (
+            "3D + planes, higher than wide, an eighth of the rays, filtered",
+            "mode = 'sr'\nlayout = 'beside'\npicture = { size = [27, 41] }\nray = { subsampling = 8 }\npost = { sigma = {}, gamma = 1.4 }",
         ),
         ("4-up, three rays", "mode = 'mip'\nlayout = 'four'\nslices = { pixels = 12 }\nray = { rays = 3 }"),
         (

@@ -73,6 +73,7 @@ fn views() -> Vec<(&'static str, Subject, &'static str)> {
             "mode = 'cube'\ncamera = { azimuth = 35, elevation = -20 }\ncube = { inset = { left = 9, near = 8 } }",
         ),
         ("4-up", fan(), "mode = 'sr'\nlayout = 'four'\nsurface = { threshold = 0.15 }"),
+        ("3D + planes", fan(), "mode = 'mixed'\nlayout = 'beside'\nsurface = { threshold = 0.15 }"),
         (
             "every filter",
             fan(),

@@ -100,6 +100,7 @@ fn other_pictures_have_no_pass_for_it() {
         ("mode = 'sr'", true),
         ("mode = 'mixed'", true),
         ("mode = 'sr'\nlayout = '4up'", true),
+        ("mode = 'sr'\nlayout = 'beside'", true),
         ("mode = 'sr'\nlayout = 'pair'", true),
         ("mode = 'sr'\nray.rays = 2", false),
         ("mode = 'sr'\nray.subsampling = 2", false),

@@ -86,7 +86,14 @@ fn a_ray_of_16_pixels_goes_through_their_middle() {
 #[test]
 fn back_from_moving_the_picture_is_whole_again_and_no_frame_was_needed() {
     let device = Device::new();
-    for mode in ["'sr'", "'vr'", "'mixed'", "'vr'\nvolume.shading = 'first-hit'", "'mip'\nlayout = 'four'"] {
+    for mode in [
+        "'sr'",
+        "'vr'",
+        "'mixed'",
+        "'vr'\nvolume.shading = 'first-hit'",
+        "'mip'\nlayout = 'four'",
+        "'sr'\nlayout = 'beside'",
+    ] {
         let full = look(mode);
         let half = moving(&full);
         let body = |p: glam::DVec3| 0.1 + 0.8 / (1.0 + (-(p.y - 42.0 + 3.0 * (0.3 * p.x).sin())).exp());

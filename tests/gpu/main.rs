@@ -6,6 +6,7 @@ mod antialias;
 mod any_scene;
 mod bands;
 mod batches;
+mod beside;
 mod caps;
 #[path = "../common/mod.rs"]
 mod common;

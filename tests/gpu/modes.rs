@@ -92,6 +92,11 @@ const MODES: &[(&str, &str, &str)] = &[
         "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances tiles distance_map rendered planes screen",
     ),
     (
+        "mode = 'sr'\nlayout = 'beside'\npost.floats = true",
+        "scan_convert tile_ranges brick_ranges classify_bricks_surface brick_distance_surface brick_distance_surface brick_distance_surface raycast_surface raycast_planes light assemble tone",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances tiles distance_map rendered planes picture screen",
+    ),
+    (
         "mode = 'sr'\nlayout = 'pair'",
         "scan_convert tile_ranges brick_ranges classify_bricks_surface brick_distance_surface brick_distance_surface brick_distance_surface classify_bricks_volume brick_distance_volume brick_distance_volume brick_distance_volume raycast_surface_and_volume light assemble_toned",
         "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances volume_brick_distances opaque_before transfer distance_map volume_layer rendered screen",

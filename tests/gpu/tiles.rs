@@ -13,10 +13,17 @@ use glam::DVec3;
 fn cross_lines_run_through_the_place_where_the_planes_meet() {
     let device = Device::new();
     let position = DVec3::new(3.3, 31.0, -2.1);
-    for (layout, angles) in [("mode = 'orthogonal'", ""), ("mode = 'orthogonal'", TURNED)] {
+    for (layout, angles) in [
+        ("mode = 'orthogonal'", ""),
+        ("mode = 'orthogonal'", TURNED),
+        // Each pass that draws lines: where the picture is assembled, and where it is toned.
+        ("mode = 'vr'\nlayout = 'beside'", ""),
+        ("mode = 'vr'\nlayout = 'beside'\npost = { colour_map = 'sepia', gamma = 2.0, floats = true }", TURNED),
+    ] {
+        let post = if layout.contains("post") { "" } else { "post = { colour_map = 'sepia', gamma = 2.0 }" };
         let toml = format!(
             "{layout}\nplanes = {{ position = [3.3, 11.0, -2.1], {angles} }}\npicture = {{ size = [121, 101] }}\nslices = {{ pixels = 40 }}
-             post = {{ colour_map = 'sepia', gamma = 2.0 }}"
+             {post}"
         );
         let scene = scene(Geometry::Sweep(wobbler()), BYTES, &toml.replace(",  }", " }"));
         let frames = frames(&scene, |_| 0.0);
@@ -201,6 +208,8 @@ fn what_cannot_be_drawn_is_refused_by_name() {
         ("mode = 'tomography'\nplanes = { columns = 5 }\npicture = { size = [4, 9] }", "picture.size"),
         ("mode = 'orthogonal'\npicture = { size = [1, 9] }", "picture.size"),
         ("layout = 'four'\npicture = { size = [1, 1] }", "picture.size"),
+        ("layout = 'beside'\npicture = { size = [4, 2] }", "picture.size"),
+        ("mode = 'plane'\nlayout = 'beside'", "layout"),
         ("mode = 'plane'\nplanes = { thickness = 50000 }", "planes.thickness"),
         ("mode = 'plane'\nplanes = { thickness = -1 }", "planes.thickness"),
         ("mode = 'plane'\nplanes = { position = [0, nan, 0] }", "planes.position"),

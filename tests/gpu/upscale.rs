@@ -70,7 +70,7 @@ fn each_pixel_of_every_layout_is_that_of_the_reference() {
     let device = Device::new();
     let mut single = PassRunner::new(&device).expect("single");
     let pass = by_name("assemble").expect("pass");
-    for (layout, apart, size) in ["single", "four", "pair"].into_iter().flat_map(|layout| {
+    for (layout, apart, size) in ["single", "four", "beside", "pair"].into_iter().flat_map(|layout| {
         let sizes = [[96, 96], [97, 75], [62, 90], [71, 83]];
         [2, 4, 8].into_iter().flat_map(move |apart| sizes.map(|size| (layout, apart, size)))
     }) {

@@ -230,13 +230,14 @@ pub const FILTERS: [(&str, &str); 11] = [
 ];
 
 /// Windows on the volume, in depths below the face or along the axes of the Cartesian one.
-pub const WINDOWS: [&str; 8] = [
+pub const WINDOWS: [&str; 9] = [
     "mode = 'plane'\nplanes = { tilt = 8, thickness = 1.5 }",
     "mode = 'plane'\nplanes = { plane = 'c', zoom = 2.0 }\nray.elevation = 'bspline'",
     "mode = 'tomography'\nplanes = { plane = 'b', columns = 2, rows = 1, spacing = 3.0 }\nregion = { depth = [8, 22] }",
     "mode = 'sr'\nray.elevation = 'bspline'\nregion = { lateral = [-6, 9], depth = [14, 24], elevation = [-2, 3] }",
     "mode = 'vr'\nvolume = { start_depth = 13.0 }\nray.sliding = 3\nregion = { lateral = [-20, 4] }",
     "mode = 'mixed'\nsurface = { start_depth = 16.0 }\nvolume = { start_depth = 10.0 }\nlight.skin = {}\nregion = { elevation = [-3, 1] }",
+    "mode = 'vr'\nlayout = 'beside'\nregion = { lateral = [-3, 8], depth = [5, 19] }",
     "mode = 'mip'\nlayout = 'four'\nregion = { lateral = [-3, 8], depth = [5, 19] }\nclip = [{ at = [4, 15, 0], normal = [1, 0.4, 0.3] }]",
     "mode = 'cube'\ncube.inset.right = 3\nregion = { depth = [8, 22], elevation = [-1, 2] }",
 ];

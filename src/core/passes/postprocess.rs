@@ -30,7 +30,10 @@ pub const TONE: Pass = Pass {
     writes: |_, _| vec![whole("screen", Slot::Screen)],
     extent: picture_extent,
     repeat: once,
-    params: |s, _| tone_and_lines_params(s, Params::default()),
+    params: |s, _| {
+        let [x, y] = s.tile_area().corner;
+        tone_and_lines_params(s, Params::default()).i32("tiles_x", x).i32("tiles_y", y)
+    },
     constants: |s, _| tone_and_lines_constants(s),
     tolerance: Tolerance {
         absolute: 1.01 / 255.0,
@@ -56,7 +59,12 @@ fn tone_and_lines_params(scene: &Scene, params: Params) -> Params {
 }
 
 fn tone_and_lines_constants(scene: &Scene) -> Vec<(&'static str, i32)> {
-    [tone_constants(scene), vec![("LINES", scene.draws_lines() as i32)]].concat()
+    let lines = match scene.settings.layout {
+        _ if !scene.draws_lines() => 0,
+        Layout::Beside => 2,
+        _ => 1,
+    };
+    [tone_constants(scene), vec![("LINES", lines)]].concat()
 }
 
 /// Adds the numbers of toning to those of a pass.
@@ -175,7 +183,7 @@ fn assemble_extent(scene: &Scene, _: &DispatchArgs) -> [u32; 3] {
     match scene.settings.ray.subsampling {
         1 => [width, height, 1],
         apart => {
-            let upper = if scene.settings.layout == Layout::Four { height / 2 } else { 0 };
+            let [_, upper] = scene.rendering_area().corner;
             let lead = (apart / 2 + apart - upper % apart) % apart;
             [width, (height + lead).div_ceil(apart), 1]
         }
@@ -183,7 +191,7 @@ fn assemble_extent(scene: &Scene, _: &DispatchArgs) -> [u32; 3] {
 }
 
 /// The picture from the rendering: the mean of several rays per pixel; what is near and what is far at an edge of a surface, by the share of the pixel that
-/// each covers; or interpolation between the rays where one ray makes several pixels, without mixing what is near with what lies far behind it; in a 4-up picture, the rendering next to the planes; in a pair, the composited volume next to the lit surface.
+/// each covers; or interpolation between the rays where one ray makes several pixels, without mixing what is near with what lies far behind it; the rendering next to planes; in a pair, the composited volume next to the lit surface.
 pub(crate) const ASSEMBLE: Pass = Pass {
     name: "assemble",
     stage: Stage::Postprocess,
@@ -246,7 +254,7 @@ pub(crate) const ASSEMBLE_TONED: Pass = Pass {
 /// Why a pixel of the picture is not that of one ray.
 fn why_assembled(scene: &Scene, layout: Layout) -> &'static str {
     match layout {
-        Layout::Four => "the rendering stands beside three planes",
+        Layout::Four | Layout::Beside => "the rendering stands beside three planes",
         Layout::Pair => "the volume stands beside the surface",
         Layout::Single if scene.settings.ray.subsampling > 1 => "one ray makes several pixels",
         Layout::Single if scene.antialiases() => "edges are antialiased",
@@ -257,7 +265,7 @@ fn why_assembled(scene: &Scene, layout: Layout) -> &'static str {
 
 fn assemble_reads(scene: &Scene) -> Vec<Bind> {
     let mut reads = vec![whole("rendered", Slot::Rendered)];
-    reads.extend((scene.settings.layout == Layout::Four).then_some(whole("planes", Slot::Planes)));
+    reads.extend(scene.settings.layout.has_planes().then_some(whole("planes", Slot::Planes)));
     reads.extend(scene.is_pair().then_some(whole("composited", composited_beside_surface(scene))));
     if scene.adapts_rays() {
         reads.extend([whole("marks", Slot::EdgeMarks), whole("single", Slot::PixelRays)]);
@@ -276,6 +284,7 @@ fn assemble_constants(scene: &Scene) -> Vec<(&'static str, i32)> {
         Layout::Single => 0,
         Layout::Four => 1,
         Layout::Pair => 2,
+        Layout::Beside => 3,
     };
     let ray = &scene.settings.ray;
     let guided = guide(scene).is_some();
@@ -293,18 +302,13 @@ fn assemble_constants(scene: &Scene) -> Vec<(&'static str, i32)> {
 fn assemble(scene: &Scene, reads: &Arrays, picture: &mut Texels) {
     let rays = scene.settings.ray.rays as usize;
     let [beside, of_rendering] = [false, true].map(|is_rendering| edge_distances(scene, reads, is_rendering));
-    let corner = match scene.settings.layout {
-        Layout::Single => [0, 0],
-        // The lower right tile.
-        Layout::Four => [picture.size[0] / 2, picture.size[1] / 2],
-        // The right half.
-        Layout::Pair => [picture.size[0] / 2, 0],
-    };
+    let rendering = scene.rendering_area();
+    let [corner, tiles] = [rendering, scene.tile_area()].map(|area| area.corner.map(|n| n as usize));
     for y in 0..picture.size[1] {
         for x in 0..picture.size[0] {
-            let is_rendering = x >= corner[0] && y >= corner[1];
+            let is_rendering = rendering.holds([x, y]);
             if !is_rendering && scene.cuts_planes() {
-                let plane = reads.get("planes").get([x, y, 0]).to_vec();
+                let plane = reads.get("planes").get([x - tiles[0], y - tiles[1], 0]).to_vec();
                 picture.set([x, y, 0], &plane);
                 continue;
             }

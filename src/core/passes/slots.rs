@@ -465,8 +465,8 @@ slots! {
     /// Workgroups along x, y and z that take all of them, and their number.
     RefineGroups = D::image("refine_groups", |_| Shape::Two([4, 1]), |_| Format::R32u)
         .of(GREY, "workgroups along x, y, z; pixels");
-    /// The planes of a 4-up picture; black where the rendering goes.
-    Planes = D::image("planes", per_pixel, |_| Format::Rgba16f).of(COLOUR, "share, 0..1");
+    /// The planes beside a rendering; black where a 4-up picture has the rendering.
+    Planes = D::image("planes", |s| Shape::Two(s.tile_area().size), |_| Format::Rgba16f).of(COLOUR, "share, 0..1");
     /// The picture of stages 2 and 3 before the filters of stage 4.
     Picture = D::image("picture", per_pixel, |_| Format::Rgba16f).of(COLOUR, "share, 0..1");
     SmoothPicture = D::image("smooth_picture", per_pixel, |_| Format::Rgba16f).of(COLOUR, "share, 0..1");

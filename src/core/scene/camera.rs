@@ -1,7 +1,7 @@
 //! The camera as rays. The origin and direction of a pixel's ray are affine functions of the pixel's position, in parallel and
 //! perspective projection.
 
-use super::{Layout, Settings};
+use super::Settings;
 use glam::DVec3;
 
 /// How far the eye of a parallel view stands off the box beyond a 20th of the box's extent along the view: this share of half its diagonal. About 1 mm
@@ -41,7 +41,7 @@ impl Rays {
     }
 }
 
-/// Number of rays along each axis: a quarter of a 4-up picture or half of a pair (rounded up), times the rays per pixel, or half
+/// Number of rays along each axis: the part of the picture that the layout leaves to the rendering, times the rays per pixel, or half
 /// or a quarter (rounded up) with that resolution.
 pub fn ray_size(settings: &Settings) -> [u32; 2] {
     full_size(settings).map(|n| n.div_ceil(settings.ray.subsampling))
@@ -49,12 +49,7 @@ pub fn ray_size(settings: &Settings) -> [u32; 2] {
 
 /// As [`ray_size`], with a ray for every pixel.
 pub fn full_size(settings: &Settings) -> [u32; 2] {
-    let tile = match settings.layout {
-        Layout::Single => settings.picture.size,
-        Layout::Four => settings.picture.size.map(|n| n.div_ceil(2)),
-        Layout::Pair => [settings.picture.size[0].div_ceil(2), settings.picture.size[1]],
-    };
-    tile.map(|n| n * settings.ray.rays)
+    settings.layout.rendering(settings.picture.size).size.map(|n| n * settings.ray.rays)
 }
 
 /// The camera that frames the box (`low`, `high`) by the settings. `depth_offset` converts depths below the face to Y.

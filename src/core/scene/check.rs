@@ -62,8 +62,8 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     if width > MAX_PICTURE || height > MAX_PICTURE {
         return refuse("ray.rays", format!("makes {width}x{height} rays, each edge must lie in 1..={MAX_PICTURE}"));
     }
-    if settings.layout == Layout::Four && settings.mode.is_flat() {
-        return refuse("layout", "four shows three planes and a rendering: the mode must be one that renders");
+    if settings.layout.has_planes() && settings.mode.is_flat() {
+        return refuse("layout", "shows three planes and a rendering: the mode must be one that renders");
     }
     if settings.marks.are_mirrored() {
         return refuse(
@@ -326,8 +326,9 @@ pub(super) fn check_planes_resolved(scene: &Scene) -> Result<(), SceneError> {
     if tiles > MAX_TILES {
         return refuse("planes.columns, planes.rows", format!("make {tiles} tiles, at most {MAX_TILES} can be drawn"));
     }
-    let ([columns, rows], [width, height]) = (scene.tile_grid(), scene.picture_size());
+    let ([columns, rows], [width, height]) = (scene.tile_grid(), scene.tile_area().size);
     if columns > width || rows > height {
+        let [width, height] = scene.picture_size();
         return refuse(
             "picture.size",
             format!("is {width}x{height}: {columns} x {rows} tiles need at least one pixel each"),

@@ -214,7 +214,7 @@ impl Layers {
         if mode == Mode::Cube {
             found.cube(geometry);
         }
-        if chosen.layout == Layout::Four && !mode.is_flat() {
+        if chosen.layout.has_planes() && !mode.is_flat() {
             found.planes_beside_rendering(geometry);
         }
         if mode == Mode::MinIp {
@@ -283,7 +283,7 @@ impl Found<'_> {
         let is_frame = geometry.slices() == 1
             || matches!(geometry, Geometry::Sweep(probe) if matches!(probe.motion, Motion::Still { .. }));
         // A pair is of mode surface; a single frame has no layout.
-        let is_fixed = chosen.layout == Layout::Pair || (chosen.layout == Layout::Four && is_frame);
+        let is_fixed = chosen.layout == Layout::Pair || (chosen.layout.has_planes() && is_frame);
         if self.layers.has("mode") || is_fixed || !self.layers.presets().is_empty() {
             return chosen.mode;
         }

@@ -1,9 +1,10 @@
 //! Marks of a picture: for each tile its position, its scale, the letters of the patient's sides at its edges, and the side of the probe's
 //! marker. The viewer and written pictures draw the same marks.
 
-use super::planes::{CURVE_COLOUR, Plane, cell, colour};
+use super::areas::Area;
+use super::planes::{CURVE_COLOUR, Plane, colour};
 use super::region::depth_offset;
-use super::{Layout, Marks, Mode, PlaneName, ProbeMarker, Scene, Sides};
+use super::{Marks, Mode, PlaneName, ProbeMarker, Scene, Sides};
 use glam::DVec3;
 
 /// Directions whose components differ by less are as far from one edge as from the other.
@@ -194,13 +195,7 @@ impl Scene {
     }
 
     fn marks_of_rendering(&self, marks: &Marks) -> TileMarks {
-        let size = self.picture_size();
-        let corner = match self.settings.layout {
-            Layout::Single => [0, 0],
-            Layout::Four => size.map(|n| cell(n, 1, 2)),
-            Layout::Pair => [cell(size[0], 1, 2), 0],
-        };
-        let (rays, size) = (&self.rays, [size[0] - corner[0], size[1] - corner[1]]);
+        let (rays, Area { corner, size }) = (&self.rays, self.rendering_area());
         let apart = match rays.is_perspective {
             true => rays.direction_dx.length() * (rays.target - rays.origin).dot(rays.forward),
             false => rays.origin_dx.length(),

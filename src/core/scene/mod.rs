@@ -1,6 +1,7 @@
 //! The scene: everything that determines a picture. It combines the geometry of the probe, the type of the samples and the user's
 //! [`Settings`], checked and resolved to the values that the passes need. Pure data, no Vulkan.
 
+mod areas;
 mod bricks;
 pub mod camera;
 mod caps;
@@ -307,8 +308,8 @@ impl Scene {
         let mut resolver = Resolver { pitches, resolved: Vec::new() };
         let conditioning = resolver.conditioning(&settings.conditioning);
         let slice_filters = resolver.slices(&settings.slices);
-        let is_four = settings.layout == Layout::Four;
-        let section_smooth = settings.planes.smooth.filter(|_| is_four);
+        let has_planes = settings.layout.has_planes();
+        let section_smooth = settings.planes.smooth.filter(|_| has_planes);
         let section_smooth = section_smooth.map(|smooth| resolver.smooth("planes.smooth.elevation_mm", smooth));
         let halvings = settings.ray.subsampling.ilog2();
         let distance = (0..halvings).fold(resolver.distance(&settings.distance), |distance, _| distance.halved());
@@ -648,9 +649,9 @@ impl Scene {
         matches!(self.settings.mode, Mode::Mip | Mode::MinIp | Mode::Mean)
     }
 
-    /// True if the picture has planes: a mode of planes, or 4-up.
+    /// True if the picture has planes: a mode of planes, or a layout with planes beside the rendering.
     pub fn cuts_planes(&self) -> bool {
-        self.is_flat() || self.settings.layout == Layout::Four
+        self.is_flat() || self.settings.layout.has_planes()
     }
 
     /// True if the mode cuts planes and casts no rays.

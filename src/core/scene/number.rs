@@ -289,7 +289,7 @@ impl Settings {
     }
 
     pub(super) fn shows_planes(&self) -> bool {
-        self.mode.is_flat() || self.layout == Layout::Four
+        self.mode.is_flat() || self.layout.has_planes()
     }
 
     pub(super) fn is_cube(&self) -> bool {

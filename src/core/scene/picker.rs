@@ -1,7 +1,6 @@
 //! The projection of the rendered part of a picture: from points in space to pixels, and from pixels to rays.
 
-use super::planes::cell;
-use super::{Layout, Rays, Scene};
+use super::{Rays, Scene};
 use glam::DVec3;
 
 /// The projection of the rendered part of the picture. Positions are in pixels of the picture from its upper left corner.
@@ -16,17 +15,12 @@ pub struct Picker<'a> {
 
 impl<'a> Picker<'a> {
     pub fn of(scene: &'a Scene) -> Picker<'a> {
-        let size = scene.picture_size();
-        let corner = match scene.settings.layout {
-            Layout::Single => [0, 0],
-            Layout::Four => size.map(|n| cell(n, 1, 2)),
-            Layout::Pair => [cell(size[0], 1, 2), 0],
-        };
+        let area = scene.rendering_area();
         let ray = &scene.settings.ray;
         Picker {
             rays: &scene.rays,
-            corner: corner.map(f64::from),
-            size: std::array::from_fn(|a| f64::from(size[a] - corner[a])),
+            corner: area.corner.map(f64::from),
+            size: area.size.map(f64::from),
             rays_per_pixel: f64::from(ray.rays) / f64::from(ray.subsampling),
         }
     }

@@ -1,5 +1,6 @@
 //! Planes through the volume, resolved to the tiles of a picture: which pixel shows which point in space.
 
+use super::areas::Area;
 use super::curve::Line;
 use super::{Curve, Layout, MAX_POINTS, Mode, PlaneName, Scene, Slab, View, depth_offset, insonified_box};
 use glam::{DMat3, DVec2, DVec3};
@@ -103,7 +104,7 @@ pub fn cell(edge: u32, n: u32, count: u32) -> u32 {
 impl Scene {
     /// True if the planes beside a rendering are cut from a volume of their own: all of the sector, whatever is rendered.
     pub fn has_sections(&self) -> bool {
-        self.settings.layout == Layout::Four && !self.is_flat() && self.section_smooth.is_some()
+        self.settings.layout.has_planes() && !self.is_flat() && self.section_smooth.is_some()
     }
 
     /// Corners of the box that planes show, mm in space.
@@ -127,6 +128,7 @@ impl Scene {
     pub(crate) fn tile_grid(&self) -> [u32; 2] {
         match (self.settings.layout, self.settings.mode) {
             (Layout::Single, Mode::Plane) if self.has_curve() => self.grid_of_two(),
+            (Layout::Beside, _) => self.grid_beside(),
             (Layout::Four, _) | (_, Mode::Orthogonal) => [2, 2],
             (_, Mode::Tomography) => [self.settings.planes.columns, self.settings.planes.rows],
             _ => [1, 1],
@@ -152,7 +154,7 @@ impl Scene {
 
     /// True if three crossing planes are shown.
     pub fn shows_three(&self) -> bool {
-        self.settings.layout == Layout::Four || self.settings.mode == Mode::Orthogonal
+        self.settings.layout.has_planes() || self.settings.mode == Mode::Orthogonal
     }
 
     /// True if lines are drawn over the planes: cross-lines and frames, or the lines between tiles.
@@ -264,7 +266,7 @@ impl Scene {
     /// The tiles of this scene.
     pub fn tiling(&self) -> Tiling {
         let [columns, rows] = self.tile_grid();
-        let [width, height] = self.picture_size();
+        let Area { corner: [left, top], size: [width, height] } = self.tile_area();
         let three = [PlaneName::A, PlaneName::B, PlaneName::C];
         let planes: Vec<Plane> = match self.shows_three() {
             true => three.map(|name| self.plane(name)).to_vec(),
@@ -287,8 +289,8 @@ impl Scene {
         let middle = (low + high) / 2.0;
         let place = |n: u32| {
             let (column, row) = (n % columns, n / columns);
-            let corner = [cell(width, column, columns), cell(height, row, rows)];
-            let end = [cell(width, column + 1, columns), cell(height, row + 1, rows)];
+            let corner = [left + cell(width, column, columns), top + cell(height, row, rows)];
+            let end = [left + cell(width, column + 1, columns), top + cell(height, row + 1, rows)];
             (corner, [end[0] - corner[0], end[1] - corner[1]])
         };
         let section = self.section(middle);

@@ -90,8 +90,8 @@ const CHOICES: [&str; 53] = [
     "mode = 'vr'\nvolume.shading = 'depth-coded'",
 ];
 
-/// The settings that a user may switch to from these by one choice, beginning with these: each mode alone, each mode that casts rays in a 4-up
-/// picture too, the pair of surface and volume, and each preset laid over these. `follow` adds the settings that follow from another mode or
+/// The settings that a user may switch to from these by one choice, beginning with these: each mode alone, each mode that casts rays with
+/// planes beside it too, the pair of surface and volume, and each preset laid over these. `follow` adds the settings that follow from another mode or
 /// layout; presets do not go through it.
 pub fn switches(from: &Settings, follow: impl Fn(Settings) -> Settings) -> Vec<Variant> {
     let mut variants = vec![Variant::new("as it is", from.clone())];
@@ -101,8 +101,10 @@ pub fn switches(from: &Settings, follow: impl Fn(Settings) -> Settings) -> Vec<V
         settings.layout = Layout::Single;
         variants.push(Variant::new(format!("mode {name}"), follow(settings.clone())));
         if !mode.is_flat() {
-            settings.layout = Layout::Four;
-            variants.push(Variant::new(format!("mode {name}, layout 4up"), follow(settings)));
+            for (layout, layout_name) in [(Layout::Four, "4up"), (Layout::Beside, "beside")] {
+                settings.layout = layout;
+                variants.push(Variant::new(format!("mode {name}, layout {layout_name}"), follow(settings.clone())));
+            }
         }
     }
     let pair = Settings { mode: Mode::Surface, layout: Layout::Pair, ..from.clone() };
@@ -183,7 +185,9 @@ mod tests {
             let layouts: Vec<Layout> =
                 variants[1..].iter().filter(|v| v.settings.mode == mode).map(|v| v.settings.layout).collect();
             assert!(layouts.contains(&Layout::Single), "{mode:?}: {layouts:?}");
-            assert_eq!(layouts.contains(&Layout::Four), !mode.is_flat(), "{mode:?}: {layouts:?}");
+            for layout in [Layout::Four, Layout::Beside] {
+                assert_eq!(layouts.contains(&layout), !mode.is_flat(), "{mode:?}: {layouts:?}");
+            }
         }
     }
 }

@@ -5,7 +5,7 @@ use crate::controls::Controls;
 use crate::frame_budget::{self, Pace, Quality, Rung};
 use crate::live::Lowered;
 use crate::plan::Work;
-use crate::scene::{Follows, Layout, Scene, Settings, variants};
+use crate::scene::{Follows, Scene, Settings, variants};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -188,7 +188,7 @@ pub(super) fn full_settings(controls: &Controls) -> Settings {
     let mut full = controls.settings().clone().without_drawings();
     // A region that grows and a plane that moves show slices that were left out. With all of them processed, dragging needs no frame
     // again.
-    let cuts_planes = full.mode.is_flat() || full.layout == Layout::Four;
+    let cuts_planes = full.mode.is_flat() || full.layout.has_planes();
     full.slices.everything |= cuts_planes || matches!(controls.tool(), Tool::Region | Tool::Clip);
     full
 }

@@ -15,7 +15,7 @@ fn kept<const N: usize>(point: [f64; N]) -> [f64; N] {
 
 /// True if a picture has a plane on which a line can be drawn.
 fn has_plane(settings: &Settings) -> bool {
-    settings.layout == Layout::Four || matches!(settings.mode, Mode::Orthogonal | Mode::Plane)
+    settings.layout.has_planes() || matches!(settings.mode, Mode::Orthogonal | Mode::Plane)
 }
 
 impl Controls {

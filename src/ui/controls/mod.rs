@@ -65,7 +65,7 @@ pub struct Controls {
     /// As it is in a file.
     saved: Handiwork,
     tool: Tool,
-    /// The last mode that renders the volume: a 4-up picture returns to it.
+    /// The last mode that renders the volume: a layout with planes returns to it.
     rendered: Mode,
     /// What settings that nobody chose follow from. None: they are complete.
     defaults: Option<Defaults>,
@@ -373,7 +373,7 @@ impl Controls {
             Command::Mode(mode) => new.set_mode(mode),
             Command::Layout(layout) => {
                 new.layout = layout;
-                if layout == Layout::Four && new.mode.is_flat() {
+                if layout.has_planes() && new.mode.is_flat() {
                     new.mode = self.rendered;
                 }
                 if layout == Layout::Pair {

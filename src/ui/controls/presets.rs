@@ -50,8 +50,8 @@ impl Controls {
         }
         layers.preset(exam.preset).ok()?;
         let mode = layers.clone().finish().ok()?.mode;
-        let is_four = self.settings.layout == Layout::Four && !mode.is_flat();
-        let layers = layers.in_mode(mode, if is_four { Layout::Four } else { Layout::Single })?;
+        let keeps_planes = self.settings.layout.has_planes() && !mode.is_flat();
+        let layers = layers.in_mode(mode, if keeps_planes { self.settings.layout } else { Layout::Single })?;
         let look = layers.completed(&scene.geometry, None).ok()?.settings;
         let mut settings = look.look_over(&self.in_mode_of_look(&look));
         if is_phantom && exam.is_framed {

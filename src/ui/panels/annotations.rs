@@ -116,7 +116,7 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32, messages: &[Rect]) 
             axes(&painter, &mut taken, area, scene);
         }
     }
-    if has_room(&picture, MIN_FOR_COLOURS) && scene.settings.layout != Layout::Four {
+    if has_room(&picture, MIN_FOR_COLOURS) && !scene.settings.layout.has_planes() {
         colour_bar(&painter, &mut taken, picture, scene, scale);
     }
     for (n, tile, area) in tiles() {

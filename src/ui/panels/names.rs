@@ -151,7 +151,7 @@ fn in_words(state: &PanelState) -> (String, String) {
     let settings = &scene.settings;
     let layout = match settings.layout {
         Layout::Single => "",
-        Layout::Four => texts::WITH_THREE_PLANES,
+        Layout::Four | Layout::Beside => texts::WITH_THREE_PLANES,
         Layout::Pair => texts::BESIDE_THE_VOLUME,
     };
     let time = match (state.is_frozen, state.ended) {

@@ -4,7 +4,7 @@ use super::names::{self, Tell};
 use super::widgets::{row_of, slider, switch};
 use super::{PanelState, ROW_HEIGHT, SMALL_TEXT, tools};
 use crate::command::Command;
-use crate::scene::{Group, Layout, Mode, PlaneName};
+use crate::scene::{Group, Mode, PlaneName};
 use crate::sliders::SLIDERS;
 use crate::texts;
 use egui::{Button, Label, RichText, Ui, vec2};
@@ -13,7 +13,7 @@ const PLANES: [(PlaneName, &str); 3] = [(PlaneName::A, "A"), (PlaneName::B, "B")
 
 pub(super) fn show(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
     let settings = state.controls.settings();
-    let has_planes = settings.mode.is_flat() || settings.layout == Layout::Four;
+    let has_planes = settings.mode.is_flat() || settings.layout.has_planes();
     tools::curve(ui, state, width, execute);
     if has_planes && settings.mode != Mode::Orthogonal {
         let is_chosen = |plane| settings.planes.plane == plane;

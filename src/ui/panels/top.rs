@@ -17,10 +17,11 @@ use egui::{
 };
 
 /// The views: their names, what chooses them, and what they show.
-const VIEWS: [(&str, Command, &str); 6] = [
+const VIEWS: [(&str, Command, &str); 7] = [
     (texts::VIEW_3D, Command::Rendering, texts::VIEW_3D_HINT),
-    (texts::LAYOUT_PAIR, Command::Layout(Layout::Pair), hints::of_layout(Layout::Pair)),
+    (texts::LAYOUT_BESIDE, Command::Layout(Layout::Beside), hints::of_layout(Layout::Beside)),
     (texts::LAYOUT_FOUR, Command::Layout(Layout::Four), hints::of_layout(Layout::Four)),
+    (texts::LAYOUT_PAIR, Command::Layout(Layout::Pair), hints::of_layout(Layout::Pair)),
     (Mode::Orthogonal.title(), Command::Mode(Mode::Orthogonal), hints::of_mode(Mode::Orthogonal)),
     (Mode::Plane.title(), Command::Mode(Mode::Plane), hints::of_mode(Mode::Plane)),
     (Mode::Tomography.title(), Command::Mode(Mode::Tomography), hints::of_mode(Mode::Tomography)),

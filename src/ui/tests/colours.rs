@@ -204,7 +204,7 @@ fn check_boundaries(shown: &Shown, what: &str) {
 #[test]
 fn everything_that_is_drawn_has_the_contrast_that_wcag_demands() {
     for mode in Mode::ALL {
-        for layout in [Layout::Single, Layout::Four, Layout::Pair] {
+        for layout in [Layout::Single, Layout::Four, Layout::Beside, Layout::Pair] {
             let mut shown = Shown::new("marks.lateral='right-left'\nmarks.elevation='head-feet'");
             shown.apply(Command::Mode(mode));
             shown.apply(Command::Layout(layout));

@@ -102,7 +102,7 @@ fn is_named(node: &Node, role: Role, name: &str) -> bool {
 #[test]
 fn every_control_has_a_name_of_its_own_and_a_tooltip_in_every_mode_and_list() {
     for mode in Mode::ALL {
-        for layout in [Layout::Single, Layout::Four, Layout::Pair] {
+        for layout in [Layout::Single, Layout::Four, Layout::Beside, Layout::Pair] {
             let mut shown = Shown::new("");
             shown.apply(Command::Mode(mode));
             shown.apply(Command::Layout(layout));

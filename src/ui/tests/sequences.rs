@@ -26,7 +26,7 @@ fn command() -> impl Strategy<Value = Command> {
     let two = || [number(), number()];
     prop_oneof![
         3 => mode().prop_map(Command::Mode),
-        2 => prop::sample::select(vec![Layout::Single, Layout::Four, Layout::Pair]).prop_map(Command::Layout),
+        2 => prop::sample::select(vec![Layout::Single, Layout::Four, Layout::Beside, Layout::Pair]).prop_map(Command::Layout),
         1 => tool().prop_map(Command::Tool),
         1 => two().prop_map(Command::Rotate),
         1 => prop::sample::select(Body::ALL.to_vec()).prop_map(Command::AddBodyMark),

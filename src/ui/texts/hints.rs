@@ -23,7 +23,8 @@ pub const fn of_mode(mode: Mode) -> &'static str {
 pub(crate) const fn of_layout(layout: Layout) -> &'static str {
     match layout {
         Layout::Single => "One picture.",
-        Layout::Four => "Three planes and the rendering.",
+        Layout::Four => "Three planes and the rendering, of one size.",
+        Layout::Beside => "The rendering, and three planes beside it.",
         Layout::Pair => "Volume and surface side by side.",
     }
 }

@@ -23,6 +23,7 @@ pub const DEPTH: &str = "Depth";
 pub(crate) const PRESETS_HINT: &str =
     "The looks of an examination, with small pictures of this volume, and your own. (Ctrl+P)";
 pub const PRESETS: &str = "Presets";
+pub(crate) const LAYOUT_BESIDE: &str = "3D + planes";
 pub(crate) const LAYOUT_FOUR: &str = "4-up";
 pub(crate) const LAYOUT_PAIR: &str = "VR | SR";
 pub(crate) const PROGRAM: &str = "Echolume";
@@ -49,7 +50,7 @@ pub(crate) const VIEW_3D: &str = "3D";
 pub(crate) const VIEW_3D_HINT: &str = "The rendering alone (Shift+Tab: one picture).";
 pub(crate) const RENDERING: &str = "Rendering";
 pub(crate) const RENDER_START: &str = "Where rendering starts";
-pub(crate) const NO_PLANES: &str = "4-up, 3 planes, Plane and Slices show planes.";
+pub(crate) const NO_PLANES: &str = "3D + planes, 4-up, 3 planes, Plane and Slices show planes.";
 pub(crate) const NO_MEASUREMENTS: &str = "Nothing is measured yet.";
 pub(crate) const QUICK_LOOKS: &str = "Quick looks";
 pub(crate) const MANAGE_LOOKS: &str = "Manage";

@@ -138,7 +138,7 @@ impl Desk {
     /// The settings of the idle picture.
     pub fn drawn(&self) -> Settings {
         let mut settings = self.console.controls().settings().clone().without_drawings();
-        let cuts_planes = settings.mode.is_flat() || settings.layout == Layout::Four;
+        let cuts_planes = settings.mode.is_flat() || settings.layout.has_planes();
         settings.slices.everything |=
             cuts_planes || matches!(self.console.controls().tool(), Tool::Region | Tool::Clip);
         settings

@@ -22,7 +22,7 @@ pub(crate) const PASS: Pass = Pass {
     },
     reads: |s, _| reads(s),
     writes: |s, _| vec![whole("picture", if s.is_flat() { Slot::Picture } else { Slot::Planes })],
-    extent: |s, t| in_runs_of(run(s), picture_extent(s, t), 1),
+    extent,
     repeat: once,
     params: |s, _| params(s),
     constants: |s, _| constants(s),
@@ -36,10 +36,11 @@ pub(crate) const PASS: Pass = Pass {
     reference: |scene, _, reads, writes| {
         let volume = reads.get("volume");
         let picture = writes.get_mut("picture");
-        let cut = Cut::of(scene);
+        let (cut, [left, top]) = (Cut::of(scene), scene.tile_area().corner);
         let [width, height, _] = picture.size;
         for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
-            let rgba = value_at(scene, volume, &cut, x, y).map_or([0.0; 4], |v| [v, v, v, 1.0]);
+            let rgba =
+                value_at(scene, volume, &cut, x + left as usize, y + top as usize).map_or([0.0; 4], |v| [v, v, v, 1.0]);
             picture.set([x, y, 0], &rgba);
         }
     },
@@ -75,6 +76,12 @@ pub(crate) const TONED: Pass = Pass {
     },
     ..PASS
 };
+
+/// One invocation for a run of pixels of a column, of the part of the picture that has planes.
+fn extent(scene: &Scene, _: &DispatchArgs) -> [u32; 3] {
+    let [width, height] = scene.tile_area().size;
+    in_runs_of(run(scene), [width, height, 1], 1)
+}
 
 fn reads(scene: &Scene) -> Vec<Bind> {
     let mut reads = ray::reads(scene);

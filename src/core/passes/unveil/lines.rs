@@ -2,9 +2,9 @@
 
 use super::Unveiled;
 use crate::passes::raycast::ray;
+use crate::scene::Scene;
 use crate::scene::planes::{Tile, Tiling};
 use crate::scene::start_curve::StartCurve;
-use crate::scene::{Layout, Scene};
 use glam::DVec3;
 
 /// Cells along each edge of a tile between whose corners a line is straight: surface and curve are smooth.
@@ -28,7 +28,7 @@ pub fn lines(scene: &Scene, unveiled: Option<&Unveiled>) -> Vec<StartLine> {
         curve: scene.start_curve(),
         least: scene.start_depth(),
     };
-    let is_shown = scene.settings.layout == Layout::Four && scene.draws_lines();
+    let is_shown = scene.settings.layout.has_planes() && scene.draws_lines();
     if !is_shown || (start.surface.is_none() && start.curve.is_none()) {
         return Vec::new();
     }

@@ -189,6 +189,8 @@ pub enum Layout {
     /// 4-up: the three orthogonal planes and the rendering of the mode.
     #[serde(alias = "4up", alias = "4-up")]
     Four,
+    /// The rendering of the mode, and the three orthogonal planes in a column on its right; in a picture that is higher than wide, in a row below it.
+    Beside,
     /// Volume rendering on the left and surface rendering on the right, of one march along the same rays. Mode surface only.
     Pair,
 }
