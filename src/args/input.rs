@@ -62,7 +62,7 @@ impl InputArgs {
         Ok((opened.source, opened.scene))
     }
 
-    /// As [`InputArgs::open`], for the first of several volumes that are shown.
+    /// As [`InputArgs::open`], with the scene of volume `first`, the first of `--volumes`.
     pub fn open_volumes(&self, first: usize) -> Result<(Box<dyn Source>, Scene), Failure> {
         let opened = self.open_recorded(&[], Some(first))?;
         Ok((opened.source, opened.scene))
@@ -240,7 +240,7 @@ pub struct SceneArgs {
     /// vr (volume), sr (surface), mixed, mip, minip, xray (mean), mpr (plane), orthogonal, tomography, cube
     #[arg(long)]
     mode: Option<String>,
-    /// single; 4up: three orthogonal planes and the rendering; beside: the rendering and the planes in a column beside it; pair: volume and surface of one march side by side
+    /// single; 4up: three orthogonal planes and the rendering; beside: the rendering and the planes in a column beside it; pair: volume and surface side by side
     #[arg(long, value_name = "LAYOUT")]
     layout: Option<String>,
     /// Transfer function: grey, sepia, skin, bone, cool, warm, or a .toml file of points

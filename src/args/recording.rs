@@ -80,7 +80,7 @@ impl GeometryArgs {
         })
     }
 
-    /// The same options for the library.
+    /// The arguments as options of the library.
     pub fn options(&self) -> OpenOptions<'_> {
         OpenOptions {
             probe: self.probe.as_deref(),

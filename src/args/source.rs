@@ -110,13 +110,13 @@ impl SourceArgs {
         self.motor.check()
     }
 
-    /// The same arguments, with the geometry of the flags, for another file.
+    /// These arguments for another file, with the geometry of the flags.
     #[cfg(feature = "view")]
     pub fn at_file(&self, file: &Path) -> SourceArgs {
         SourceArgs { source: file.to_string_lossy().into_owned(), ..self.clone() }
     }
 
-    /// The same arguments for another file, whose geometry is derived from the file alone.
+    /// These arguments for another file, with the geometry of that file alone.
     #[cfg(feature = "view")]
     pub fn of_file(&self, file: &Path) -> SourceArgs {
         let geometry = GeometryArgs::default();
@@ -131,7 +131,7 @@ impl SourceArgs {
         }
     }
 
-    /// The same arguments with the recording of a workspace.
+    /// These arguments with the recording of a workspace.
     ///
     /// # Errors
     /// The workspace names no recording.

@@ -1,4 +1,4 @@
-//! Pictures of one unit by two devices, held against each other: bit for bit on the same driver, within the tolerance of `verify` on others.
+//! Comparison of two pictures of one unit: bit for bit on the same device and driver, otherwise within the tolerance of `verify`.
 
 use crate::picture::Picture;
 use crate::verify::report::Figure;
@@ -15,23 +15,23 @@ pub struct Drawer {
     pub is_software: bool,
 }
 
-/// What may differ.
+/// How much two pictures may differ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Class {
-    /// The same device and driver, or no device at all: the same bytes.
+    /// The same device and driver, or no device at all: the bytes must be equal.
     SameDriver,
-    /// Another device or driver: the tolerance of `verify` for pictures.
+    /// Another device or driver: the pictures must agree within the tolerance of `verify`.
     OtherDriver,
 }
 
 impl Class {
-    /// The class of two results.
+    /// The class of results by these two devices.
     pub fn of(a: Option<&Drawer>, b: Option<&Drawer>) -> Class {
         if a == b { Class::SameDriver } else { Class::OtherDriver }
     }
 
-    /// For reports.
+    /// The class in words, for reports.
     pub fn sentence(self) -> &'static str {
         match self {
             Class::SameDriver => "same device and driver: bit for bit",
@@ -40,26 +40,26 @@ impl Class {
     }
 }
 
-/// How a second picture of a unit compares with the one that is kept.
+/// The comparison of a second picture of a unit with the stored one.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Agreement {
     pub class: Class,
-    /// What drew the picture that is kept.
+    /// The device that drew the stored picture.
     pub with: Option<Drawer>,
     pub same_bytes: bool,
-    /// Within what the class allows.
+    /// Whether the difference is within what the class allows.
     pub agrees: bool,
-    /// Errors with what `verify` allows; empty if the bytes are the same.
+    /// Errors with the limits of `verify`; empty if the bytes are equal.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub figures: Vec<Figure>,
-    /// One line if it does not agree.
+    /// One line that describes the difference, if the pictures do not agree.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fault: Option<String>,
 }
 
 impl Agreement {
-    /// Compares a picture with the one that is kept. Equal pixels are equal bytes: both are encoded alike.
+    /// Compares a picture with the stored one. Equal pixels mean equal bytes, as both are encoded alike.
     pub fn of(kept: &Picture, kept_by: Option<&Drawer>, drawn: &Picture, drawn_by: Option<&Drawer>) -> Agreement {
         let class = Class::of(kept_by, drawn_by);
         // A file has no transparency.

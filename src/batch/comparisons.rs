@@ -1,10 +1,10 @@
-//! All comparisons of devices that results hold, by class and pair of devices.
+//! Summary of the comparisons between devices that are among the results.
 
 use super::agreement::{Class, Drawer};
 use super::results::{Record, Status};
 use std::collections::BTreeMap;
 
-/// Comparisons of one pair of devices.
+/// Counts of the comparisons of one pair of devices.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Pair {
     pub compared: usize,
@@ -13,8 +13,8 @@ pub struct Pair {
     pub faults: Vec<(String, String, String)>,
 }
 
-/// All comparisons that results hold, by class and pair of devices: of units that were drawn again, and of units that two processes did, whose
-/// outputs have digests.
+/// All comparisons of results, by class and pair of devices: units that were drawn again, and units that two processes did, by the digests of
+/// their outputs.
 pub fn pairs(records: &[Record]) -> BTreeMap<(Class, Option<Drawer>, Option<Drawer>), Pair> {
     let mut pairs: BTreeMap<(Class, Option<Drawer>, Option<Drawer>), Pair> = BTreeMap::new();
     let mut first: BTreeMap<&str, &Record> = BTreeMap::new();

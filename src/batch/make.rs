@@ -1,4 +1,4 @@
-//! Makes a manifest from files, folders and patterns: what can be read, with size, digest and expected cost.
+//! Makes a manifest from files, folders and patterns: a unit for each recording that can be read, with size, digest and expected cost.
 
 use super::digest_of;
 use super::manifest::Unit;
@@ -10,10 +10,10 @@ use crate::terminal::{Failure, input};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Deepest folder below one that is named.
+/// Largest depth of folders that are searched below a named one.
 const MAX_DEPTH: usize = 64;
 
-/// What became of a file.
+/// The result of looking at a file.
 pub enum Found {
     Unit(Box<Unit>),
     /// The file and why it is left out.
@@ -23,7 +23,7 @@ pub enum Found {
 /// The files that `patterns` name, sorted, each once: files, folders with all recordings below them, and patterns with `*`, `?`, `**` and `[...]`.
 ///
 /// # Errors
-/// A pattern that is none, or that nothing matches.
+/// A pattern is invalid or matches nothing.
 pub fn files(patterns: &[String]) -> Result<Vec<PathBuf>, Failure> {
     let mut found = Vec::new();
     for pattern in patterns {
@@ -72,7 +72,7 @@ fn walk(folder: &Path, depth: usize, found: &mut Vec<PathBuf>) -> Result<(), Str
 /// The unit of a file: its absolute path, digest, length and expected cost. The file is opened and read.
 ///
 /// # Errors
-/// The command is wrong, whatever the file.
+/// The command is wrong, independently of the file.
 pub fn unit(file: &Path, command: &[String]) -> Result<Found, Failure> {
     let blank = Unit {
         input: String::new(),
@@ -108,8 +108,8 @@ pub fn unit(file: &Path, command: &[String]) -> Result<Found, Failure> {
     }
 }
 
-/// 1 for the start of a unit, and 1 for each MiB of the volume's samples, times what the kind of work costs beside drawing. The ratios are rough:
-/// what counts is that a large recording costs more than a small one.
+/// Expected cost: (1 + MiB of the volume's samples) times the cost of this kind of work relative to drawing. The ratios are rough; it matters only
+/// that a large recording costs more than a small one.
 fn expected_cost(kind: Kind, source: &dyn Source, volume: usize) -> f64 {
     let geometry = source.geometry(volume);
     let [width, height] = geometry.frame_size();

@@ -7,35 +7,35 @@ use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 use std::sync::Arc;
 
-/// Longest line, bytes.
+/// Most bytes of a line.
 const MAX_LINE: u64 = 1 << 20;
-/// Most units.
+/// Largest number of units.
 const MAX_UNITS: usize = 1 << 27;
-/// Most outputs of a unit.
+/// Largest number of outputs of a unit.
 const MAX_OUTPUTS: usize = 4;
 
-/// A line of the manifest.
+/// A unit of work: one line of the manifest.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Unit {
-    /// The recording. A relative path begins at the manifest's folder.
+    /// Path of the recording, absolute or relative to the manifest's folder.
     pub input: String,
-    /// SHA-256 of the recording, 64 hexadecimal digits; without it the recording is read to name the outputs.
+    /// SHA-256 of the recording, 64 hexadecimal digits. Without it the recording is read to compute the key.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub digest: Option<String>,
-    /// Length of the recording's files, bytes.
+    /// Length of the recording's files in bytes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bytes: Option<u64>,
-    /// Expected cost, in any unit that all lines share; 1 if it is not given.
+    /// Expected cost in a unit that all lines share; 1 if not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cost: Option<f64>,
-    /// Settings as in a scene file, to be rendered. Not with `command`.
+    /// Settings as in a scene file, with which the recording is rendered. Excludes `command`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scene: Option<Map<String, Value>>,
-    /// `render`, `convert`, `measure` or `verify` with their flags; `render` if neither this nor a scene is given.
+    /// `render`, `convert`, `measure` or `verify` with its flags; `render` if neither this nor a scene is given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub command: Option<Vec<String>>,
-    /// Names of the files that are made, one for each that the command makes.
+    /// File names of the outputs, one for each output of the command.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub outputs: Vec<String>,
 }
@@ -47,7 +47,7 @@ pub struct Numbered {
     pub unit: Arc<Unit>,
 }
 
-/// What dividing the manifest needs of a line.
+/// The part of a line that the division into shards needs.
 #[derive(Deserialize)]
 struct Cost {
     cost: Option<f64>,
@@ -74,7 +74,7 @@ impl Unit {
     }
 }
 
-/// An output is a plain file name, which must stay in the folder of the unit on every system.
+/// Checks that an output's name is a plain file name on every system, so that it cannot leave the unit's folder.
 fn check_name(name: &str) -> Result<(), String> {
     let plain = |c: char| c.is_ascii_alphanumeric() || "._-+".contains(c);
     match !name.is_empty() && name.len() <= 100 && !name.starts_with('.') && name.chars().all(plain) {
@@ -133,7 +133,7 @@ pub fn costs(file: &Path) -> Result<Vec<f64>, String> {
     }
 }
 
-/// The units that `is_chosen` selects by their place (from 0), in the order of the manifest.
+/// The units that `is_chosen` selects by their index (from 0), in the order of the manifest.
 ///
 /// # Errors
 /// One line that names the file, the line and the fault.
@@ -152,7 +152,7 @@ pub fn units(file: &Path, is_chosen: impl Fn(usize) -> bool) -> Result<Vec<Numbe
     Ok(units)
 }
 
-/// Calls `each` with every unit, keeping none.
+/// Calls `each` with every unit, one at a time in memory.
 ///
 /// # Errors
 /// As of [`units`].

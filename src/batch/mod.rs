@@ -1,13 +1,13 @@
-//! Many recordings, one unit of work each: rendered, converted, measured or verified. What starts the processes is the site's (Slurm, Kubernetes,
-//! GNU parallel); one process does one shard of the manifest.
+//! Many recordings, each a unit of work: rendered, converted, measured or verified. A process does one shard of the manifest; Slurm, Kubernetes or
+//! GNU parallel starts the processes.
 //!
 //! - [`manifest`] is the list of units, [`make`] writes it from files and folders. [`shard`] divides it.
-//! - [`unit`] is the command of a unit, and the name of its outputs: a hash of what determines them.
-//! - [`reading`] reads a unit's recording, on a thread of its own. [`painter`] draws, with one device and one renderer. [`work`] does a shard.
-//! - [`results`] is what is kept of a unit. [`agreement`] holds pictures of different devices against each other, [`comparisons`] counts that. [`report`] is the page.
+//! - [`unit`] is the command of a unit, and the key of its outputs: a hash of what determines them.
+//! - [`reading`] reads a unit's recording, on a thread of its own. [`painter`] draws, with one device and one renderer. [`work`] runs a shard.
+//! - [`results`] is what is stored of a unit. [`agreement`] compares pictures of two devices, [`comparisons`] counts them. [`report`] is the page.
 //!
-//! A unit is done when its record exists: outputs are written and renamed before it. Whatever ends a process, a later one goes on from there. Two
-//! processes that do the same unit write the same bytes.
+//! A unit is done when its record exists, which is written after its outputs. If a process is killed, a later one does what is left. Two processes
+//! that do the same unit write the same bytes.
 
 pub mod agreement;
 pub mod comparisons;
@@ -27,7 +27,7 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-/// Lower-case hexadecimal digits.
+/// Bytes as lower-case hexadecimal digits.
 fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|b| format!("{b:02x}")).collect()
 }
@@ -53,8 +53,8 @@ pub(crate) fn sha256_of_file(path: &Path) -> io::Result<(String, u64)> {
     }
 }
 
-/// The digest of a recording: that of its file. For a recording of several files (samples apart from the header, a probe file): that of the
-/// lines of their digests. Returns the length of all files, bytes, too.
+/// SHA-256 of a recording, and the length of its files in bytes. For a recording of several files (samples apart from the header, a probe file) it
+/// is the hash of their digests, one a line.
 ///
 /// # Errors
 /// One line that names the file.

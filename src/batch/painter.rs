@@ -16,7 +16,7 @@ use std::sync::Arc;
 pub struct DeviceOptions {
     pub device: Option<DeviceChoice>,
     pub deadline: Deadline,
-    /// Ends waits for the device.
+    /// Waits for the device end once it returns true.
     pub stop: fn() -> bool,
 }
 
@@ -25,7 +25,7 @@ pub struct Painter {
     context: Arc<Context>,
     renderer: Option<Renderer>,
     options: DeviceOptions,
-    /// Of the running unit.
+    /// Losses of the device by the unit that is drawn.
     losses: Losses,
 }
 
@@ -47,7 +47,7 @@ impl Painter {
         }
     }
 
-    /// Draws a volume. A lost device is opened again, and its work divided into smaller and smaller parts.
+    /// Draws a volume. A lost device is opened again and the work repeated in smaller and smaller parts.
     ///
     /// # Errors
     /// The device lacks something, has too little memory, or was lost again.
@@ -92,7 +92,7 @@ impl Painter {
     }
 }
 
-/// Holds a picture against the f64 reference, as `verify` does: what was measured, and the faults. `frames`: of every slice.
+/// Compares a picture with the f64 reference, as `verify` does. `frames`: one for every slice.
 pub fn against_reference(scene: &Scene, frames: &[Frame], picture: &Picture) -> Findings {
     let format = Slot::Frames.format(scene);
     let [width, height] = scene.geometry.frame_size();

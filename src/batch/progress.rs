@@ -1,31 +1,31 @@
-//! What a shard says while it goes on: on a terminal a bar with rate and time left, elsewhere a line a minute.
+//! Progress of a shard: on a terminal a bar with rate and time left, elsewhere one line a minute.
 
 use crate::terminal::{remark, say};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
 
-/// Time between two lines.
+/// Interval of the lines where standard error is no terminal.
 const LINE: Duration = Duration::from_secs(60);
 
-/// Follows a shard.
+/// Counts the units of a shard and shows its progress.
 pub struct Progress {
     bar: Option<ProgressBar>,
     begun: Instant,
     said: Instant,
     units: usize,
-    /// Units that ended, those of them that were done before, and those that failed.
+    /// Numbers of units: all that ended, those of them that were done before, and those that failed.
     ended: usize,
     found: usize,
     failed: usize,
-    /// Expected cost of all units, of those that ended, and of those that were done before.
+    /// Sums of expected costs: of all units, of those that ended, and of those that were done before.
     cost: f64,
     spent: f64,
     saved: f64,
 }
 
 impl Progress {
-    /// `cost`: expected, of all units together.
+    /// `cost`: expected cost of all units together.
     pub fn new(units: usize, cost: f64) -> Progress {
         let bar = std::io::stderr().is_terminal().then(|| {
             let bar = ProgressBar::new(units as u64);
@@ -39,7 +39,7 @@ impl Progress {
         Progress { bar, begun: now, said: now, units, ended: 0, found: 0, failed: 0, cost, spent: 0.0, saved: 0.0 }
     }
 
-    /// A unit was done before.
+    /// Counts a unit that was done before.
     pub fn found(&mut self, cost: f64) {
         self.found += 1;
         self.saved += cost;
@@ -50,7 +50,7 @@ impl Progress {
         self.ends(cost);
     }
 
-    /// A unit failed: one line.
+    /// Counts a unit that failed, and prints `line`.
     pub fn failed(&mut self, cost: f64, line: &str) {
         self.failed += 1;
         match &self.bar {
@@ -77,7 +77,7 @@ impl Progress {
         }
     }
 
-    /// Rate and time left. The time follows from the expected cost; units that were done before took none.
+    /// Rate and time left, which follows from the expected costs of the units that this run did.
     fn line(&self) -> String {
         let seconds = self.begun.elapsed().as_secs_f64();
         let rate = (self.ended - self.found) as f64 / seconds.max(1e-3);
@@ -90,7 +90,7 @@ impl Progress {
         format!("{rate:.2} units a second{left}{failed}")
     }
 
-    /// After the last unit: a summary of one line.
+    /// Removes the bar and returns a summary of one line.
     pub fn finish(self) -> String {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();

@@ -24,11 +24,11 @@ pub struct Task {
     pub input: PathBuf,
 }
 
-/// What the reader hands over.
+/// What the reader found for a task.
 pub enum Read {
-    /// Nothing is left to do.
+    /// The unit was done before: its record.
     Finished(Task, Box<Record>),
-    /// The key and what the work needs. `earlier`: the record of a unit that is done and is drawn again to be compared.
+    /// The unit is to be done. `earlier`: the record of a unit that was done before and is drawn again for comparison.
     Ready {
         task: Task,
         key: Key,
@@ -59,8 +59,8 @@ pub enum Contents {
     Figures(Map<String, Value>),
 }
 
-/// Reads what a task needs. A unit whose record is in `folder` is not read if its digest is known, unless `again` chooses its key. `verified`: the
-/// digests of its outputs are compared.
+/// Reads what a task needs. A unit with a known digest whose record is in `folder` is not read, unless `again` is true for its key. With `verified`
+/// the digests of its outputs are compared first.
 pub(super) fn read(task: Task, folder: &Path, verified: Option<&Verified>, again: impl Fn(&Key) -> bool) -> Read {
     let begun = Instant::now();
     let (mut key, mut earlier) = (None, None);
@@ -159,7 +159,7 @@ fn drawable(work: &Work, source: &mut dyn Source) -> Result<Contents, Failure> {
     Ok(Contents::Frames { scene: Box::new(scene), frames, is_whole })
 }
 
-/// Reads every frame of every volume. False if fewer are there than the recording states.
+/// Reads every frame of every volume. Returns false if there are fewer than the recording states.
 fn check_all(task: &Task, source: &mut dyn Source) -> Result<bool, Failure> {
     // The description of a .frames file counts damaged frames, which are left out otherwise.
     let facts = source::description(&task.input, task.work.geometry.options()).map_err(input)?;
@@ -193,7 +193,7 @@ fn convertible(task: &Task, source: &mut dyn Source) -> Result<Contents, Failure
     Ok(Contents::Volume { volume: Box::new(volume), target: Box::new(target) })
 }
 
-/// What `info` says, without patient fields, and statistics of the samples of the volume in the units of the file.
+/// The output of `info` without patient fields, and statistics of the volume's samples in the file's own units.
 fn measured(task: &Task, source: &mut dyn Source) -> Result<Map<String, Value>, Failure> {
     let facts = source::description(&task.input, task.work.geometry.options()).map_err(input)?;
     let mut figures = Map::new();
@@ -257,7 +257,7 @@ impl Statistics {
     }
 }
 
-/// A file name for messages.
+/// The file name of a path, for messages.
 pub fn shown(path: &Path) -> String {
     escaped(&path.display().to_string(), 300)
 }

@@ -1,5 +1,5 @@
-//! All results of a batch as one HTML page: failures first, then what different devices made of the same unit, devices and times, and a contact
-//! sheet. No script, no network, no other file.
+//! The results of a batch as one HTML page: failures, comparisons between devices, devices and times, and a contact sheet. The page needs no
+//! script, no network and no other file.
 
 use super::agreement::{Class, Drawer};
 use super::comparisons::{Pair, pairs};
@@ -16,16 +16,16 @@ use std::path::Path;
 
 /// Longest edge of a thumbnail, pixels.
 const THUMBNAIL: u32 = 128;
-/// Most thumbnails, and most bytes of them.
+/// Largest number of thumbnails, and of their bytes.
 const MAX_THUMBNAILS: usize = 1000;
 const MAX_BYTES: usize = 24 << 20;
-/// Most failures that are listed.
+/// Largest number of failures that are listed.
 const MAX_FAILURES: usize = 2000;
 
 const STYLE: &str = ".sheet { display: flex; flex-wrap: wrap; gap: .75rem; } .sheet figure { margin: 0; width: 8rem; font-size: .75rem; } \
                      .sheet img { display: block; max-width: 8rem; max-height: 8rem; background: #000; }";
 
-/// Of two results of a unit the greater one counts.
+/// Orders the results of a unit: the greatest one counts.
 fn rank(record: &Record) -> (bool, bool, &str) {
     (record.status == Status::Done, record.agreement.is_none(), &record.date)
 }
@@ -33,7 +33,7 @@ fn rank(record: &Record) -> (bool, bool, &str) {
 /// The results of all shards, one for each unit.
 #[derive(Default)]
 pub struct Merged<'a> {
-    /// By input and work: the last result, a success before any failure.
+    /// By input and work: the last success or, if there is none, the last failure.
     pub units: BTreeMap<(&'a str, &'a str), &'a Record>,
 }
 
@@ -60,7 +60,7 @@ impl<'a> Merged<'a> {
     }
 }
 
-/// The page. `folder`: of the batch, for thumbnails. `torn`: lines of results that a killed process left.
+/// The page. `folder`: the batch's, with the pictures of the thumbnails. `torn`: number of lines that killed processes left unfinished.
 pub fn html(records: &[Record], torn: usize, folder: &Path) -> String {
     let merged = Merged::of(records);
     let (units, failures) = (merged.units.len(), merged.failures().count());
@@ -98,7 +98,7 @@ pub fn html(records: &[Record], torn: usize, folder: &Path) -> String {
     page(&format!("echolume batch: {verdict}"), STYLE, &body)
 }
 
-/// The days of the first and of the last try, UTC.
+/// The dates of the first and of the last try, UTC.
 fn dates(records: &[Record]) -> Option<(String, String)> {
     let days = || records.iter().filter_map(|record| record.date.split('T').next()).filter(|day| !day.is_empty());
     days().min().zip(days().max()).map(|(first, last)| (escaped(first), escaped(last)))
@@ -195,7 +195,7 @@ impl Times {
         self.write += record.seconds.write;
     }
 
-    /// The middle one of the times of work, s.
+    /// Median time of the work of a unit, s.
     fn median(&self) -> f64 {
         quantile_of(self.work.iter().copied(), 0.5).unwrap_or(0.0)
     }
@@ -284,7 +284,7 @@ fn name_of(input: &str) -> String {
     Path::new(input).file_name().map_or(input.into(), |name| name.to_string_lossy().into_owned())
 }
 
-/// A picture of at most [`THUMBNAIL`] pixels an edge, by means over boxes.
+/// A picture reduced to at most [`THUMBNAIL`] pixels an edge, by box filtering.
 fn thumbnail(picture: &Picture) -> Picture {
     let step = picture.width.max(picture.height).div_ceil(THUMBNAIL).max(1);
     if step == 1 {

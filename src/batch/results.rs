@@ -1,4 +1,4 @@
-//! What is kept of a unit: its record, which says that it is done, and a line of its shard's results.
+//! What is stored of a unit: its record, whose existence marks it as done, and a line in the results of its shard.
 
 use super::agreement::{Agreement, Drawer};
 use super::sha256_of_file;
@@ -17,7 +17,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Version of the format of records.
 pub const FORMAT: &str = "echolume-batch-1";
-/// Longest line of results, bytes, and largest record.
+/// Most bytes of a line of results and of a record.
 const MAX_LINE: u64 = 1 << 20;
 
 /// How a unit ended.
@@ -25,21 +25,21 @@ const MAX_LINE: u64 = 1 << 20;
 #[serde(rename_all = "lowercase")]
 pub enum Status {
     Done,
-    /// The recording or the command is at fault: another try ends the same.
+    /// The recording or the command is wrong: another try would end the same.
     Bad,
     /// The work failed.
     Failed,
-    /// The device was lost while it was done.
+    /// The device was lost during the work.
     Lost,
 }
 
-/// Seconds by stage, of the clock of the host.
+/// Wall-clock seconds by stage.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Seconds {
     /// Reading the recording, on the thread that reads ahead.
     pub read: f64,
-    /// Waiting for it.
+    /// Waiting for the recording to be read.
     pub wait: f64,
     /// Drawing, converting or comparing.
     pub work: f64,
@@ -51,7 +51,7 @@ pub struct Seconds {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct OutputFile {
-    /// Below the folder of the batch.
+    /// Path relative to the batch's folder.
     pub file: String,
     pub bytes: u64,
     pub sha256: String,
@@ -61,14 +61,14 @@ pub struct OutputFile {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Record {
-    /// [`FORMAT`].
+    /// Version of the format; [`FORMAT`] when written by this program.
     pub format: String,
-    /// The hash that names the outputs; empty if the recording could not be read.
+    /// Key of the outputs; empty if the recording could not be read.
     pub key: String,
-    /// Line of the manifest.
+    /// Number of the unit's line in the manifest, from 1.
     pub line: u64,
     pub input: String,
-    /// The command, or the scene.
+    /// The command or the scene, as text.
     pub work: String,
     pub status: Status,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -76,7 +76,7 @@ pub struct Record {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub outputs: Vec<OutputFile>,
     pub seconds: Seconds,
-    /// None if no device was used.
+    /// The device that was used, if any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub drawer: Option<Drawer>,
     pub program: String,
@@ -85,21 +85,21 @@ pub struct Record {
     pub date: String,
     #[serde(default, skip_serializing_if = "Map::is_empty")]
     pub figures: Map<String, Value>,
-    /// Set if a unit that was done was drawn again and compared.
+    /// The comparison with the stored picture, if a finished unit was drawn again.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub agreement: Option<Agreement>,
 }
 
-/// Counts of outputs that were read again, for their digests.
+/// Counts of outputs whose digests were compared with their records.
 #[derive(Default)]
 pub(super) struct Verified {
     pub whole: AtomicU64,
-    /// Of these one line each is said, and their units are done again.
+    /// Outputs that differ or cannot be read. Each is reported in a line, and its unit is done again.
     pub damaged: AtomicU64,
 }
 
 impl Verified {
-    /// True if an output is what its record says.
+    /// Whether an output has the digest that its record states; counts and reports it.
     fn is_whole(&self, folder: &Path, output: &OutputFile) -> bool {
         let file = folder.join(&output.file);
         let fault = match sha256_of_file(&file) {
@@ -116,7 +116,7 @@ impl Verified {
     }
 }
 
-/// The record of a unit that is done: it is there, whole, and so are its outputs. `verified`: their digests are compared, too.
+/// The record of a unit, if it is valid and all outputs exist with the stated length. With `verified` their digests must agree, too.
 pub(super) fn read_record(folder: &Path, key: &Key, verified: Option<&Verified>) -> Option<Record> {
     let bytes = files::read(&folder.join(key.record()), MAX_LINE, "record").ok()?;
     let record: Record = serde_json::from_slice(&bytes).ok()?;
@@ -128,14 +128,14 @@ pub(super) fn read_record(folder: &Path, key: &Key, verified: Option<&Verified>)
     (is_done && record.outputs.iter().all(is_there) && record.outputs.iter().all(is_whole)).then_some(record)
 }
 
-/// A unit by its recording and its work: what is kept of a million units.
+/// Hash of a unit's recording and work: eight bytes instead of two texts, as there may be millions.
 fn hash_of(input: &str, work: &str) -> u64 {
     let mut hasher = DefaultHasher::new();
     (input, work).hash(&mut hasher);
     hasher.finish()
 }
 
-/// The units of a manifest, as hashes: a million are 16 MiB.
+/// The units of a manifest, as hashes: a million take 16 MiB.
 #[derive(Default)]
 pub struct Asked(HashSet<u64>);
 
@@ -145,26 +145,26 @@ impl Asked {
     }
 }
 
-/// What earlier processes wrote into the results of a folder.
+/// Results that earlier processes wrote into a folder.
 #[derive(Debug, Default)]
 pub struct Earlier {
-    /// Results of a batch are there, maybe without a line.
+    /// Whether the folder has results of a batch, possibly without a line.
     pub is_begun: bool,
-    /// There is a line.
+    /// Whether the results have a line.
     pub has_lines: bool,
-    /// There is a line of a unit that was asked for.
+    /// Whether a line is that of a unit that was asked for.
     pub is_of_these: bool,
-    /// Of this shard: keys and recordings of the units that a line says are done.
+    /// Keys and recordings of this shard's units with a line that says done.
     done: HashSet<(String, String)>,
-    /// Of this shard, by recording and work: lines that say that a device was lost.
+    /// Number of lost devices of this shard's units, by recording and work.
     lost: HashMap<(String, String), usize>,
-    /// Of all shards: units that were asked for, and that a line of this version of the program says are done.
+    /// Units of all shards that were asked for and that this version of the program has done.
     done_anywhere: HashSet<u64>,
 }
 
 impl Earlier {
-    /// Reads the results of a shard; for units that are `asked` for those of all shards, whatever their number. Each file is read once, and
-    /// nothing is made.
+    /// Reads the results of a shard; with `asked` those of all shards, also of divisions into another number. Each file is read once. Nothing is
+    /// written.
     ///
     /// # Errors
     /// One line that names the file.
@@ -200,7 +200,7 @@ impl Earlier {
         Ok(found)
     }
 
-    /// True if a line says that a unit that was asked for is done, by any shard.
+    /// Whether any shard has done this unit, which must be among those asked for.
     pub fn says_done(&self, input: &str, work: &str) -> bool {
         self.done_anywhere.contains(&hash_of(input, work))
     }
@@ -210,7 +210,7 @@ fn file_of(folder: &Path, shard: Shard) -> PathBuf {
     folder.join("results").join(format!("shard-{:04}-of-{:04}.ndjson", shard.index, shard.count))
 }
 
-/// The results of one shard, to which lines are added.
+/// The file of results of a shard, open for appending.
 pub struct Results {
     file: File,
     path: PathBuf,
@@ -218,8 +218,8 @@ pub struct Results {
 }
 
 impl Results {
-    /// Opens or creates `results/shard-I-of-N.ndjson`. A last line that a killed process left unfinished is ended. `earlier`: what was read of
-    /// this shard.
+    /// Opens or creates `results/shard-I-of-N.ndjson`, and ends a line that a killed process left unfinished. `earlier`: the results that were
+    /// read before.
     ///
     /// # Errors
     /// One line that names the file.
@@ -243,7 +243,7 @@ impl Results {
         &self.earlier
     }
 
-    /// Adds a line by one write, so that two processes do not mix theirs.
+    /// Appends a line in one write, so that lines of two processes do not mix.
     ///
     /// # Errors
     /// One line that names the file.
@@ -258,12 +258,12 @@ impl Results {
         Ok(())
     }
 
-    /// True if a line says that the unit is done: a process that is killed after it wrote the record adds none.
+    /// Whether a line says that the unit is done. There may be none although the record exists: a process may be killed between the two.
     pub fn has(&self, record: &Record) -> bool {
         self.earlier.done.contains(&(record.key.clone(), record.input.clone()))
     }
 
-    /// How often a device was lost by a unit.
+    /// Number of times that a device was lost by this unit.
     pub fn losses(&self, input: &str, work: &str) -> usize {
         // Nearly always empty, and a key has to be copied.
         let is_known = !self.earlier.lost.is_empty();
@@ -272,7 +272,7 @@ impl Results {
     }
 }
 
-/// Calls `each` with the records of a file of results. Returns the number of lines that are none.
+/// Calls `each` with every record of a file of results. Returns the number of lines that are no records.
 fn for_each_record(path: &Path, mut each: impl FnMut(Record)) -> Result<usize, String> {
     let fault = |e: io::Error| format!("{}: cannot be read: {e}", path.display());
     let mut reader = BufReader::new(File::open(path).map_err(fault)?);
@@ -292,7 +292,7 @@ fn for_each_record(path: &Path, mut each: impl FnMut(Record)) -> Result<usize, S
     }
 }
 
-/// The files of results of a folder, sorted; otherwise what cannot be read.
+/// The files of results of a folder, sorted. The error names what cannot be read.
 fn files_of(folder: &Path) -> Result<Vec<PathBuf>, (PathBuf, io::Error)> {
     let place = folder.join("results");
     let fault = |e: io::Error| (place.clone(), e);
@@ -307,10 +307,10 @@ fn files_of(folder: &Path) -> Result<Vec<PathBuf>, (PathBuf, io::Error)> {
     Ok(files)
 }
 
-/// All results of a folder without their figures, and the number of lines that a killed process left unfinished.
+/// All results of a folder without their figures, and the number of lines that killed processes left unfinished.
 ///
 /// # Errors
-/// One line: there are none, or they cannot be read.
+/// One line: there are no results, or they cannot be read.
 pub fn read_all(folder: &Path) -> Result<(Vec<Record>, usize), String> {
     let files = files_of(folder)
         .map_err(|(place, e)| format!("{}: cannot be read: {e}; is this the folder of a batch?", place.display()))?;

@@ -5,7 +5,7 @@ use std::collections::BinaryHeap;
 use std::fmt;
 use std::str::FromStr;
 
-/// Most shards.
+/// Largest number of shards.
 const MAX_SHARDS: u32 = 1 << 20;
 
 /// One part of a manifest.
@@ -27,12 +27,12 @@ impl Shard {
         }
     }
 
-    /// The shard that Slurm or Kubernetes gives this process: the task of an array, or the completion of an Indexed Job; the whole manifest
-    /// outside of them. `count` is the number of shards where it is known: Kubernetes does not tell it, and the tasks of an array that is
-    /// submitted again in part are then numbered as before.
+    /// The shard of this process by the environment of Slurm (task of an array) or Kubernetes (completion of an Indexed Job); the whole manifest
+    /// elsewhere. `count` is the number of shards, if known. Kubernetes does not tell it. With it, an array that is submitted again in part
+    /// keeps its division.
     ///
     /// # Errors
-    /// One line: a number that is none, an array with gaps, or a Job without a count.
+    /// One line: an invalid number, an array with gaps, or a Job without a count.
     pub fn from_environment(count: Option<u32>, variable: impl Fn(&str) -> Option<String>) -> Result<Shard, String> {
         let number = |name: &str| match variable(name) {
             None => Ok(None),
@@ -72,7 +72,7 @@ impl Shard {
 impl FromStr for Shard {
     type Err = String;
 
-    /// `I/N`, I from 0.
+    /// Reads `I/N`, I from 0.
     fn from_str(text: &str) -> Result<Shard, String> {
         let parts = text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
         let (index, count) = parts.ok_or("must read I/N, as 0/8 for the first of eight")?;
@@ -86,7 +86,7 @@ impl fmt::Display for Shard {
     }
 }
 
-/// The cost that a shard has got so far. The least cost comes first, of equal ones the one with fewer units, then the lower number.
+/// The cost assigned to a shard so far, ordered by cost, then number of units, then index, the least first.
 #[derive(PartialEq)]
 struct Load {
     cost: f64,
@@ -108,8 +108,8 @@ impl PartialOrd for Load {
     }
 }
 
-/// The shard of every unit: the dearest unit first, each to the shard that has the least cost so far (Graham's LPT rule). No shard costs more
-/// than the mean and one unit. O(n log n); the same for everyone who asks.
+/// The shard of every unit by Graham's LPT rule: the most expensive unit first, each to the shard with the least cost so far. No shard costs more
+/// than the mean plus one unit. O(n log n), deterministic.
 pub fn assign(costs: &[f64], count: u32) -> Vec<u32> {
     let mut order: Vec<usize> = (0..costs.len()).collect();
     order.sort_by(|a, b| costs[*b].total_cmp(&costs[*a]).then(a.cmp(b)));

@@ -1,4 +1,4 @@
-//! The command of a unit, and the name of its outputs: a hash of everything that determines them.
+//! The command of a unit, and the key of its outputs: a hash of everything that determines them.
 
 use super::manifest::Unit;
 use super::sha256_of_file;
@@ -14,9 +14,9 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use toml::Table;
 
-/// Changes whenever units of the same key would have other outputs without another version of the program.
+/// Part of every key. It must change when outputs change but the program's version does not.
 const SCHEME: &str = "echolume-batch-1";
-/// Characters of a key: 128 bits.
+/// Hexadecimal digits of a key: 128 bits.
 const KEY_LENGTH: usize = 32;
 
 /// What can be done with a recording.
@@ -29,7 +29,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// As in a command.
+    /// The subcommand's name.
     pub fn word(self) -> &'static str {
         match self {
             Kind::Render => "render",
@@ -39,7 +39,7 @@ impl Kind {
         }
     }
 
-    /// The output if the manifest does not name it.
+    /// File name of the output if the manifest names none.
     fn output(self) -> &'static str {
         match self {
             Kind::Render => "picture.png",
@@ -49,7 +49,7 @@ impl Kind {
         }
     }
 
-    /// True if it is done on a device.
+    /// Whether the work needs a Vulkan device.
     pub fn needs_device(self) -> bool {
         matches!(self, Kind::Render | Kind::Verify)
     }
@@ -107,27 +107,27 @@ struct MeasureUnit {
     volume: usize,
 }
 
-/// What is done with a recording, checked, with all its settings. Units that differ in their recording only share it.
+/// What is done with a recording: a checked command with all its settings. Units that differ only in their recording share one.
 pub struct Work {
     pub kind: Kind,
-    /// As in the manifest, for results.
+    /// The command or scene as results name it ([`text`]).
     pub text: String,
     pub geometry: GeometryArgs,
     /// Volume of the recording, from 0.
     pub volume: usize,
-    /// Of a picture.
+    /// Settings of a picture, by layer.
     pub layers: Layers,
     /// Voxel spacing of a converted volume, mm.
     pub spacing: Option<f64>,
-    /// Value of a converted volume outside the sector; None: that of no echo.
+    /// Value of a converted volume outside the sector; `None`: the value of no echo.
     pub outside: Option<f64>,
-    /// The name of the output.
+    /// File name of the output.
     pub output: String,
-    /// Hash of all of this, and of the files that settings are read from.
+    /// Hash of the fields above and of the files that settings are read from.
     digest: Vec<u8>,
 }
 
-/// What is done with the recording, as results name it.
+/// The command or the scene of a unit as results name it.
 pub fn text(unit: &Unit) -> String {
     match (&unit.scene, &unit.command) {
         (Some(scene), _) => format!("scene {}", serde_json::to_string(scene).unwrap_or_default()),
@@ -137,10 +137,10 @@ pub fn text(unit: &Unit) -> String {
 }
 
 impl Work {
-    /// The work of a unit. Files that its flags name are read; relative ones begin at the working folder.
+    /// The work of a unit. Reads the files that its flags name, relative to the working folder.
     ///
     /// # Errors
-    /// The command line is wrong, a setting is, or the output has another format than the command makes.
+    /// The command line or a setting is wrong, or the command does not make the format of the output.
     pub fn of(unit: &Unit) -> Result<Work, Failure> {
         let text = text(unit);
         let mut work = match &unit.scene {
@@ -221,7 +221,7 @@ impl Work {
         }
     }
 
-    /// Everything but the recording that determines the output.
+    /// Hash of everything that determines the output, except for the recording.
     fn hash(&self, settings: &Settings) -> Result<Vec<u8>, Failure> {
         let settings = settings.to_json().map_err(|e| input(format!("settings: {e}")))?;
         // Presets decide what follows from the echoes.
@@ -239,7 +239,7 @@ impl Work {
         Ok(hash.finalize().to_vec())
     }
 
-    /// The name of the outputs for a recording with this digest.
+    /// The key of the outputs for a recording with this digest.
     pub fn key(&self, digest: &str) -> Key {
         let mut hash = Sha256::new();
         hash.update(&self.digest);
@@ -255,7 +255,7 @@ fn digest_of_settings(file: &Path) -> Result<Vec<u8>, Failure> {
     Ok(digest.into_bytes())
 }
 
-/// Names the outputs of a unit: 32 hexadecimal digits.
+/// The key of a unit's outputs: 32 hexadecimal digits, the beginning of their file names.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Key(String);
 
@@ -264,22 +264,22 @@ impl Key {
         &self.0
     }
 
-    /// The folder of its files below that of the batch: 65536 folders at most, so that a million units are some tens of files in each.
+    /// Folder of the unit's files, relative to the batch's folder. There are at most 65536, so that each has some tens of files of a million units.
     pub fn folder(&self) -> PathBuf {
         Path::new("units").join(&self.0[..2]).join(&self.0[2..4])
     }
 
-    /// The record that says that the unit is done, below the folder of the batch.
+    /// Path of the unit's record, relative to the batch's folder.
     pub fn record(&self) -> PathBuf {
         self.folder().join(format!("{}.json", self.0))
     }
 
-    /// An output, below the folder of the batch.
+    /// Path of an output, relative to the batch's folder.
     pub fn output(&self, name: &str) -> PathBuf {
         self.folder().join(format!("{}-{name}", self.0))
     }
 
-    /// A share of all keys, 0..=1, evenly spread: those below a limit are a fair sample of units.
+    /// A number in 0..=1 derived from the key, evenly distributed: the units with numbers below a limit are a random sample.
     pub fn share(&self) -> f64 {
         u32::from_str_radix(&self.0[4..12], 16).map_or(0.0, |n| f64::from(n) / f64::from(u32::MAX))
     }

@@ -1,4 +1,4 @@
-//! One shard: every unit that is not done, one after the other, while the next one is read.
+//! Runs a shard: every unit that is not done, one after the other. The next recording is read meanwhile.
 
 use super::agreement::{Agreement, Drawer};
 use super::manifest::Numbered;
@@ -23,29 +23,29 @@ use std::sync::atomic::Ordering;
 use std::sync::mpsc::sync_channel;
 use std::time::{Duration, Instant, SystemTime};
 
-/// A unit by which so many processes lost the device is not tried again. Each of them tried it several times, with smaller and smaller parts.
+/// A unit is given up after so many processes lost the device by it. Each process tries it several times, in smaller and smaller parts.
 const MAX_TRIES: usize = 3;
-/// Age at which a file that somebody began to write is taken to be abandoned. Whoever still writes it makes it younger.
+/// A temporary file that was not written to for so long is deleted as abandoned.
 const ABANDONED: Duration = Duration::from_secs(3600);
 
-/// A shard to be done.
+/// A shard and how it is run.
 pub struct Job<'a> {
-    /// Units of the shard. Relative recordings begin at `beside`.
+    /// Units of the shard. Paths of recordings are relative to `beside`.
     pub units: Vec<Numbered>,
     pub beside: &'a Path,
-    /// Where outputs, records and results go.
+    /// The batch's folder, for outputs, records and results.
     pub folder: &'a Path,
     pub shard: Shard,
     pub device: DeviceOptions,
-    /// The digests of finished outputs are compared with their records.
+    /// Whether the digests of finished outputs are compared with their records.
     pub verifies: bool,
-    /// Share of the finished pictures that are drawn again and compared, 0..=1.
+    /// Share of the finished pictures that is drawn again and compared, 0..=1.
     pub recheck: f64,
-    /// What earlier processes wrote of this shard. Taken by the run.
+    /// Results that earlier processes wrote for this shard. [`Job::run`] takes them.
     pub earlier: Earlier,
-    /// Says first how many of the units were done before.
+    /// Whether the run begins with a line that counts the units done before.
     pub resumes: bool,
-    /// True once no further unit is to be begun.
+    /// Returns true once no further unit is to be started.
     pub stops: &'a dyn Fn() -> bool,
 }
 
@@ -54,24 +54,24 @@ pub struct Job<'a> {
 pub struct Ended {
     pub units: usize,
     pub failed: usize,
-    /// A signal ended it before all units were tried.
+    /// Whether a signal ended the run before all units were tried.
     pub stopped: bool,
 }
 
 /// Why a unit was not done.
 enum Fault {
-    /// Of the recording or the command.
+    /// The recording or the command is wrong.
     Bad(String),
     Failed(String),
     /// The device is lost, or there is none.
     Device(String),
-    /// The outputs cannot be written, as will be those of the next unit.
+    /// The outputs cannot be written, so that those of the next unit would fail, too.
     Output(String),
-    /// A signal ended it.
+    /// A signal ended the work.
     Stopped,
 }
 
-/// What a unit made, before it is written.
+/// The results of a unit before they are written.
 struct Made {
     bytes: Option<Vec<u8>>,
     /// An output that was written already.
@@ -87,7 +87,7 @@ impl Made {
 }
 
 impl Job<'_> {
-    /// Does the shard. A unit that fails is one line, and the rest goes on.
+    /// Runs the shard. A unit that fails is reported in one line, and the others are still done.
     ///
     /// # Errors
     /// A unit's command is wrong ([`Failure::Input`], before any work); there is no device, or it is lost ([`Failure::NoDevice`]); nothing can
@@ -214,7 +214,7 @@ impl Job<'_> {
         outcome.map(|()| ended)
     }
 
-    /// The units with their work, those last by which a device was lost before: the rest gets done first.
+    /// The units with their work. Units by which a device was lost before come last.
     fn tasks(&self, results: &Results) -> Result<Vec<Task>, Failure> {
         let mut works: HashMap<String, Arc<Work>> = HashMap::new();
         let (mut tasks, mut last) = (Vec::new(), Vec::new());
@@ -238,7 +238,7 @@ impl Job<'_> {
     }
 }
 
-/// Writes the record of a unit, whose outputs are written: from now on it is done.
+/// Writes the record of a unit, which marks it as done. Its outputs must have been written.
 fn commit(folder: &Path, key: Option<&Key>, record: &Record) -> Result<(), String> {
     let Some(key) = key else { return Ok(()) };
     let mut text = serde_json::to_vec_pretty(record).map_err(|e| e.to_string())?;
@@ -327,7 +327,7 @@ impl Worker<'_> {
         Ok((made, work, begun.elapsed().as_secs_f64()))
     }
 
-    /// Holds a picture against the one that is kept. The kept one stays.
+    /// Compares a picture with the stored one, which is kept.
     fn compared(&self, file: &Path, earlier: &Record, picture: &Picture) -> Result<Made, Fault> {
         let kept = Picture::load(file).map_err(Fault::Failed)?;
         let agreement = Agreement::of(&kept, earlier.drawer.as_ref(), picture, self.drawer().as_ref());
@@ -361,7 +361,7 @@ impl Worker<'_> {
     }
 }
 
-/// The outcome of holding a picture against the reference: figures, or a fault.
+/// The result of comparing a picture with the reference: figures, or a fault.
 fn verified(picture: &Picture, findings: crate::verify::Findings) -> Result<Made, Fault> {
     if let Some(fault) = findings.faults.first() {
         return Err(Fault::Failed(format!("differs from the f64 reference: {}", fault.what)));
@@ -378,7 +378,7 @@ fn verified(picture: &Picture, findings: crate::verify::Findings) -> Result<Made
     Ok(Made { figures: all, ..Made::of(text) })
 }
 
-/// Figures as a file that states its format.
+/// Figures as a JSON file that names its format.
 fn stated(format: &str, figures: &Map<String, Value>) -> Result<Vec<u8>, Fault> {
     let mut all = figures.clone();
     all.insert("format".into(), format.into());
@@ -395,7 +395,7 @@ fn of_device(error: GpuError) -> Fault {
     }
 }
 
-/// Deletes what killed processes left of files that they were writing.
+/// Deletes unfinished files of killed processes.
 fn remove_abandoned(folder: &Path) {
     let is_abandoned = |path: &PathBuf| {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -411,7 +411,7 @@ fn remove_abandoned(folder: &Path) {
     }
 }
 
-/// The name of this machine.
+/// The host name of this machine.
 fn host() -> String {
     let named = |name: &str| std::env::var(name).ok().filter(|text| !text.is_empty());
     let system = || fs::read_to_string("/proc/sys/kernel/hostname").ok().map(|text| text.trim().to_string());

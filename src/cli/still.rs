@@ -65,7 +65,8 @@ pub fn samples_within(time: f64, mut taken: impl FnMut(u32) -> Result<f64, Failu
     Ok((1.0 + (time - first) / each.max(1e-12)).clamp(1.0, f64::from(Still::MAX_SAMPLES)) as u32)
 }
 
-/// The standard error of a still in words: that of the luminance of the pixels that have light, as a share of it.
+/// A line about the noise of a still: median and 95th percentile over the lit pixels of the relative standard error of a pixel's luminance.
+/// `None` if the scene has no still.
 pub fn noise(renderer: &mut Renderer) -> Result<Option<String>, GpuError> {
     let Some(still) = renderer.scene().still().copied() else { return Ok(None) };
     let [light, squares] = final_sums(renderer.scene());

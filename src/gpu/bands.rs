@@ -12,7 +12,7 @@ use std::time::Duration;
 /// Longest expected time of a submission, ns. It is far below the limit of every watchdog, since the next picture may be slower than the
 /// last.
 const TARGET_NS: f64 = 100e6;
-/// The same on a software device that draws the panels of a window between the bands.
+/// Longest expected time of a submission on a software device that draws the panels of a window between the bands, ns.
 const PACED_TARGET_NS: f64 = 20e6;
 /// How often the first bands of a software device are halved, because a ray takes some microseconds there.
 const SOFTWARE_HALVINGS: u32 = 2;
@@ -72,7 +72,7 @@ pub(crate) struct Band {
     pub groups: [u32; 3],
 }
 
-/// The limit of one submission.
+/// The limit to the work in one submission.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum BandLimit {
     /// Time, ns, and how often the first bands are halved.

@@ -13,7 +13,7 @@ const KNOWS_TIMELINES: u32 = vk::make_api_version(0, 1, 3, 297);
 #[derive(Clone, Copy, Debug)]
 pub struct Layer {
     version: u32,
-    /// It takes its settings from the program that creates the instance: since January 2024.
+    /// Whether the layer takes its settings from the program that creates the instance, as it does since January 2024.
     pub(crate) has_settings: bool,
 }
 
@@ -37,7 +37,7 @@ impl Layer {
         self.version >= KNOWS_TIMELINES
     }
 
-    /// The extension, of the layer itself, by which the instance asks for synchronization validation.
+    /// The layer's own extension by which the instance asks for synchronization validation.
     pub fn extension(self) -> &'static CStr {
         if self.has_settings { ash::ext::layer_settings::NAME } else { ash::ext::validation_features::NAME }
     }

@@ -35,7 +35,7 @@ impl Target {
         Target { grid, world: World::of(&grid), sample, outside: 0.0, capture: None }
     }
 
-    /// The same target as a DICOM secondary capture of 8 bits. `shown`: the stored values that become 0 and 255.
+    /// This target as a DICOM secondary capture of 8 bits. `shown`: the stored values that become 0 and 255.
     pub fn captured(self, shown: [f64; 2]) -> Target {
         Target { sample: SampleType::U8, capture: Some(shown), ..self }
     }
@@ -58,7 +58,7 @@ impl Target {
         self.check_as(self.format(path)?, path)
     }
 
-    /// The same for a format.
+    /// As [`Target::check`], for a file of this format.
     pub(super) fn check_as(&self, format: VolumeFile, path: &Path) -> Result<(), InputError> {
         let most = format.most_along_axis();
         if let Some(long) = self.grid.size.iter().find(|n| **n > most) {

@@ -39,7 +39,7 @@ pub struct Format {
 pub(super) enum Reads {
     /// As voxels or frames of whole volumes. Such a file may be packed by gzip.
     Layout(fn(&InputFile) -> Result<Layout, InputError>),
-    /// The same, with what the options say of its voxels.
+    /// As voxels or frames of whole volumes, with the options' statements about the voxels.
     Stated(fn(&InputFile, &OpenOptions) -> Result<Layout, InputError>),
     /// Frames as they arrived.
     Frames,

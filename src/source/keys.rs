@@ -115,7 +115,7 @@ impl Unused {
         self.noted(without_numbers(&escaped(name, MAX_NAME)), name);
     }
 
-    /// The same for a name whose numbers tell it from others.
+    /// Notes the name of a key whose numbers distinguish it from others.
     pub(super) fn note_as_it_is(&mut self, name: &str) {
         self.noted(escaped(name, MAX_NAME), name);
     }

@@ -251,7 +251,7 @@ impl PixelStream {
         Ok(())
     }
 
-    /// Reads a compressed stream to its end, where its checksum is verified. Returns the number of bytes that were left.
+    /// Reads a compressed stream to its end, where its checksum is verified. Returns the number of decompressed bytes that were not read before.
     pub fn finish(&mut self) -> io::Result<u64> {
         match self {
             PixelStream::Raw(_) => Ok(0),

@@ -94,7 +94,7 @@ pub(super) struct Poses {
 }
 
 impl Poses {
-    /// Adds one. More names than are kept are left out.
+    /// Adds the transform of this name for a picture. Beyond the largest number of names it is left out.
     pub fn add(&mut self, name: TransformName, picture: usize, matrix: DMat4) {
         if self.by_name.len() < MAX_NAMES || self.by_name.contains_key(&name) {
             self.by_name.entry(name).or_default().insert(picture, matrix);

@@ -1,4 +1,4 @@
-//! Where the picture shows what was recorded, whatever its echoes are: there, nothing may lie over it that has room elsewhere.
+//! Where the picture shows recorded data, dark or bright. Overlays keep away from there if they have room elsewhere.
 
 use crate::picking::Picker;
 use crate::probe::{Geometry, Motion, Probe};
@@ -24,7 +24,7 @@ impl<'a> Anatomy<'a> {
         Anatomy { scene, tiling, bounds: (low.max(scene.low), high.min(scene.high)) }
     }
 
-    /// True if a plane or a ray at this position, pixels of the picture, meets what was recorded. Cuts and thresholds are not regarded.
+    /// True if a plane or a ray through this position, pixels of the picture, meets recorded data. Cuts and thresholds are ignored.
     pub(super) fn is_at(&self, at: [f64; 2]) -> bool {
         let is_in = |tile: &&Tile| {
             (0..2).all(|a| (0.0..f64::from(tile.size[a])).contains(&(at[a] - f64::from(tile.corner[a]))))

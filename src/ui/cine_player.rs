@@ -1,5 +1,5 @@
-//! Plays the volumes of a cine loop: a part of it, at a speed, in one direction or back and forth, as its settings say. Pure: settings, volumes and
-//! the clock are passed in.
+//! Plays the cine loop: a part of it, at a speed, in one direction or back and forth, by its settings. Pure: settings, volumes and the time are
+//! passed in.
 
 use crate::live::cine::CineVolume;
 use crate::scene::Cine;
@@ -7,29 +7,29 @@ use std::collections::VecDeque;
 use std::ops::RangeInclusive;
 use std::time::{Duration, Instant};
 
-/// The speeds of its button, as multiples of that of the acquisition.
+/// The selectable speeds, as multiples of the acquisition's.
 pub(super) const SPEEDS: [f64; 7] = [0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0];
 /// Time from a volume to the next where their time stamps do not say it, s.
 const UNKNOWN_INTERVAL: f64 = 0.2;
 /// Intervals that time stamps can state, s. Longer ones are pauses of the acquisition.
 const INTERVALS: RangeInclusive<f64> = 1e-3..=5.0;
 
-/// Where a loop is that plays.
+/// The playback of a loop.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct CinePlayer {
-    /// When the next volume is due, while the loop plays.
+    /// When the next volume is due; none while the loop does not play.
     next: Option<Instant>,
     is_backwards: bool,
 }
 
-/// What a loop is played of.
+/// The volumes of a loop, and how they are played.
 #[derive(Clone, Copy)]
 pub(super) struct Loop<'a> {
     pub(super) cine: &'a Cine,
     pub(super) volumes: &'a VecDeque<CineVolume>,
 }
 
-/// The speed so many steps along [`SPEEDS`] from another one.
+/// The speed that is so many steps along [`SPEEDS`] from another one.
 pub(super) fn stepped(speed: f64, by: i32) -> f64 {
     let last = SPEEDS.len() as i32 - 1;
     let at = match by >= 0 {
@@ -39,7 +39,7 @@ pub(super) fn stepped(speed: f64, by: i32) -> f64 {
     SPEEDS[at.saturating_add(by).clamp(0, last) as usize]
 }
 
-/// The loop begins (`end` false) or ends with the volume of this number. A mark that leaves nothing takes the other one away.
+/// Sets the first (`end` false) or the last volume of the loop, by its number. A mark that would leave no volume removes the other mark.
 pub(super) fn marked(cine: Cine, volume: u32, end: bool) -> Cine {
     match end {
         false => Cine { first: Some(volume), last: cine.last.filter(|last| *last >= volume), ..cine },
@@ -48,7 +48,7 @@ pub(super) fn marked(cine: Cine, volume: u32, end: bool) -> Cine {
 }
 
 impl Loop<'_> {
-    /// Indices of the volumes between the marks; of all where none of them is left: the loop may lose volumes meanwhile.
+    /// Indices of the volumes between the marks, or of all volumes if none is left between them, as the loop drops its oldest ones.
     pub(super) fn range(&self) -> RangeInclusive<usize> {
         let Loop { cine, volumes } = self;
         let all = 0..=volumes.len().saturating_sub(1);
@@ -69,13 +69,13 @@ impl Loop<'_> {
         known.map(|intervals| intervals.len() as f64 / intervals.iter().sum::<f64>())
     }
 
-    /// Volumes a second as they are played.
+    /// Volumes a second at the present speed.
     pub(super) fn played_rate(&self) -> f64 {
         self.rate().unwrap_or(1.0 / UNKNOWN_INTERVAL) * self.cine.speed
     }
 }
 
-/// What the panel shows of a loop.
+/// The state of a loop for the panel.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct CineState {
     /// Number of volumes.
@@ -90,9 +90,9 @@ pub(super) struct CineState {
     pub(super) goes_back_and_forth: bool,
     /// Time of the shown volume after the first of the loop, s.
     pub(super) seconds: Option<f64>,
-    /// The same of the last volume.
+    /// Time of the last volume after the first, s.
     pub(super) length: Option<f64>,
-    /// Volumes a second as they were acquired, of the part that is played.
+    /// Acquisition rate of the part that is played, volumes a second.
     pub(super) rate: Option<f64>,
 }
 
@@ -110,7 +110,7 @@ impl CinePlayer {
         self.next = None;
     }
 
-    /// Plays from `now` on, or stops.
+    /// Starts at `now`, or stops.
     pub(super) fn toggle(&mut self, of: Loop, now: Instant) {
         self.next = match self.next {
             None if of.range().count() > 1 => Some(now),

@@ -1,8 +1,8 @@
-//! The clipboard of the desktop. A monitor without a desktop has none.
+//! The clipboard of the desktop. There is none on a monitor without a desktop.
 
 use arboard::Clipboard as Desktop;
 
-/// The clipboard, connected with the first text. What was copied stays as long as this does.
+/// The clipboard, which is connected with the first text. A copied text is available as long as this lives.
 #[derive(Default)]
 pub(super) struct Clipboard {
     desktop: Option<Desktop>,

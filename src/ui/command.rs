@@ -1,5 +1,4 @@
-//! The commands of a user, which gestures on the picture, keys and panels give; and the key bindings: what every key does, and its
-//! description in the help.
+//! The commands of a user, given by gestures on the picture, keys and panels; and the key bindings with their descriptions in the help.
 
 pub use super::view::{Face, Viewpoint};
 
@@ -12,7 +11,7 @@ use crate::scene::{
 use crate::texts::keys;
 use Key::{Char, Function};
 
-/// What a user asks for, by a key, a gesture or a control.
+/// What a user asks for by a key, a gesture or a control.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Command {
     Mode(Mode),
@@ -43,9 +42,9 @@ pub enum Command {
     ToggleStartCurve,
     /// Moves the handle of the start line with this index: lateral, depth, mm.
     MoveStartHandle(usize, [f64; 2]),
-    /// Adds a handle to the start line at this lateral position, mm; none: in the widest gap.
+    /// Adds a handle to the start line at this lateral position, mm; with `None` in the widest gap.
     AddStartHandle(Option<f64>),
-    /// Removes the handle of the start line with this index; none: the one that bends it the least.
+    /// Removes the handle of the start line with this index; with `None` the one that bends the line the least.
     RemoveStartHandle(Option<usize>),
     /// Moves the viewer's clip plane further into the volume, mm; negative values pull it back.
     MoveClip(f64),
@@ -59,36 +58,36 @@ pub enum Command {
     RotatePlanes([f64; 2]),
     /// Sets a slider, by its index in [`super::sliders::SLIDERS`], to a value.
     SetSlider(usize, f64),
-    /// Sets a slider to a value in the unit that it shows.
+    /// Sets a slider to a value in its displayed unit.
     SetShown(usize, f64),
-    /// Sets a slider to the value of the start.
+    /// Resets a slider to its value at the start.
     ResetSlider(usize),
     /// Moves a slider by a number of its steps.
     StepSlider(usize, i32),
     Transfer(TransferName),
-    /// The opacities of a volume by name; those of its transfer function.
+    /// Sets the opacities of the volume by name; `None`: those of its transfer function.
     Opacity(Option<TransferName>),
     ColourMap(ColourMap),
     Shadow(bool),
-    /// Restores all settings of the start. A frozen picture stays frozen, and measurements stay.
+    /// Restores all settings of the start. A frozen picture stays frozen, and measurements are kept.
     Reset,
-    /// Takes the last change back: of settings, planes, region or measurements.
+    /// Undoes the last change: of settings, planes, region or measurements.
     Undo,
-    /// Takes all changes back; undone step by step, they come again.
+    /// Undoes all changes. Each remains a step of redo.
     UndoAll,
-    /// Does again what was undone.
+    /// Redoes what was undone.
     Redo,
     /// Moves the point where the planes cross to the middle of the region.
     Recentre,
-    /// Shows the plane across the slices of a tomography, with their lines, or not.
+    /// Shows or hides the reference plane of a tomography: a plane across the slices, with their lines.
     Reference(bool),
-    /// Sets a point of the tool's measurement: lateral, depth, elevation, mm; and whether it was picked on the rendered surface.
+    /// Sets a point of the current measurement: lateral, depth, elevation, mm; and whether it was picked on the rendered surface.
     Point([f64; 3], bool),
     /// Picks the point of the surface under this pixel of the picture.
     PickSurface([f64; 2]),
-    /// Closes the contour in work, or ends the volume in work.
+    /// Closes the contour or ends the volume that is being measured.
     EndMeasure,
-    /// Leaves the measurement in work.
+    /// Discards the measurement in progress.
     CancelMeasure,
     /// Moves a point: index of the measurement, index of its point, mm.
     MovePoint(usize, usize, [f64; 3]),
@@ -100,15 +99,15 @@ pub enum Command {
     Type(char),
     Untype,
     EndTyping,
-    /// Begins the contour of a cut at this pixel of the picture.
+    /// Starts the contour of a cut at this pixel of the picture.
     BeginCut([f64; 2]),
-    /// Draws the contour on to this pixel.
+    /// Continues the contour to this pixel.
     CutAlong([f64; 2]),
     /// Closes the contour and cuts along it.
     EndCut,
-    /// Leaves the contour in work.
+    /// Discards the contour in progress.
     CancelCut,
-    /// Chooses the side of the next contour that stays.
+    /// Chooses the side of the next contour that is kept.
     KeepSide(KeptSide),
     /// Sets the radius of the brush, mm.
     BrushRadius(f64),
@@ -118,26 +117,26 @@ pub enum Command {
     CurvePoint(PlaneName, [f64; 2]),
     /// Ends the line, and shows the section along it.
     EndCurve,
-    /// Leaves the line in work.
+    /// Discards the line in progress.
     CancelCurve,
     /// Moves a point of the line of the curved plane, mm.
     MoveCurvePoint(usize, [f64; 2]),
     /// Removes the curved plane.
     ClearCurve,
-    /// Sets a point of the tool's measurement on the curved plane: lateral, depth, elevation, mm.
+    /// Sets a point of the current measurement on the curved plane: lateral, depth, elevation, mm.
     PointOnCurve([f64; 3]),
     /// Adds a body mark in a corner of the picture.
     AddBodyMark(Body),
-    /// Gives the body mark with this index another place, size, probe, direction or part of the body.
+    /// Changes the position, size, probe, direction or body part of the body mark with this index.
     ChangeBodyMark(usize, BodyMark),
-    /// Chooses the body mark that controls are about.
+    /// Selects the body mark that the controls refer to.
     SelectBodyMark(usize),
     RemoveBodyMark(usize),
-    /// States the patient's sides at the ends of an axis.
+    /// Sets the patient's sides at the ends of an axis.
     Sides(VolumeAxis, Sides),
     /// Exchanges the letters L and R.
     ExchangeLeftAndRight,
-    /// States where the marker of the probe is.
+    /// Sets the position of the probe's marker.
     ProbeMarker(ProbeMarker),
     /// Counts the voxels of the region whose echo reaches the threshold.
     CountVoxels,
@@ -151,49 +150,49 @@ pub enum Command {
     OpenFiles,
     /// Opens the n-th entry of that list.
     OpenFile(usize),
-    /// Shows the n-th of the recordings that are open.
+    /// Shows the n-th of the open recordings.
     ShowRecording(usize),
-    /// Shows the recording so many places further in their list.
+    /// Shows the recording so many positions further in the list.
     StepRecording(i32),
-    /// Closes the n-th recording, or the one that is shown.
+    /// Closes the n-th recording; `None`: the one that is shown.
     CloseRecording(usize),
-    /// Ends the reading of a file.
+    /// Stops reading a file.
     CancelReading,
     /// Shows or hides the menu of exports.
     Exports,
-    /// Exports the volume that is shown in the n-th format of that menu.
+    /// Exports the shown volume in the n-th format of the menu.
     Export(usize),
-    /// Ends the export in work.
+    /// Cancels the export in progress.
     CancelExport,
     /// Shows or hides the list of presets.
     Presets,
-    /// Takes the n-th preset of that list: first the built-in ones, then those of the user.
+    /// Applies the n-th preset of the list: first the built-in ones, then the user's.
     Preset(usize),
-    /// Begins to type the name under which the present look is kept.
+    /// Starts to type the name of a new preset with the present look.
     NamePreset,
-    /// Begins to type another name for the n-th preset of the user.
+    /// Starts to type a new name for the user's n-th preset.
     RenamePreset(usize),
-    /// Keeps the name that was typed.
+    /// Saves under the name that was typed.
     EndNaming,
-    /// Deletes the n-th preset of the user.
+    /// Deletes the user's n-th preset.
     DeletePreset(usize),
-    /// Brings the presets of the user back as they were before the last change.
+    /// Restores the user's presets as they were before the last change.
     RestorePresets,
     /// Freezes or unfreezes the live picture.
     Freeze,
-    /// Steps so many volumes back (negative) or forward, and freezes.
+    /// Steps so many volumes back (negative) or forward in the cine loop, and freezes.
     StepCine(i32),
     /// Shows the volume at this index of the cine loop (0 is the oldest), and freezes.
     SeekCine(usize),
     /// Plays the cine loop repeatedly, or stops it.
     PlayCine,
-    /// The cine loop begins with the volume that is shown; `true`: it ends with it.
+    /// Makes the shown volume the first of the cine loop; `true`: the last.
     MarkCine(bool),
-    /// The cine loop begins with the volume at this index; `true`: it ends with it.
+    /// Makes the volume at this index the first of the cine loop; `true`: the last.
     TrimCine(usize, bool),
-    /// The cine loop is all volumes again.
+    /// Removes the marks: the cine loop is all volumes again.
     WholeCine,
-    /// Plays the cine loop so many steps faster.
+    /// Changes the speed of the cine loop by so many steps.
     CineSpeed(i32),
     /// Plays the cine loop back and forth, or forwards only.
     BackAndForth(bool),
@@ -205,34 +204,34 @@ pub enum Command {
     CloseHints,
     /// Shows or hides the search of all commands and controls.
     Find,
-    /// Shows the slider with this index of [`super::sliders::SLIDERS`] in the inspector, and gives it the keyboard.
+    /// Shows the slider with this index of [`super::sliders::SLIDERS`] in the inspector, and gives it the keyboard focus.
     ShowControl(usize),
-    /// Begins to type the value of the slider with this index.
+    /// Starts to type the value of the slider with this index.
     TypeValue(usize),
-    /// Saves pictures with a bar, or without.
+    /// Chooses whether saved pictures have a bar below with scale, depth, mode, time and origin.
     SavesBar(bool),
     /// Shows or hides the times of the passes.
     ToggleTimes,
     /// Shows or hides sliders and buttons.
     TogglePanels,
-    /// Gives the keyboard to the panels, or back to the picture.
+    /// Gives the keyboard focus to the panels, or back to the picture.
     FocusPanels,
     /// Shows this part of the inspector.
     InspectorTab(InspectorTab),
-    /// Shows the next part of the inspector; where that is a drawer, opens it first and closes it after the last part.
+    /// Shows the next part of the inspector. A drawer is opened first, and closed after the last part.
     NextTab,
-    /// Opens or closes the inspector of a window that has no room for it beside the picture.
+    /// Opens or closes the inspector as a drawer, in a window that has no room for it beside the picture.
     ToggleDrawer,
     /// Turns the pointer by keyboard on or off.
     KeyboardPointer,
     ToggleFullScreen,
-    /// Closes what is open, else leaves full screen, else leaves the program.
+    /// Closes what is open; if nothing is, leaves full screen, and otherwise the program.
     Back,
-    /// Leaves the program. If that loses a loop, asks first.
+    /// Leaves the program, after a question if a loop would be lost.
     Exit,
-    /// Saves the cine loop, and leaves the program when it is saved.
+    /// Saves the cine loop and then leaves the program.
     SaveAndExit,
-    /// Leaves the program without another question.
+    /// Leaves the program without saving.
     Discard,
 }
 
@@ -263,7 +262,7 @@ pub enum Tool {
 /// The parts of the inspector.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum InspectorTab {
-    /// Tools and views, in a window that has no room for them at its edges.
+    /// Tools and views, if the window has no room for them at its edges.
     Tools,
     #[default]
     Look,
@@ -273,7 +272,7 @@ pub enum InspectorTab {
 }
 
 impl Command {
-    /// True for commands that a drag or a held key gives repeatedly.
+    /// True for commands that a drag or a held key repeats.
     pub(super) fn is_continuous(&self) -> bool {
         matches!(
             self,
@@ -295,7 +294,7 @@ impl Command {
         )
     }
 
-    /// True if this command goes on with what `last` began, so that both are one step for undo.
+    /// True if this command continues what `last` began, so that both are one step of undo.
     pub(super) fn continues(&self, last: &Command) -> bool {
         match (self, last) {
             (Command::SetSlider(a, _), Command::SetSlider(b, _)) => a == b,
@@ -325,7 +324,7 @@ pub struct Binding {
     pub modifiers: Modifiers,
     pub(super) description: &'static str,
     pub command: Command,
-    /// The command repeats while the key is held.
+    /// True if the command repeats while the key is held.
     pub(super) repeats: bool,
 }
 
@@ -355,7 +354,7 @@ impl Binding {
 /// A distance beyond any volume, mm.
 const BEYOND_ANY_VOLUME_MM: f64 = 1e5;
 
-/// All key bindings, in groups. Consecutive ones with the same description are one line of the help.
+/// All key bindings, in groups. Consecutive ones with the same description share a line of the help.
 pub const KEY_BINDINGS: &[Binding] = &[
     on(Char('1'), keys::SURFACE, Command::Mode(Mode::Surface)),
     on(Char('2'), keys::VOLUME, Command::Mode(Mode::Volume)),
@@ -527,7 +526,7 @@ pub(super) fn key_label(binding: &Binding) -> String {
     held + &key
 }
 
-/// The keys that are held. A toggle must not repeat while its key is held.
+/// The keys that are held, so that a toggle does not repeat.
 #[derive(Clone, Debug, Default)]
 pub(super) struct HeldKeys {
     modifiers: Modifiers,
@@ -543,7 +542,7 @@ impl HeldKeys {
         self.held.contains(&key)
     }
 
-    /// The command that an input gives, if any.
+    /// The command of an input, if it has one.
     pub(super) fn input(&mut self, input: &Input) -> Option<Command> {
         match *input {
             Input::Modifiers(modifiers) => self.modifiers = modifiers,

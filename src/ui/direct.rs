@@ -18,9 +18,9 @@ pub struct DirectOptions {
     /// The monitor and its mode.
     pub monitor: MonitorChoice,
     pub present_mode: PresentMode,
-    /// Grabs the input devices, so that no other program gets their events, such as the text console behind.
+    /// Whether the input devices are grabbed, so that no other program, such as the text console, gets their events.
     pub grab: bool,
-    /// Ends after this time.
+    /// Ends the console after this time.
     pub time: Option<Duration>,
 }
 
@@ -66,7 +66,7 @@ struct DirectLoop<'a> {
     size: [u32; 2],
     recovery: Recovery,
     cursor: CursorTimer,
-    /// At least one frame was presented.
+    /// Whether a frame was presented.
     has_presented: bool,
     ends: Option<Instant>,
 }
@@ -74,7 +74,7 @@ struct DirectLoop<'a> {
 /// When the loop updates again.
 enum NextUpdate {
     Exit,
-    /// At an event, or at this time.
+    /// Wait for an event, or until this time.
     Wait(Option<Instant>),
 }
 

@@ -18,20 +18,20 @@ use std::time::{SystemTime, UNIX_EPOCH};
 /// Largest number of files that are being saved: a key that is held must not fill the disk.
 const MAX_PENDING: usize = 4;
 
-/// What a file holds that would otherwise be lost.
+/// Data in a saved file that would otherwise be lost.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Holds {
     Nothing,
     /// The complete cine loop up to the volume of this number.
     Loop(u32),
-    /// What was made by hand, of the recording that is shown or of one that is kept.
+    /// Handiwork on the shown recording, or on one that is kept.
     Work {
         kept: Option<PathBuf>,
         work: Handiwork,
     },
 }
 
-/// What became of a file.
+/// The result of saving a file.
 pub(super) struct Saved {
     pub(super) file: Result<PathBuf, String>,
     pub(super) holds: Holds,
@@ -45,11 +45,11 @@ pub(super) struct Exporter {
     pending: usize,
     number: u32,
     wake: Wake,
-    /// The threads that save anything else than an export.
+    /// Threads that save files other than exports.
     threads: Vec<JoinHandle<()>>,
-    /// The export that was begun last: its name and its thread.
+    /// The last export: its name, state and thread.
     export: Option<(&'static str, Arc<Export>, JoinHandle<()>)>,
-    /// How far it was at the last look.
+    /// Progress of the export when it was last polled.
     progress: Option<Progress>,
 }
 
@@ -70,7 +70,7 @@ impl Exporter {
         }
     }
 
-    /// The next file that was saved since the last call, or why it was not.
+    /// The next file that was saved or failed since the last call.
     pub(super) fn poll(&mut self) -> Option<Saved> {
         let done = self.receiver.try_recv().ok()?;
         self.pending = self.pending.saturating_sub(1);
@@ -128,26 +128,26 @@ impl Exporter {
         Ok(())
     }
 
-    /// The name of the export in work.
+    /// The name of the running export.
     pub(super) fn exporting(&self) -> Option<&'static str> {
         // The thread also ends without any work, if there is no folder for it.
         let is_at_work = |export: &Export, thread: &JoinHandle<()>| !export.is_finished() && !thread.is_finished();
         self.export.as_ref().filter(|(_, export, thread)| is_at_work(export, thread)).map(|(name, ..)| *name)
     }
 
-    /// Looks how far the export in work is. True if it is further than at the last look.
+    /// Polls the running export. True if its progress changed.
     pub(super) fn look(&mut self) -> bool {
         let export = self.export.as_ref().filter(|_| self.exporting().is_some());
         let progress = export.and_then(|(_, export, _)| export.progress());
         std::mem::replace(&mut self.progress, progress) != progress
     }
 
-    /// How far the export in work was at the last look, as far as it says so.
+    /// Progress of the running export at the last poll, if it reports one.
     pub(super) fn progress(&self) -> Option<Progress> {
         self.progress
     }
 
-    /// Ends the export in work, if there is one.
+    /// Cancels the running export, if there is one.
     pub(super) fn cancel_export(&self) {
         if let Some((_, export, _)) = &self.export {
             export.cancel();

@@ -1,5 +1,5 @@
-//! Frame budget: keeps the time of a picture below a limit while the view moves, by choosing a rung of the quality ladder. A view at rest
-//! has full quality. It is pure: it is given the times of pictures and returns the rung of the next one.
+//! Frame budget: keeps the time of a picture below a limit while the view moves, by choosing a rung of the quality ladder. A view at rest has full
+//! quality. Pure: picture times go in, the rung of the next picture comes out.
 //!
 //! The quality ladder of a moving view: changes of the settings from full quality down. They come from a measured error report, or are
 //! the built-in ones, which were found to cost the least error for the time that they save.
@@ -11,7 +11,7 @@ use crate::scene::{Mode, Ray, Scene, Settings, camera};
 use crate::texts;
 use std::time::{Duration, Instant};
 
-/// The view is at rest so long after its last movement.
+/// Time after the last movement at which a view counts as at rest.
 pub(super) const REST_DELAY: Duration = Duration::from_millis(250);
 /// Weight of a new time in the running mean of a rung.
 const NEW_WEIGHT: f64 = 0.4;
@@ -24,16 +24,16 @@ const PAUSE: f64 = 3.0;
 /// Pictures on a rung before a better one is tried.
 const MIN_PICTURES: u32 = 4;
 
-/// What is left out of a picture: the rungs of the two ladders, 0 for full quality.
+/// What a picture leaves out: the rungs of its two ladders, 0 for full quality.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Quality {
-    /// Of the rays and of all that follows.
+    /// Rung of the rays and of everything that follows them.
     pub rays: usize,
-    /// Of the shading alone, on a complete distance map.
+    /// Rung of the shading alone, on a complete distance map.
     pub shading: usize,
 }
 
-/// The frame budget of each kind of work. What only changes tone, colours or planes beside a rendering is always drawn in full.
+/// The frame budgets of the kinds of work. Changes of tone, colours or planes beside a rendering alone are always drawn in full.
 #[derive(Clone, Debug)]
 pub(super) struct Pace {
     rays: FrameBudget,
@@ -46,9 +46,9 @@ pub(super) struct Pace {
 #[derive(Clone, Debug)]
 struct Live {
     pictures: FrameBudget,
-    /// That of a view that moves, which is the least.
+    /// The frame budget of a moving view, the shortest one.
     least: Option<Duration>,
-    /// When a volume came last, and the mean time between two, s.
+    /// When the last volume came, and the mean interval between volumes, s.
     came: Option<(Instant, Option<f64>)>,
 }
 
@@ -76,14 +76,14 @@ impl Live {
     }
 }
 
-/// The rung of the rays while nothing is measured: full quality on a GPU with memory of its own. One that shares the machine's memory, or a CPU, may take
-/// seconds for a picture of full quality, and nothing interrupts it.
+/// The rung of the rays before anything is measured: full quality on a GPU with memory of its own. A GPU that shares the machine's memory, or a CPU,
+/// may take seconds for such a picture, which cannot be interrupted.
 pub(super) fn first_rung(has_unified_memory: bool) -> usize {
     usize::from(has_unified_memory)
 }
 
 impl Pace {
-    /// `rungs`: of the rays; `first`: the one of a view that moves before any picture was timed.
+    /// `rungs`: those of the rays; `first`: the rung of a moving view before any picture was timed.
     pub(super) fn new(budget: Option<Duration>, rungs: &[Rung], first: usize) -> Pace {
         let shares: Vec<f64> = rungs.iter().map(|rung| rung.time_share).collect();
         let shading = SHADING.map(|(_, share)| share);
@@ -96,7 +96,7 @@ impl Pace {
         self.rays.budget()
     }
 
-    /// Records that the user moved what takes this work.
+    /// Records that the user moved something whose picture takes this work.
     pub(super) fn moved(&mut self, work: Work, now: Instant) {
         match work {
             Work::Rays => self.rays.view_moved(now),
@@ -110,7 +110,7 @@ impl Pace {
         self.live.volumes_came(count, now);
     }
 
-    /// No more volumes are shown as they come.
+    /// Records that volumes are no longer shown as they come.
     pub(super) fn volumes_stopped(&mut self) {
         self.live.came = None;
     }
@@ -142,7 +142,7 @@ impl Pace {
         }
     }
 
-    /// Records the time of a picture of this quality that took this work.
+    /// Records the time of a picture of this quality that needed this work.
     pub(super) fn picture_took(&mut self, work: Work, quality: Quality, time: Duration) {
         match work {
             Work::Rays if quality.shading == 0 => {
@@ -173,8 +173,8 @@ pub(super) fn shaded(mut settings: Settings, rung: usize) -> Settings {
 /// Most cells of a light volume that is made again for every picture of a view that moves.
 const MOVING_CELLS: u32 = 1_000_000;
 
-/// The settings of a moving view whose light is made again for every picture: its cells are coarser, which pictures with fewer rays hardly show. A view that
-/// only turns keeps the light that it has.
+/// The settings of a moving view whose light is recomputed for every picture: the light volume gets coarser cells, which is hardly visible with fewer
+/// rays. A view that only rotates keeps its light.
 pub(super) fn coarsely_lit(mut settings: Settings) -> Settings {
     if let Some(light) = &mut settings.light.volume {
         light.cells = light.cells.min(MOVING_CELLS);
@@ -190,7 +190,7 @@ pub(super) fn label(quality: Quality, rungs: &[Rung]) -> &str {
     }
 }
 
-/// What the rungs make of a scene at full quality, once each as far as stage 1 can tell them apart.
+/// What stage 1 is to make on the lower rungs of a scene at full quality, each once: settings without what stages 2 to 4 alone depend on.
 pub(super) fn lowered(rungs: &[Rung], scene: &Scene) -> Vec<Settings> {
     let mut all: Vec<Settings> = Vec::new();
     for rung in rungs.iter().skip(1) {
@@ -211,12 +211,12 @@ pub(super) struct FrameBudget {
     budget: Option<Duration>,
     /// By rung: the expected time of a picture as a fraction of that on rung 0.
     expected: Vec<f64>,
-    /// The same, corrected by measurements.
+    /// The expected fractions, corrected by measurements.
     measured: Vec<f64>,
     rung: usize,
-    /// No picture was timed yet: the rung is a guess by the kind of device.
+    /// True until a picture was timed: the rung is a guess by the kind of device.
     is_guessed: bool,
-    /// Mean time of the pictures on this rung, s, and their number.
+    /// Mean time of the pictures on the present rung, s, and their number.
     mean: f64,
     pictures: u32,
     /// The previous rung and its mean.
@@ -284,8 +284,8 @@ impl FrameBudget {
         }
     }
 
-    /// Records the time of a picture on a rung, and chooses the next rung. Times of a view at rest are ignored unless it is on the rung of
-    /// the moving view, or keeps the budget as it is.
+    /// Records the time of a picture on a rung, and chooses the next rung. Times on another rung than that of the moving view are ignored,
+    /// except that a picture at full quality within the budget chooses full quality.
     pub(super) fn picture_took(&mut self, rung: usize, time: Duration) {
         let Some(budget) = self.budget.map(|b| b.as_secs_f64()) else { return };
         let time = time.as_secs_f64();
@@ -359,15 +359,15 @@ pub struct Rung {
 #[derive(Clone, Debug, PartialEq)]
 enum Change {
     None,
-    /// So many pixels from ray to ray along each axis.
+    /// One ray for so many pixels along each axis.
     Apart(u32),
-    /// Assignments as of `--set`, from an error report.
+    /// Assignments in the form of `--set`, from an error report.
     Measured(Vec<String>),
 }
 
-/// The built-in ladder. It takes rays away and nothing else: without its filters a surface has holes that are not there, a longer step loses thin
-/// tissue, and neither saves as much as half the rays. The time shares are a first estimate, from the phantom's face on two cores; the frame budget
-/// corrects them with measurements.
+/// The built-in ladder, which only reduces the number of rays: without its filters a surface would have false holes, a longer step would lose thin
+/// tissue, and neither saves as much as half the rays. The time shares are first estimates, from the phantom's face on two cores; the frame budget
+/// corrects them by measurements.
 pub fn built_in_ladder() -> Vec<Rung> {
     let rung = |label: &str, time_share, apart| Rung { label: label.into(), time_share, change: Change::Apart(apart) };
     vec![
@@ -378,8 +378,8 @@ pub fn built_in_ladder() -> Vec<Rung> {
     ]
 }
 
-/// The ladder of an error report: the Pareto front of its measured combinations, from full quality to the fastest. Times are those of
-/// the picture: stage 1 is the same on every rung.
+/// The ladder of an error report: the Pareto front of its measured combinations, from full quality to the fastest. Times are those of the picture, as
+/// stage 1 is the same on every rung.
 ///
 /// # Errors
 /// One line: the report has no times.

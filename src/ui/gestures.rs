@@ -1,5 +1,5 @@
-//! Gestures on the picture: a mouse with three buttons and a wheel, or fingers. Inputs go in, commands come out; the only state is what
-//! is pressed and the last click.
+//! Gestures on the picture, by a mouse with three buttons and a wheel or by fingers. Inputs go in, commands come out; the only state is what is
+//! pressed and the last click.
 
 use super::command::{Command, Face, Tool};
 use super::input::{Button, Input, Modifiers, Phase};
@@ -41,14 +41,14 @@ const MIN_PINCH: f64 = 24.0;
 pub(super) struct Gestures {
     pointer: Option<[f64; 2]>,
     mouse: Option<(Button, Press)>,
-    /// In the order in which they touched the picture. The first two form a pair.
+    /// The fingers in the order in which they touched the picture. The first two form a pair.
     fingers: Vec<Finger>,
-    /// The press of a single finger.
+    /// The press of the first finger while it is alone.
     finger_press: Option<Press>,
-    /// Several fingers touched since all were up: lifting the last one is no tap.
+    /// Whether several fingers touched since all were up: lifting the last one is then no tap.
     had_several: bool,
     last_click: Option<Click>,
-    /// The command that returns from a tile that is shown alone.
+    /// The command that returns from a tile shown alone.
     back: Option<Command>,
 }
 
@@ -66,7 +66,7 @@ struct Click {
 }
 
 impl Gestures {
-    /// The commands that an input gives, in the order in which to execute them. Keys give none here.
+    /// The commands of an input, in the order of execution. Keys give none here.
     pub(super) fn input(
         &mut self,
         input: &Input,
@@ -294,27 +294,27 @@ enum Drag {
     Clip,
     /// A face of the region.
     Face(Face),
-    /// A face of the region, by its line on a tile of planes.
+    /// A face of the region, dragged by its line on a tile of planes.
     FaceOnPlane {
         tile: usize,
         face: Face,
     },
-    /// The region, from where it was grabbed on a tile; how far it can move, and how far it moved, mm.
+    /// The region, dragged on a tile: where it was grabbed, how far it can move, and how far it has moved, mm.
     Region {
         tile: usize,
         from: DVec3,
         travel: [DVec3; 2],
         moved: DVec3,
     },
-    /// A handle of the start line. It is grabbed where it is: lateral and depth of the way there from the pointer, mm.
+    /// A handle of the start line, with the offset of the handle from the pointer: lateral and depth, mm.
     StartHandle {
         tile: usize,
         index: usize,
         way: [f64; 2],
     },
     RotatePlanes,
-    /// The point where three planes cross, dragged on one of their tiles. It is grabbed where it is: `way` from the pointer; `along`: only
-    /// along the normal of the plane whose line was grabbed.
+    /// The point where three planes cross, dragged on one of their tiles. `way`: offset from the pointer; `along`: the normal of the plane whose line
+    /// was grabbed, along which alone it moves.
     Crossing {
         tile: usize,
         way: DVec3,
@@ -328,28 +328,28 @@ enum Drag {
         index: usize,
         point: usize,
     },
-    /// A new distance from the press to the release, on a tile; its first point is set already, or not.
+    /// A new distance on a tile, from the press to the release; whether its first point is already set.
     Caliper {
         tile: usize,
         has_first: bool,
     },
     /// A contour along the drag, on a tile.
     Trace(usize),
-    /// What cannot be drawn on the curved plane of this tile, which the first point of it tells.
+    /// A drag on the tile of a curved plane with a tool that cannot draw there: the command for its first point reports that.
     OnCurve(usize),
-    /// A straight line from the press to the release, on a tile; or the next point of the line in work.
+    /// A straight line on a tile from the press to the release, or the next point of the line in progress.
     Line {
         tile: usize,
         is_next: bool,
     },
-    /// A point of the line of the curved plane, on its tile.
+    /// A point of the curved plane's line, on its tile.
     Handle {
         tile: usize,
         index: usize,
     },
     /// The contour of a cut along the drag, on the rendering.
     Cut,
-    /// A body mark, or the probe on it. It is grabbed where it is: `way` from the pointer, pixels of the picture.
+    /// A body mark or the probe on it. `way`: offset from the pointer, pixels of the picture.
     BodyMark {
         index: usize,
         part: MarkPart,
@@ -366,10 +366,10 @@ struct Press {
     last: [f64; 2],
     /// See [`Viewport::columns_to_surface`]; a drag that leaves its half stays on the same rays.
     columns_to_surface: f64,
-    /// The press becomes a drag after it moved so far, pixels of the window.
+    /// Distance in pixels of the window after which the press becomes a drag.
     slop: f64,
     is_drag: bool,
-    /// Of a face, mm: where along its axis it was grabbed, its range of motion from there, and how far it moved.
+    /// For a face: where along its axis it was grabbed, its range of motion from there, and how far it has moved, mm.
     grabbed: Option<f64>,
     travel: [f64; 2],
     moved_mm: f64,
@@ -659,7 +659,7 @@ fn probe_to(viewport: &Viewport, index: usize, at: [f64; 2]) -> Option<Command> 
     Some(Command::ChangeBodyMark(index, body_marks::with_probe_at(mark, size, pixel)))
 }
 
-/// The command that sets the place of a text that is begun by a letter: at the pointer, or in the middle of what is shown.
+/// The command that sets the position of a text started by typing: at the pointer, or else in the middle of the picture.
 pub(super) fn place_of_text(viewport: &Viewport, pointer: Option<[f64; 2]>) -> Option<Command> {
     let pointer = pointer.filter(|at| !viewport.is_covered && viewport.pane_at(*at).is_some());
     let at = pointer.or_else(|| viewport.middle())?;

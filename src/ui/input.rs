@@ -35,7 +35,7 @@ const MAX_COORDINATE: f64 = 1e6;
 const MAX_NOTCHES: f64 = 20.0;
 
 impl Input {
-    /// The event with its numbers limited to what a window and a wheel can produce. None if the position is out of range or not a number.
+    /// The event with its numbers limited to what a window and a wheel can produce; none if the position is out of range or not a number.
     pub(super) fn sanitized(self) -> Option<Input> {
         let is_near = |at: [f64; 2]| at.iter().all(|n| n.abs() <= MAX_COORDINATE);
         match self {

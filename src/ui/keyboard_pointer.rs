@@ -1,5 +1,5 @@
-//! The pointer by keyboard ("mouse keys"): while it is on, keys move a pointer over the picture, click, and hold the left button. What comes out are inputs of
-//! a mouse, which go the way of those of the mouse, so that every gesture has keys.
+//! The pointer by keyboard ("mouse keys"): while it is on, keys move a pointer over the picture, click, and hold the left button. It produces the
+//! inputs of a mouse, so that every gesture can be made by keys.
 
 use super::command::HeldKeys;
 use super::input::{Button, Input, Key, Modifiers};
@@ -12,15 +12,15 @@ const ARROWS: [(Key, [f64; 2]); 4] =
 /// The area of the picture: upper left corner and size, pixels of the window.
 pub(super) type PictureArea = ([u32; 2], [u32; 2]);
 
-/// An input, and the modifiers that it comes with.
+/// An input with the modifiers that are held.
 pub(super) type Pointed = (Input, Modifiers);
 
-/// What is drawn of the pointer.
+/// How the pointer is drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct PointerMark {
-    /// Pixels of the window.
+    /// Position, pixels of the window.
     pub(super) at: [f64; 2],
-    /// Keys moved it last. After a mouse only the ring says that the mode is on.
+    /// Whether keys moved it last. After a motion of the mouse only the ring shows that the mode is on.
     pub(super) has_arrow: bool,
     pub(super) is_held: bool,
 }
@@ -28,12 +28,12 @@ pub(super) struct PointerMark {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct KeyboardPointer {
     is_on: bool,
-    /// Pixels of the window.
+    /// Position, pixels of the window.
     at: Option<[f64; 2]>,
-    /// The left button is held by a key.
+    /// Whether a key holds the left button.
     is_held: bool,
     has_arrow: bool,
-    /// Where the mouse was last. A windowing system reports the place again when the window gets the focus.
+    /// Last position of the mouse. A windowing system reports it again when the window gets the focus.
     mouse: Option<[f64; 2]>,
 }
 
@@ -47,7 +47,7 @@ impl KeyboardPointer {
         self.is_on && self.is_held
     }
 
-    /// Turns it on where the pointer was last, or off. What is held is given up.
+    /// Turns the pointer on at its last position, or off. A held button is cancelled.
     pub(super) fn toggle(&mut self, pointer: Option<[f64; 2]>, picture: PictureArea) -> Vec<Pointed> {
         if self.is_on {
             let given_up = if self.is_held { self.give_up(picture) } else { Vec::new() };
@@ -59,7 +59,7 @@ impl KeyboardPointer {
         vec![plain(Input::Moved(self.place(picture)))]
     }
 
-    /// Takes note of an input of a mouse, a finger or the windowing system.
+    /// Records an input of a mouse, a finger or the windowing system.
     pub(super) fn other_input(&mut self, input: &Input) {
         match *input {
             Input::Moved(at) if self.mouse != Some(at) => {
@@ -71,7 +71,7 @@ impl KeyboardPointer {
         }
     }
 
-    /// The inputs of a key that goes down; none if it is not one of the pointer's. `held`: the keys before this one.
+    /// The inputs of a key that goes down; none if the pointer does not use the key. `held`: the keys that were down before.
     pub(super) fn key(&mut self, key: Key, held: &HeldKeys, picture: PictureArea) -> Option<Vec<Pointed>> {
         let modifiers = held.modifiers();
         if !self.is_on || modifiers.alt {
@@ -136,7 +136,7 @@ impl KeyboardPointer {
         })
     }
 
-    /// What is drawn; none while it is off.
+    /// How the pointer is drawn; none while it is off.
     pub(super) fn mark(&self, picture: PictureArea) -> Option<PointerMark> {
         let at = self.place(picture);
         self.is_on.then_some(PointerMark { at, has_arrow: self.has_arrow, is_held: self.is_held })
@@ -157,7 +157,7 @@ mod tests {
 
     const PICTURE: PictureArea = ([100, 20], [400, 300]);
 
-    /// A pointer with its keys.
+    /// A pointer with its keys, for tests.
     struct Desk {
         pointer: KeyboardPointer,
         keys: HeldKeys,

@@ -1,4 +1,4 @@
-//! The list of files to open: the recent ones and what a folder has, and the file that keeps the recent ones.
+//! The list of files to open: the recent ones and the entries of a folder, and the file that stores the recent ones.
 
 use crate::files;
 use crate::source::{self, formats};
@@ -15,25 +15,25 @@ const MAX_LOOKED_AT: usize = 2000;
 /// Longest list of recent files, bytes.
 const MAX_BYTES: u64 = 1 << 16;
 
-/// What an entry of the list is.
+/// The kind of an entry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     /// A recording or a workspace.
     File,
-    /// The DICOM files of the folder that is listed, so many, as one recording.
+    /// The DICOM files of the listed folder as one recording, and their number.
     Series(usize),
     Folder,
     FolderAbove,
 }
 
-/// The recent files, and folders of one series, that still exist, the newest first. A list that cannot be read is empty.
+/// The recent files, and folders of one series, that still exist, the newest first; none if the list cannot be read.
 pub(super) fn recent(list: &Path) -> Vec<PathBuf> {
     let text = files::read_text(list, MAX_BYTES, "list").unwrap_or_default();
     let there = text.lines().map(PathBuf::from).filter(|file| file.is_absolute() && file.exists());
     there.take(MAX_RECENT).collect()
 }
 
-/// Puts a file first on the list. That it cannot be written is no fault of the view.
+/// Puts a file at the top of the list. A list that cannot be written is no fault of the view.
 pub(super) fn remember(list: &Path, file: &Path) {
     let Some(file) = std::path::absolute(file).ok().filter(|file| !file.to_string_lossy().contains('\n')) else {
         return;
@@ -49,8 +49,8 @@ pub(super) fn remember(list: &Path, file: &Path) {
     }
 }
 
-/// What can be opened in a folder: the folder above, its DICOM files as one recording, folders, then recordings and workspaces, by name. At most
-/// 200.
+/// What can be opened in a folder, at most 200 entries: the parent folder, the DICOM files as one recording, folders, then recordings and workspaces
+/// by name.
 pub(super) fn entries(folder: &Path) -> Vec<(Kind, PathBuf)> {
     let is_hidden = |path: &Path| path.file_name().is_none_or(|name| name.to_string_lossy().starts_with('.'));
     let read = std::fs::read_dir(folder).into_iter().flatten().take(MAX_READ);
@@ -75,7 +75,7 @@ pub(super) fn entries(folder: &Path) -> Vec<(Kind, PathBuf)> {
     above.into_iter().chain(series).chain(folders).chain(files).take(MAX_LISTED).collect()
 }
 
-/// The path that a typed text means: `~` is the user's own folder.
+/// The path of a typed text; `~` is the user's home folder.
 pub(super) fn expanded(typed: &str) -> PathBuf {
     let home = std::env::var_os("HOME").map(PathBuf::from).filter(|home| home.is_absolute());
     match (typed.strip_prefix('~'), home) {
@@ -85,7 +85,8 @@ pub(super) fn expanded(typed: &str) -> PathBuf {
     }
 }
 
-/// What all names that go on from a typed path have in common, with `/` after a folder that is the only one. Hidden ones need their dot.
+/// The longest common beginning of all paths that continue a typed one, with `/` after the only folder. Hidden files are included if the dot is
+/// typed.
 pub(super) fn completion(typed: &str) -> String {
     let Some((folder, begun)) = typed.rsplit_once('/') else {
         return if typed == "~" { "/".into() } else { String::new() };

@@ -7,7 +7,7 @@ use crate::texts;
 use crate::texts::hints;
 use crate::volume_export::FORMATS;
 
-/// Something that the search finds.
+/// An entry that the search finds.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Entry {
     pub name: String,
@@ -36,7 +36,7 @@ const WITHOUT_KEY: [(&str, &str, Command); 14] = [
     (texts::OPACITY_OF, texts::OPACITY_OF_HINT, Command::InspectorTab(InspectorTab::Look)),
 ];
 
-/// All that can be found: commands, looks, formats of exports, controls.
+/// All entries: commands, presets, export formats, controls.
 pub(crate) fn entries() -> impl Iterator<Item = Entry> {
     // A key beside another for the same is not told.
     let is_first = |n: &usize| !KEY_BINDINGS[..*n].iter().any(|other| other.command == KEY_BINDINGS[*n].command);
@@ -80,7 +80,7 @@ fn capitalised(text: &str) -> String {
     letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
 }
 
-/// Those that have all words of a text: first those whose name begins with it, then those whose name has all words, then those of which it is said.
+/// The entries that contain all words of a text: first those whose name begins with the text, then those with all words in the name, then the others.
 pub(crate) fn found(text: &str) -> Vec<Entry> {
     let text = text.trim().to_lowercase();
     let words: Vec<&str> = text.split_whitespace().collect();

@@ -18,25 +18,25 @@ pub(super) fn closest_along(line: (DVec3, DVec3), ray: (DVec3, DVec3)) -> Option
 /// The picture in the window at the time of an input.
 #[derive(Clone, Copy)]
 pub(super) struct Viewport<'a> {
-    /// Its upper left corner, pixels of the window.
+    /// Upper left corner of the picture, pixels of the window.
     pub(super) corner: [f64; 2],
-    /// Its width and height, pixels of the window: `picture.size`, or that enlarged.
+    /// Width and height of the picture on the screen, pixels of the window: `picture.size` or an enlargement of it.
     pub(super) size: [f64; 2],
-    /// The scene that it shows; without one nothing can be dragged.
+    /// The scene of the picture; without one nothing can be dragged.
     pub(super) scene: Option<&'a Scene>,
-    /// The number of the volume that it shows, where that is known.
+    /// The number of the shown volume, if known.
     pub(super) volume: Option<u32>,
-    /// The measurements that are drawn over it.
+    /// The measurements drawn over the picture.
     pub(super) measures: &'a [Measurement],
-    /// The body marks that are drawn over it.
+    /// The body marks drawn over the picture.
     pub(super) body_marks: &'a [BodyMark],
-    /// The points of the start line of the region that is drawn over it; none while that is straight.
+    /// The points of the start line of the region; empty while it is straight.
     pub(super) start_line: &'a [[f64; 2]],
-    /// The points of a measurement or of a line are being set.
+    /// Whether the points of a measurement or a line are being set.
     pub(super) has_work: bool,
-    /// The pointer is over a panel: a press there does not reach the picture.
+    /// Whether a panel covers the pointer, so that a press does not reach the picture.
     pub(super) is_covered: bool,
-    /// The current time, since any fixed moment; it distinguishes a double click from two clicks.
+    /// The current time, since any fixed moment, to recognise a double click.
     pub(super) now: Duration,
 }
 
@@ -98,7 +98,7 @@ impl<'a> Viewport<'a> {
         Some(tiling.point(tiling.tiles.get(tile)?, pixel))
     }
 
-    /// The body mark at a position in the window, and what of it: the probe is grabbed from `reach` pixels of the window.
+    /// The index of the body mark at a position in the window, and its part. The probe is grabbed within `reach` pixels of the window.
     pub(super) fn body_mark_at(&self, at: [f64; 2], reach: f64) -> Option<(usize, body_marks::Part)> {
         let (scene, pixel) = self.pixel_at(at)?;
         body_marks::part_at(self.body_marks, scene.picture_size().map(f64::from), pixel, reach * self.scale())
@@ -120,8 +120,8 @@ impl<'a> Viewport<'a> {
         near.filter(|near| near.2 <= reach).min_by(|a, b| a.2.total_cmp(&b.2)).map(|near| (near.0, near.1))
     }
 
-    /// What of the cross-lines of three planes is near a position on one of their tiles: the way from there to the common point of the planes,
-    /// and along which normal alone it is to be moved; none of these at the centre. `reach`: of a line and of the centre, pixels of the window.
+    /// The part of the cross-lines of three planes near a position on one of their tiles: the offset from there to the common point of the planes,
+    /// and the only normal along which it moves; no normal at the centre. `reach`: of a line and of the centre, pixels of the window.
     pub(super) fn cross_at(&self, tile: usize, at: [f64; 2], reach: [f64; 2]) -> Option<(DVec3, Option<DVec3>)> {
         let (scene, pixel) = self.pixel_at(at)?;
         let tiling = scene.tiling();
@@ -169,7 +169,7 @@ impl<'a> Viewport<'a> {
         std::array::from_fn(|a| self.corner[a] + if scale > 0.0 { centre[a] / scale } else { 0.0 })
     }
 
-    /// The middle of the selected plane, or else of the rendering, pixels of the window.
+    /// The middle of the selected plane or, without one, of the rendering, pixels of the window.
     pub(super) fn middle(&self) -> Option<[f64; 2]> {
         let (scene, scale) = (self.scene?, self.scale());
         if !scene.cuts_planes() || scale <= 0.0 {
@@ -182,7 +182,7 @@ impl<'a> Viewport<'a> {
         Some(std::array::from_fn(|a| self.corner[a] + middle(a) / scale))
     }
 
-    /// The plane of a tile, if the tiles show different planes; of a curved plane the one that it stands on.
+    /// The plane of a tile, if the tiles show different planes; for a curved plane the one that it is perpendicular to.
     pub(super) fn plane_name(&self, tile: usize) -> Option<PlaneName> {
         let scene = self.scene.filter(|scene| scene.shows_three())?;
         scene.plane_of_tile(tile).or(scene.curve().map(|curve| curve.plane))

@@ -1,5 +1,5 @@
-//! The recordings that are open in a window. One of them is shown, and only that one is in memory; of the others is kept what the user made of
-//! them: settings, measurements and the volume that was frozen.
+//! The recordings that are open in a window. One is shown, and only that one is in memory; for the others the user's work is kept: settings,
+//! measurements and the frozen volume.
 
 use super::controls::{Controls, Handiwork};
 use super::texts;
@@ -7,34 +7,34 @@ use crate::source::live::SourceKind;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
-/// Most recordings that are open at once.
+/// Largest number of open recordings.
 pub const MAX_OPEN: usize = 16;
 
-/// The recordings of a window, for each console that shows one of them.
+/// The recordings of a window, shared by the consoles that follow each other.
 pub type OpenRecordings = Arc<Mutex<Recordings>>;
 
 /// What is kept of a recording while another one is shown.
 #[derive(Clone, Debug)]
 pub(super) struct Kept {
     pub(super) controls: Controls,
-    /// The volume that was frozen, by its number in the recording.
+    /// The number of the frozen volume in the recording.
     pub(super) frozen: Option<u32>,
 }
 
-/// What the window shows whichever recording it is of.
+/// The state of the window that does not depend on the recording.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Display {
     pub(super) panels: bool,
     pub(super) times: bool,
     pub(super) bar: bool,
-    /// The panels have the keyboard.
+    /// Whether the panels have the keyboard focus.
     pub(super) has_focus: bool,
 }
 
-/// A recording of the list, as it is shown.
+/// A recording of the list, for display.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Named {
-    /// No two are the same.
+    /// Unique name.
     pub(super) name: String,
     pub(super) path: String,
     pub(super) is_shown: bool,
@@ -43,9 +43,9 @@ pub(super) struct Named {
 #[derive(Debug)]
 struct Entry {
     path: PathBuf,
-    /// In place of the file's name.
+    /// Shown instead of the file's name.
     title: Option<&'static str>,
-    /// It can be opened again. A pipe cannot.
+    /// Whether it can be opened again; a pipe cannot.
     returns: bool,
     kept: Option<Kept>,
 }
@@ -65,7 +65,7 @@ fn absolute(path: &Path) -> PathBuf {
 }
 
 impl Recordings {
-    /// A list of one source, which is shown. `path`: how it is named to be opened again.
+    /// A list of one source, which is shown. `path`: the name under which it can be opened again.
     pub fn of(kind: SourceKind, path: &Path) -> Recordings {
         let title = match kind {
             SourceKind::Demo => Some(texts::DEMO_DATA),
@@ -76,7 +76,7 @@ impl Recordings {
         Recordings { all: vec![entry], ..Recordings::default() }
     }
 
-    /// Puts a recording behind the others, if it is not there yet. False if there is no room.
+    /// Appends a recording unless it is listed. False if there is no room.
     pub fn add(&mut self, path: &Path) -> bool {
         let path = absolute(path);
         let is_there = self.place(&path).is_some();
@@ -107,7 +107,7 @@ impl Recordings {
         self.place(path).or_else(|| self.place(&absolute(path)))
     }
 
-    /// The recording so many places behind (or before) another one, in a circle.
+    /// The recording so many positions after (or before) another one; the list is a ring.
     pub(super) fn step(&self, from: &Path, by: i32) -> Option<&Path> {
         let at = self.index(from).unwrap_or(self.shown) as i64 + i64::from(by);
         self.path(at.rem_euclid(self.all.len().max(1) as i64) as usize)
@@ -119,7 +119,7 @@ impl Recordings {
         self.index(path).and_then(|at| self.names().into_iter().nth(at)).unwrap_or_else(own)
     }
 
-    /// All of them, for the window.
+    /// All recordings, for display.
     pub(super) fn list(&self) -> Vec<Named> {
         let names = self.names().into_iter().zip(&self.all).enumerate();
         let named = |(n, (name, entry)): (usize, (String, &Entry))| Named {
@@ -156,8 +156,8 @@ impl Recordings {
         names.collect()
     }
 
-    /// Shows a recording of the list in place of the one that was shown, of which this is kept. A source that cannot be opened again leaves the
-    /// list, as does one of which `closes` is said.
+    /// Shows a recording of the list in place of the present one, whose state is `kept`. A source that cannot be opened again leaves the list, as
+    /// does the present one if `closes`.
     pub(super) fn show(&mut self, path: &Path, kept: Option<Kept>, closes: bool, display: Display) {
         self.display = Some(display);
         let Some(next) = self.index(path) else { return };
@@ -173,12 +173,12 @@ impl Recordings {
         }
     }
 
-    /// What is kept of the n-th, if something made by hand is in no file.
+    /// What is kept of the n-th recording, if handiwork on it is in no file.
     pub(super) fn unsaved(&self, n: usize) -> Option<&Kept> {
         self.all.get(n)?.kept.as_ref().filter(|kept| n != self.shown && kept.controls.is_unsaved())
     }
 
-    /// What was made of this recording is in a file.
+    /// Records that this handiwork on a recording is saved.
     pub(super) fn saved(&mut self, path: &Path, work: Handiwork) {
         if let Some(kept) = self.index(path).and_then(|n| self.all[n].kept.as_mut()) {
             kept.controls.saved(work);
@@ -193,7 +193,7 @@ impl Recordings {
         }
     }
 
-    /// What was kept of the one that is shown, once; and what the window showed.
+    /// Takes the kept state of the shown recording, and the state of the window.
     pub(super) fn take_kept(&mut self) -> (Option<Kept>, Option<Display>) {
         let kept = self.all.get_mut(self.shown).and_then(|entry| entry.kept.take());
         (kept, self.display)

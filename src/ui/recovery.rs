@@ -60,7 +60,7 @@ impl Recovery {
         }
     }
 
-    /// `count`: how often the current screen presented. Resets the count of faults once it is stable.
+    /// Resets the count of faults once the current screen is stable. `count`: number of its presentations.
     pub(super) fn presented(&mut self, count: u64) {
         if count > STABLE_FRAMES {
             self.faults = 0;
@@ -68,7 +68,7 @@ impl Recovery {
     }
 }
 
-/// What an error of the console means is lost, and its cause.
+/// What is lost by an error of the console, and its cause.
 pub(super) fn lost_by(error: ConsoleError) -> (Lost, GpuError) {
     match error {
         ConsoleError::DeviceLost(fault) => (Lost::Device, fault),

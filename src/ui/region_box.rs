@@ -1,4 +1,4 @@
-//! The region as a box that is seen and grabbed: its section by each plane beside a rendering, with a handle on each side, and its edges in the
+//! The region as a box that is shown and grabbed: its section by each plane beside a rendering, with a handle on each side, and its edges in the
 //! rendering.
 
 use super::command::Face;
@@ -17,11 +17,11 @@ const MIN_SIDE: f64 = 12.0;
 pub(super) struct Side {
     pub(super) face: Face,
     pub(super) ends: [[f64; 2]; 2],
-    /// The middle of what is seen of it on its tile, if that is long enough to be grabbed.
+    /// The middle of its visible part on its tile, if that is long enough to be grabbed.
     pub(super) handle: Option<[f64; 2]>,
 }
 
-/// What of the region's box is at a place of a tile.
+/// The part of the region's box at a position on a tile.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Part {
     Face(Face),
@@ -32,11 +32,11 @@ pub(super) enum Part {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Edge {
     pub(super) ends: [[f64; 2]; 2],
-    /// Both of its faces are turned away from the viewer.
+    /// Whether both adjacent faces are turned away from the viewer.
     pub(super) is_behind: bool,
 }
 
-/// True if planes show where the region is: those beside a rendering, which are not cropped to it.
+/// True if planes show the region's section: those beside a rendering, which are not cropped to the region.
 pub(super) fn is_on_planes(scene: &Scene) -> bool {
     scene.has_sections()
 }
@@ -86,15 +86,15 @@ const PIECES: usize = 96;
 /// The start line of the region on plane A, pixels of the picture.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct StartLine {
-    /// The ends of its pieces, from the left to the right side of the region.
+    /// The vertices of the line, from the left to the right side of the region.
     pub(super) line: Vec<[f64; 2]>,
-    /// Lateral positions of these ends, mm.
+    /// Lateral positions of the vertices, mm.
     lateral: Vec<f64>,
-    /// None while it is straight.
+    /// The handles; none while the line is straight.
     pub(super) handles: Vec<[f64; 2]>,
 }
 
-/// What of the start line is at a place of a tile.
+/// The part of the start line at a position on a tile.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum StartPart {
     Handle(usize),
@@ -102,8 +102,8 @@ pub(super) enum StartPart {
     Line(f64),
 }
 
-/// The start line through points, lateral and depth in mm, or straight without any: on a tile, if that shows plane A beside a rendering, not turned
-/// too far. The points may be ahead of the scene, whose picture takes time.
+/// The start line through points (lateral, depth, mm), straight without points, on a tile that shows plane A beside a rendering and is not rotated
+/// too far. The points may be newer than the scene of the shown picture.
 pub(super) fn start_line(scene: &Scene, tiling: &Tiling, tile: usize, points: &[[f64; 2]]) -> Option<StartLine> {
     let is_shown = tile == START_TILE && is_on_planes(scene) && scene.renders();
     let tile = tiling.tiles.get(tile).filter(|_| is_shown)?;
@@ -126,7 +126,7 @@ pub(super) fn start_line(scene: &Scene, tiling: &Tiling, tile: usize, points: &[
     Some(StartLine { line: lateral.iter().map(|x| on_tile(*x, depth(*x))).collect(), lateral, handles })
 }
 
-/// What of the start line through points is at a place of a tile, pixels of the picture. `reach`: of the line and of a handle, pixels.
+/// The part of the start line through points at a position on a tile, pixels of the picture. `reach`: of the line and of a handle, pixels.
 pub(super) fn start_at(
     scene: &Scene,
     tile: usize,
@@ -170,7 +170,7 @@ fn handle(tile: &Tile, [from, to]: [[f64; 2]; 2]) -> Option<[f64; 2]> {
     is_long.then(|| [0, 1].map(|axis| from[axis] + way[axis] * middle))
 }
 
-/// What of the region's section is at a place of a tile, pixels of the picture. `reach`: of a side and of its handle, pixels.
+/// The part of the region's section at a position on a tile, pixels of the picture. `reach`: of a side and of its handle, pixels.
 pub(super) fn part_at(scene: &Scene, tile: usize, at: [f64; 2], reach: [f64; 2]) -> Option<Part> {
     if !is_on_planes(scene) {
         return None;
@@ -207,7 +207,7 @@ fn share(at: [f64; 2], [from, to]: [[f64; 2]; 2]) -> f64 {
     ((off[0] * way[0] + off[1] * way[1]) / length).clamp(0.0, 1.0)
 }
 
-/// The edges of the region in the rendering. What is behind the camera is left out.
+/// The edges of the region in the rendering, without what is behind the camera.
 pub(super) fn wireframe(scene: &Scene) -> Vec<Edge> {
     if scene.is_flat() {
         return Vec::new();
@@ -237,7 +237,7 @@ pub(super) fn wireframe(scene: &Scene) -> Vec<Edge> {
     (0..12).filter_map(edge).collect()
 }
 
-/// Where the faces of the region are grabbed in the rendering: the middle of each whose axis is not seen from its end, pixels of the picture.
+/// The handles of the region's faces in the rendering, pixels of the picture: the middle of each face whose axis is not seen end-on.
 pub(super) fn rendered_handles(scene: &Scene) -> Vec<[f64; 2]> {
     if scene.is_flat() {
         return Vec::new();
@@ -247,7 +247,7 @@ pub(super) fn rendered_handles(scene: &Scene) -> Vec<[f64; 2]> {
     handles.filter_map(|face| picker.project(face_axis(scene, face).0)).collect()
 }
 
-/// How far a face moves so that its line on a plane follows a way in that plane, mm.
+/// How far a face moves if its line on a plane is dragged by a vector in that plane, mm.
 pub(super) fn along(face: Face, way: DVec3) -> f64 {
     way.dot(outwards(face))
 }

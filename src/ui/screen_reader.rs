@@ -1,5 +1,5 @@
-//! The panels for the screen readers of the desktop: their tree goes out, what the reader asks of a control comes in. In a program built
-//! without the feature `screen-reader` nothing listens, and no tree is made.
+//! Connects the panels with the desktop's screen readers: their tree is sent, and requests for controls are received. Without the feature
+//! `screen-reader` nothing listens, and no tree is made.
 
 use super::console::Console;
 use crate::gpu::Wake;
@@ -10,7 +10,7 @@ use winit::window::Window;
 #[cfg(feature = "screen-reader")]
 pub(super) use self::served::ScreenReader;
 
-/// Stands for the screen readers where none is served.
+/// Replaces the connection in a program without the feature.
 #[cfg(not(feature = "screen-reader"))]
 pub(super) struct ScreenReader;
 
@@ -59,12 +59,12 @@ mod served {
             ScreenReader { adapter, heard, is_listening: false }
         }
 
-        /// Takes note of an event of the window: its place, its focus.
+        /// Handles an event of the window that changes its position or focus.
         pub fn event(&mut self, window: &Window, event: &WindowEvent) {
             self.adapter.process_event(window, event);
         }
 
-        /// Hands on what screen readers ask for.
+        /// Passes the requests of screen readers to the console.
         pub fn listen(&mut self, console: &mut Console) {
             for heard in self.heard.try_iter() {
                 match heard {
@@ -78,7 +78,7 @@ mod served {
             }
         }
 
-        /// Tells what the panels are now, if they were laid out.
+        /// Sends the tree of the panels, if they were laid out.
         pub fn tell(&mut self, console: &mut Console) {
             if let Some(tree) = console.take_tree() {
                 self.adapter.update_if_active(|| tree);
@@ -86,7 +86,7 @@ mod served {
         }
     }
 
-    /// Is called by threads of the desktop's interface.
+    /// Receives requests; called by threads of the desktop's interface.
     #[derive(Clone)]
     struct Ear {
         sender: Sender<Heard>,

@@ -1,4 +1,4 @@
-//! How long no frame came from a source, without the time in which the program could not have taken one.
+//! Measures how long no frame came from a source, without the time in which the program could not take one.
 
 use std::time::{Duration, Instant};
 
@@ -10,9 +10,9 @@ const LONG_UPDATE: Duration = Duration::from_millis(100);
 /// The silence of a source.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Silence {
-    /// When the last frame came, later by all the time that the program was busy since.
+    /// When the last frame came, plus all the time since that the program was busy.
     last: Instant,
-    /// When the update before ended, if the device was busy then.
+    /// When the previous update ended, if the device was busy then.
     busy_since: Option<Instant>,
 }
 
@@ -21,17 +21,17 @@ impl Silence {
         Silence { last: now, busy_since: None }
     }
 
-    /// Frames came.
+    /// Records that frames came.
     pub(super) fn frames_came(&mut self, now: Instant) {
         self.last = now;
     }
 
-    /// An update begins: while the device was busy since the one before, frames may have waited.
+    /// Begins an update. Frames may have waited if the device was busy since the previous one.
     pub(super) fn begin_update(&mut self, now: Instant) {
         self.last += self.busy_since.take().map_or(Duration::ZERO, |since| now.saturating_duration_since(since));
     }
 
-    /// An update ends that began at `now` and took so long; `is_busy`: the device still works.
+    /// Ends an update that began at `now` and took this time; `is_busy`: the device still works.
     pub(super) fn end_update(&mut self, now: Instant, took: Duration, is_busy: bool) {
         // What takes long here keeps no frame from coming, but from being taken.
         self.last += Some(took).filter(|took| *took >= LONG_UPDATE).unwrap_or_default();
@@ -43,7 +43,7 @@ impl Silence {
         now.saturating_duration_since(self.last) >= SILENCE
     }
 
-    /// When it will be silent, if nothing comes.
+    /// When the source will count as silent if no frame comes.
     pub(super) fn due(&self) -> Instant {
         self.last + SILENCE
     }

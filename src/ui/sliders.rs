@@ -1,4 +1,4 @@
-//! The sliders of the view: those that the rows of the settings declare, and here those of no single setting.
+//! The sliders of the view: those declared with the settings, and those that belong to no single setting.
 
 use crate::scene::{Group, MAX_DEVIATION, Mode, Scene, Settings, Slider, Smooth, Transfer, numbers, start_depths};
 use crate::texts;
@@ -21,8 +21,8 @@ pub(super) const GAIN: usize = 0;
 pub(super) const THRESHOLD: usize = 1;
 pub(super) const PLANES_ZOOM: usize = 2;
 
-/// All sliders, those of a group in display order. Those of windows, thresholds and start depths change the values of the current mode. A mixed picture has
-/// them for its surface, and again for its volume layer.
+/// All sliders; those of a group are in display order. Windows, thresholds and start depths change the values of the current mode; a mixed picture
+/// has them twice, for its surface and for its volume layer.
 pub static SLIDERS: LazyLock<Vec<Slider>> = LazyLock::new(|| {
     let mut all: Vec<Slider> = numbers().filter_map(|number| number.slider).collect();
     for (ahead_of, sliders) in OF_SEVERAL {
@@ -42,13 +42,13 @@ fn unit_of(slider: &Slider, scene: &Scene) -> [f64; 2] {
     if OF_ECHOES.contains(&slider.key) { scene.input.range } else { [0.0, 1.0] }
 }
 
-/// A value of a slider as it is shown.
+/// Converts a value of a slider to its displayed unit.
 pub(super) fn to_shown(slider: &Slider, scene: &Scene, value: f64) -> f64 {
     let [low, high] = unit_of(slider, scene);
     low + value * (high - low)
 }
 
-/// A value as it is shown, as the slider takes it.
+/// Converts a displayed value to the slider's own unit.
 pub(super) fn from_shown(slider: &Slider, scene: &Scene, shown: f64) -> f64 {
     let [low, high] = unit_of(slider, scene);
     if high > low { (shown - low) / (high - low) } else { shown }

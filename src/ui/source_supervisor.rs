@@ -20,17 +20,17 @@ pub(super) type SourceNotice = (&'static str, String, bool);
 pub(super) enum SourceState {
     Opening,
     Open,
-    /// It ended or could not be opened, and will be tried again.
+    /// The source ended or could not be opened, for this reason, and will be opened again.
     Retrying(String),
-    /// It ended for good, with the reason if that was unexpected.
+    /// The source ended for good, with the reason if that was unexpected.
     Ended(Option<String>),
-    /// The user ended it before it was open.
+    /// The user cancelled opening the source.
     Cancelled,
 }
 
 impl SourceState {
-    /// What there is to say about a source of this kind. `disconnected`: why it is not connected. `is_silent`: no frame came for a while in
-    /// which the program could have taken one. `has_shown`: a volume was shown.
+    /// The message about a source of this kind, if there is one. `disconnected`: why it is not connected. `is_silent`: no frame came for a while
+    /// although the program could have taken one. `has_shown`: a volume was shown.
     pub(super) fn notice(
         &self,
         kind: SourceKind,
@@ -75,7 +75,7 @@ impl SourceState {
 /// Keeps a source open.
 pub(super) struct SourceSupervisor {
     open: OpenSource,
-    /// Time between two attempts. None: there is only one attempt.
+    /// Time between two attempts; `None`: there is only one.
     retry: Option<Duration>,
     record: Option<PathBuf>,
     wake: Wake,
@@ -84,12 +84,12 @@ pub(super) struct SourceSupervisor {
     next_attempt: Option<Instant>,
     /// How often the source could not be opened.
     not_opened: u64,
-    /// Why it could not be, as the log has it: each reason is said once.
+    /// The reason that was logged last; each is logged once.
     logged: Option<String>,
 }
 
 impl SourceSupervisor {
-    /// `retry`: how long to wait before the source is opened again; none: never. `record`: a file for all frames that arrive.
+    /// `retry`: time before the source is opened again; `None`: never. `record`: a file for all frames that arrive.
     pub(super) fn new(
         open: OpenSource,
         retry: Option<Duration>,
@@ -155,7 +155,7 @@ impl SourceSupervisor {
         }
     }
 
-    /// Waits no longer for the source that is being opened. False if none is.
+    /// Cancels opening the source. False if it is not being opened.
     pub(super) fn cancel(&mut self) -> bool {
         let is_opening = self.opening.take().is_some();
         if is_opening {

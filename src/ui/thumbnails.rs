@@ -1,5 +1,5 @@
-//! Small pictures of volumes, one for each preset or for each volume of the loop, made beside the view by a renderer of their own. They are made of a
-//! coarse copy of the volume, and each one waits for the view to rest. While none is made there is neither copy nor renderer.
+//! Small pictures of volumes, one for each preset or each volume of the loop, drawn beside the view by a renderer of their own from a coarse copy of
+//! the volume. Each waits for the view to rest. Copy and renderer exist only while pictures are made.
 
 use crate::gpu::{Context, Renderer, RendererOptions, Wake};
 use crate::picture::Picture;
@@ -27,7 +27,7 @@ const CELL: f64 = 1.6;
 const PATIENCE: Duration = Duration::from_secs(1);
 const POLL: Duration = Duration::from_millis(10);
 
-/// What pictures are made of.
+/// A list of pictures to make.
 pub(super) struct Job {
     pub(super) context: Arc<Context>,
     pub(super) input: Input,
@@ -35,7 +35,7 @@ pub(super) struct Job {
     pub(super) pictures: Vec<Option<Wanted>>,
 }
 
-/// What one picture is made of.
+/// The volume and settings of one picture.
 pub(super) struct Wanted {
     pub(super) geometry: Geometry,
     pub(super) frames: Vec<Arc<Frame>>,
@@ -61,7 +61,7 @@ struct Work {
 #[derive(Default)]
 struct Orders {
     must_stop: AtomicBool,
-    /// The view rests.
+    /// Whether the view rests.
     may_draw: AtomicBool,
 }
 
@@ -70,7 +70,7 @@ impl Thumbnails {
         Thumbnails { wake, pictures: Vec::new(), work: None, ending: Vec::new() }
     }
 
-    /// The pictures that are made so far; earlier ones stay until they are made again.
+    /// The pictures made so far. Earlier ones stay until they are replaced.
     pub(super) fn pictures(&self) -> &[Option<Arc<Picture>>] {
         &self.pictures
     }
@@ -79,7 +79,7 @@ impl Thumbnails {
         self.work.is_some()
     }
 
-    /// Begins to make pictures in place of those that are being made.
+    /// Starts to make pictures, in place of those in progress.
     pub(super) fn begin(&mut self, job: Job) {
         self.stop();
         self.pictures.resize(job.pictures.len(), None);
@@ -95,13 +95,13 @@ impl Thumbnails {
         }
     }
 
-    /// The same, where a picture that the job has none for stays as it is in `kept`.
+    /// Like [`Thumbnails::begin`], but where the job has no picture, the one in `kept` stays.
     pub(super) fn begin_with(&mut self, job: Job, kept: Vec<Option<Arc<Picture>>>) {
         self.begin(job);
         self.pictures = kept;
     }
 
-    /// Takes what was made. `may_draw`: the view rests. True if there is another picture.
+    /// Takes finished pictures. `may_draw`: the view rests. True if there is a new one.
     pub(super) fn poll(&mut self, may_draw: bool) -> bool {
         self.ending.retain(|thread| !thread.is_finished());
         let Some(work) = &self.work else { return false };
@@ -124,7 +124,7 @@ impl Thumbnails {
         }
     }
 
-    /// Stops, and forgets all pictures but the first `count`.
+    /// Stops, and discards all pictures but the first `count`.
     pub(super) fn keep_first(&mut self, count: usize) {
         self.stop();
         self.pictures.truncate(count);
@@ -138,7 +138,7 @@ impl Thumbnails {
         }
     }
 
-    /// Stops, and forgets the pictures.
+    /// Stops, and discards the pictures.
     pub(super) fn clear(&mut self) {
         self.stop();
         self.pictures.clear();

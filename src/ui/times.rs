@@ -58,7 +58,7 @@ pub(super) struct Times {
 }
 
 impl Times {
-    /// How far pictures are behind the frames, s, if that is worth a word. That a frame waits for the last one of its volume is no delay.
+    /// Delay of the pictures behind the frames, s, if it is worth showing. The wait of a frame for the last one of its volume is no delay.
     pub(super) fn delay(&self) -> Option<f64> {
         let acquired = 1e3 * self.acquisition_time.unwrap_or(0.0);
         self.latency.map(|ms| ms - acquired).filter(|ms| *ms > UNTOLD_DELAY).map(|ms| ms / 1e3)

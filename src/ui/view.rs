@@ -1,5 +1,5 @@
-//! How commands change the camera, the light, the viewer's clip plane, the planes and the region. Every function takes finite numbers of
-//! any size and returns numbers that [`Scene::new`] accepts.
+//! How commands change the camera, the light, the viewer's clip plane, the planes and the region. Every function takes any finite numbers and returns
+//! numbers that [`Scene::new`] accepts.
 
 use super::picking::Picker;
 use crate::probe::{Geometry, Motion};
@@ -57,7 +57,7 @@ pub(super) fn rotate(now: &Scene, [azimuth, elevation]: [f64; 2]) -> Camera {
     Camera { azimuth: wrap_degrees(camera.azimuth + azimuth), elevation, ..camera }
 }
 
-/// Where a rendering is seen from: the sides of the picture at its start, not those of a patient.
+/// A side from which a rendering is seen, relative to its orientation at the start and not to the patient.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Viewpoint {
     /// From the probe.
@@ -193,7 +193,7 @@ const MIN_THICKNESS: f64 = 2.0;
 pub struct Face {
     /// 0 lateral, 1 depth, 2 elevation.
     pub axis: usize,
-    /// The face at the higher end of the axis.
+    /// Whether it is the face at the higher end of the axis.
     pub high: bool,
 }
 

@@ -1,5 +1,5 @@
-//! Exports of the volume that is shown, as other programs read it: a volume, a surface or a turntable. `convert`, `mesh` or `render` of this
-//! program does the work in a process of its own: a long one does not stop the view, and one that fails does not end it.
+//! Exports the shown volume for other programs: a volume, a surface or a turntable. A process of this program's `convert`, `mesh` or `render` does
+//! the work, so that a long export does not block the view and a failing one does not end it.
 
 use crate::files::WorkFolder;
 use crate::files::signals::Writing;
@@ -32,7 +32,7 @@ const RECORDING: &str = "volume.frames";
 const BASE: &str = "3";
 
 impl Format {
-    /// True if it takes the volumes of the loop, false if only the one that is shown.
+    /// True if all volumes of the loop are exported, false if only the shown one is.
     pub(super) fn takes_the_loop(&self) -> bool {
         self.work == Work::Loop
     }
@@ -43,7 +43,7 @@ impl Format {
 pub struct Format {
     pub name: &'static str,
     pub hint: &'static str,
-    /// The ending of the file; a folder of pictures has its own.
+    /// Ending of the file; pictures are in a folder, which has its own.
     pub(super) ending: &'static str,
     work: Work,
 }
@@ -55,7 +55,7 @@ enum Work {
     Relief,
     Turntable,
     Loop,
-    /// A picture whose longer edge has so many pixels.
+    /// A picture whose longer edge has this number of pixels.
     Picture(u32),
 }
 
@@ -63,7 +63,7 @@ const fn format(name: &'static str, ending: &'static str, work: Work, hint: &'st
     Format { name, hint, ending, work }
 }
 
-/// All of them, in the order of the menu.
+/// All formats, in the order of the menu.
 pub const FORMATS: &[Format] = &[
     format(texts::VOLUME_NRRD, "nrrd", Work::Convert, texts::VOLUME_NRRD_HINT),
     format(texts::VOLUME_NIFTI, "nii.gz", Work::Convert, texts::VOLUME_NIFTI_HINT),
@@ -83,11 +83,11 @@ pub const FORMATS: &[Format] = &[
     format(texts::PICTURE_4000, "png", Work::Picture(4000), texts::PICTURE_HINT),
 ];
 
-/// An export in work.
+/// An export in progress.
 #[derive(Debug, Default)]
 pub(super) struct Export {
     state: Mutex<State>,
-    /// How far the process says that it is.
+    /// The progress that the process reported last.
     progress: Arc<Mutex<Option<Progress>>>,
 }
 
@@ -102,7 +102,7 @@ impl Export {
         lock(&self.state)
     }
 
-    /// Ends the work; nothing of it stays.
+    /// Cancels the export; nothing of it stays.
     pub(super) fn cancel(&self) {
         self.lock().is_cancelled = true;
     }
@@ -115,7 +115,7 @@ impl Export {
         self.lock().is_finished
     }
 
-    /// How far the work is, once the process has said so.
+    /// The progress, once the process has reported any.
     pub(super) fn progress(&self) -> Option<Progress> {
         *lock(&self.progress)
     }
@@ -223,16 +223,16 @@ pub(super) fn write_frames(file: &Path, header: Header, volumes: &[CineVolume]) 
     }
 }
 
-/// What is exported, and as what.
+/// The volumes to export, and the format.
 pub(super) struct Job {
     pub(super) format: Format,
     pub(super) header: Header,
-    /// The volume that is shown; of a loop all of them.
+    /// The shown volume, or all volumes of the loop.
     pub(super) volumes: Vec<CineVolume>,
-    /// Volumes a second of a loop.
+    /// Rate of a loop, volumes a second.
     pub(super) rate: f64,
     pub(super) settings: crate::scene::Settings,
-    /// The name of the device of turntables: that of the view.
+    /// The name of the view's device, for turntables.
     pub(super) device: String,
 }
 
@@ -299,7 +299,7 @@ fn enlarged(size: [u32; 2], edge: u32) -> [u32; 2] {
     size.map(|n| ((f64::from(n) * f64::from(edge) / longest).round() as u32).max(1))
 }
 
-/// Measurements of the volumes of these numbers alone, as they are numbered in a recording of them.
+/// The measurements on the volumes with these numbers, renumbered as in a recording of them.
 pub(super) fn renumbered(measures: &[Measurement], volumes: &[u32]) -> Vec<Measurement> {
     let place = |number: u32| volumes.iter().position(|volume| *volume == number);
     let renumber = |measured: &Measurement| {

@@ -23,12 +23,12 @@ pub struct WindowOptions {
     /// Size of the window, pixels.
     pub size: [u32; 2],
     pub full_screen: bool,
-    /// Part of the name of the monitor for full screen. None: the monitor of the window.
+    /// Part of the name of the monitor for full screen; `None`: the monitor of the window.
     pub monitor: Option<String>,
     pub present_mode: PresentMode,
-    /// Opens the window again when it is closed.
+    /// Whether the window is opened again when it is closed.
     pub stays_open: bool,
-    /// Ends after this time.
+    /// Ends the console after this time.
     pub time: Option<Duration>,
 }
 
@@ -97,7 +97,7 @@ struct WindowLoop<'a> {
     context: Option<Arc<Context>>,
     screen_reader: Option<ScreenReader>,
     window: Option<Arc<Window>>,
-    /// As the last event has it. To ask the window would panic inside winit once the X server has destroyed it, before that event arrives.
+    /// Size by the last event, pixels. Asking the window would panic inside winit if the X server has destroyed it before the event arrives.
     size: [u32; 2],
     failed: Option<GpuError>,
     recovery: Recovery,

@@ -12,6 +12,7 @@ use std::ops::Deref;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
+use super::figures::figure;
 pub use super::files::*;
 pub use super::probes::wobbler;
 pub use super::scenes::{BYTES, FLOATS, scene};
@@ -79,6 +80,13 @@ impl Device {
     pub fn impatient() -> Device {
         let deadline = Deadline::After(Duration::from_secs(2));
         Device::watched_with(ContextOptions { deadline, ..ContextOptions::default() })
+    }
+
+    /// States a figure of docs/validation.md ([`figure`]). The page has those of a software device: on others nothing is compared.
+    pub fn figure(&self, name: &str, measured: &str) {
+        if self.context.candidate.is_software() {
+            figure(name, measured);
+        }
     }
 
     /// The device and driver, for output with `--nocapture`.

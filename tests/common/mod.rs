@@ -3,6 +3,7 @@
 // Each binary uses a part.
 #![allow(dead_code, unused_imports)]
 
+pub mod figures;
 pub mod files;
 pub mod gpu;
 pub mod layer;

@@ -72,8 +72,7 @@ fn difference(map: &Texels, reference: &Texels) -> Difference {
 fn a_finer_step_finds_the_same_surface_more_accurately() {
     let device = Device::new();
     let reference = head(&device, 128.0);
-    let mut places = Vec::new();
-    for parts in [4.0, 8.0, 16.0, 32.0, 64.0] {
+    let steps = [4.0, 8.0, 16.0, 32.0, 64.0].map(|parts| {
         let found = difference(&head(&device, parts), &reference);
         println!("step of 1/{parts} edge: {found:.5?}");
         // A surface that is barely above the threshold may go either way.
@@ -81,12 +80,25 @@ fn a_finer_step_finds_the_same_surface_more_accurately() {
         assert!(found.hits > 0.5 && found.lost_or_gained <= limit && found.jumped <= limit, "1/{parts}: {found:?}");
         // A ray that grazes the head has a wider edge, and places it less exactly.
         assert!(found.p95 <= 0.02 * EDGE && found.p95 > found.median, "1/{parts}: {found:?}");
-        places.push(found.median);
-    }
+        found
+    });
     // Second order in the step, until the difference to the reference is as small as that of the reference.
-    let order = (places[0] / places[2]).log2() / 2.0;
+    let order = (steps[0].median / steps[2].median).log2() / 2.0;
     println!("order {order:.2}");
-    assert!((1.5..=2.5).contains(&order), "order {order} of {places:?}");
+    assert!((1.5..=2.5).contains(&order), "order {order} of {steps:?}");
+    let [coarse, finer @ ..] = &steps;
+    let largest = |of: fn(&Difference) -> f64| finer.iter().map(of).fold(0.0, f64::max);
+    for (name, share) in [
+        ("coarse-lost", coarse.lost_or_gained),
+        ("coarse-jumped", coarse.jumped),
+        ("finer-lost", largest(|found| found.lost_or_gained)),
+        ("finer-jumped", largest(|found| found.jumped)),
+    ] {
+        device.figure(name, &format!("{:.2}", 100.0 * share));
+    }
+    device.figure("coarse-median", &format!("{:.1}", 1000.0 * coarse.median));
+    device.figure("finer-median", &format!("{:.1}", 1000.0 * largest(|found| found.median)));
+    device.figure("step-order", &format!("{order:.1}"));
 }
 
 /// Prevents a place that depends on the width of an edge: along the ray it grows with the angle of the wall.
@@ -95,6 +107,7 @@ fn oblique_walls_are_where_they_are_up_to_75_degrees() {
     let device = Device::new();
     let (voxel, edge) = (0.5, 2.0);
     let geometry = Geometry::Cartesian(Grid { size: [96, 96, 9], spacing: [voxel; 3], origin: [-24.0, 0.0, -2.0] });
+    let mut largest = 0.0f64;
     for (degrees, deviation) in
         [(0.0, 1.0), (30.0, 1.0), (45.0, 1.0), (60.0, 1.0), (75.0, 1.0), (60.0, 1.25), (45.0, 2.0)]
     {
@@ -133,8 +146,10 @@ fn oblique_walls_are_where_they_are_up_to_75_degrees() {
                 rays >= 4 && worst <= 0.025 * edge,
                 "{degrees} deg, deviation {deviation}, height {height}: {worst} mm"
             );
+            largest = largest.max(worst / edge);
         }
     }
+    device.figure("oblique-wall", &format!("{largest:.3}"));
 }
 
 /// The share of a normal distribution below x standard deviations, by its series: to 1e-9 within 5.

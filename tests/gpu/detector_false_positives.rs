@@ -55,6 +55,7 @@ fn noise_spreads_a_wall_within_the_measured_bounds() {
         (0.3, 1, [(0.0, 0.0), (0.089, 0.0), (0.181, 0.0), (0.382, 0.019)]),
         (0.3, 2, [(0.0, 0.0), (0.089, 0.0), (0.181, 0.0), (0.383, 0.0005)]),
     ];
+    let mut spreads = Vec::new();
     for (threshold, rough, levels) in measured {
         for (deviation, (steps, wrong)) in [0.0, 0.05, 0.1, 0.2].into_iter().zip(levels) {
             let got = spread(&device, &noise, deviation, threshold, rough);
@@ -63,7 +64,22 @@ fn noise_spreads_a_wall_within_the_measured_bounds() {
             assert!(got.steps <= 1.15 * steps + 0.005, "the wall is spread, {what}");
             assert!(got.wrong <= wrong + if wrong > 0.01 { 0.02 } else { 0.002 }, "led astray, {what}");
             assert!(got.missed <= 0.001, "holes, {what}");
+            spreads.push(got);
         }
+    }
+    // Four levels of noise for each threshold and rough step.
+    let [low, low_rough, high, high_rough] = [0, 4, 8, 12];
+    device.figure("noise-1-spread", &format!("{:.2}", spreads[high_rough + 2].steps));
+    device.figure("noise-2-spread", &format!("{:.2}", spreads[high_rough + 3].steps));
+    for (name, case) in [
+        ("noise-1-rough", high_rough + 2),
+        ("noise-2-rough", high_rough + 3),
+        ("noise-1-fine", high + 2),
+        ("noise-2-fine", high + 3),
+        ("noise-1-low-rough", low_rough + 2),
+        ("noise-1-low-fine", low + 2),
+    ] {
+        device.figure(name, &format!("{:.1}", 100.0 * spreads[case].wrong));
     }
 }
 
@@ -119,7 +135,9 @@ fn only_long_steps_pass_over_specks_in_the_fluid() {
     let shares = [1, 2, 3, 4].map(|rough| specks(&device, &format!("threshold = 0.4\nrough = {rough}"), [34.0, 90.0]));
     println!("shares of specks and of walls found, by the rough step: {shares:.4?}");
     let [one, two, three, four] = shares;
-    // Measured: 1.0, 0.269, 0.0153, 0.0095; the others are walls.
+    for (name, (speck, _)) in [("specks-2", two), ("specks-3", three), ("specks-4", four)] {
+        device.figure(name, &format!("{:.1}", 100.0 * speck));
+    }
     assert!(one.0 > 0.97, "without a rough detector specks are surfaces: {one:?}");
     assert!(two.0 < 0.35, "{two:?}");
     assert!(three.0 < 0.03 && four.0 < 0.03, "{three:?}, {four:?}");
@@ -229,6 +247,7 @@ fn the_adaptive_detector_has_fewer_false_positives_and_no_more_misses() {
         ("speckle of 1.5 samples", &|n| speckle(n, 1.5, 1), [(0.13, 0.09), (0.105, 0.035)]),
         ("smoothed speckle of 3 samples", &|n| speckle(n, 3.0, 4), [(0.092, 0.009), (0.046, 0.009)]),
     ];
+    let mut lost = Vec::new();
     for (name, make, limits) in cases {
         let columns = walls_of(23, make);
         for (rough, (early, missed)) in [1, 2].into_iter().zip(limits) {
@@ -254,8 +273,23 @@ fn the_adaptive_detector_has_fewer_false_positives_and_no_more_misses() {
             // Without specks the lasting detector equals the adaptive one.
             assert!(lasting.early <= adaptive.early && lasting.missed <= adaptive.missed + 0.01, "{what}");
             assert!(lasting.steps <= 1.05 * adaptive.steps + 0.001, "{what}");
+            let figures = match (name, rough) {
+                ("noise of 0.1", 1) => Some(["early-1-fine", "early-1-fine-adaptive"]),
+                ("noise of 0.1", _) => Some(["early-1-rough", "early-1-rough-adaptive"]),
+                ("noise of 0.2", 1) => Some(["early-2-fine", "early-2-fine-adaptive"]),
+                ("noise of 0.2", _) => Some(["early-2-rough", "early-2-rough-adaptive"]),
+                _ => None,
+            };
+            for (figure, found) in figures.into_iter().flatten().zip([&plain, &adaptive]) {
+                device.figure(figure, &format!("{:.1}", 100.0 * found.early));
+            }
+            if ["noise of 0.1, a third of the height", "speckle of 1.5 samples"].contains(&name) {
+                lost.push(100.0 * adaptive.missed);
+            }
         }
     }
+    device.figure("adaptive-loses-least", &format!("{:.0}", lost.iter().copied().fold(f64::MAX, f64::min)));
+    device.figure("adaptive-loses-most", &format!("{:.0}", lost.iter().copied().fold(0.0, f64::max)));
 }
 
 /// Prevents specks found by a detector that should ignore them, walls that are lost behind them, and thin

@@ -167,6 +167,7 @@ fn planes_through_the_wobblers_wires_show_them_where_they_are() {
         }
     }
     assert!(worst < 0.1, "off by {worst} mm");
+    device.figure("plane-wires", &format!("{worst:.3}"));
 }
 
 /// A slab against a plain loop over the volume, and against the known result of a field along its normal.

@@ -68,12 +68,17 @@ fn sphere_scene(ray: &str) -> Scene {
 fn a_sphere_stays_with_growing_steps_and_with_the_sliding_filter() {
     let device = Device::new();
     let (centre, radius) = (DVec3::new(1.5, 50.0, -2.0), 9.0);
-    for (ray, limit) in [("spread = 1.0", 0.15), ("sliding = 3", 0.12), ("sliding = 5, spread = 1.0", 0.35)] {
+    for (ray, limit, figure) in [
+        ("spread = 1.0", 0.15, "growing-steps"),
+        ("sliding = 3", 0.12, "sliding-filter"),
+        ("sliding = 5, spread = 1.0", 0.35, "growing-and-sliding"),
+    ] {
         let scene = sphere_scene(ray);
         let body = |p: DVec3| ((radius - p.distance(centre)) / 0.6 + 0.5).clamp(0.0, 1.0);
         let (hits, worst) = sphere_error(&scene, &slot(&device, &scene, body, Slot::Distance), centre, radius);
         println!("{ray}: {hits} hits, at most {worst:.3} mm off");
         assert!(hits > 250 && worst < limit, "{ray}: {hits} hits, {worst} mm");
+        device.figure(figure, &format!("{worst:.2}"));
     }
 }
 
@@ -104,6 +109,7 @@ fn the_sliding_filter_keeps_a_linear_field_and_quietens_noise_as_its_weights_say
         values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len() as f64
     };
     let raw = variance(&inner(&slot(&device, &at(0), noise, Slot::Picture)));
+    let mut largest = 0.0f64;
     for sliding in [3, 5] {
         let scene = at(sliding);
         let field = |p: DVec3| 0.1 + 0.03 * p.x + 0.02 * p.y + 0.01 * p.z;
@@ -119,8 +125,11 @@ fn the_sliding_filter_keeps_a_linear_field_and_quietens_noise_as_its_weights_say
         let squares: f64 = (-reach..=reach).map(|k| (weight(k) / sum).powi(2)).sum();
         let quiet = variance(&inner(&slot(&device, &scene, noise, Slot::Picture)));
         println!("sliding {sliding}: variance {:.4} of the noise's, weights say {:.4}", quiet / raw, squares.powi(3));
-        assert!((quiet / raw / squares.powi(3) - 1.0).abs() < 0.25, "sliding {sliding}: {}", quiet / raw);
+        let off = (quiet / raw / squares.powi(3) - 1.0).abs();
+        assert!(off < 0.25, "sliding {sliding}: {}", quiet / raw);
+        largest = largest.max(off);
     }
+    device.figure("sliding-noise", &format!("{:.0}", 100.0 * largest));
 }
 
 /// A thin opaque layer of the transfer function, which long steps miss.
@@ -138,8 +147,15 @@ fn pre_integration_finds_a_layer_that_long_steps_miss() {
         slot(&device, &scene, |p| 0.03 + p.y / 10.0, Slot::Picture).get([2, 2, 0])[3]
     };
     let fine = opacity(0.004, "corrected");
-    for step in [0.3, 1.1, 2.7] {
+    device.figure("layer", &format!("{fine:.4}"));
+    for (step, figures) in [
+        (0.3, ["layer-1", "layer-corrected-1"]),
+        (1.1, ["layer-2", "layer-corrected-2"]),
+        (2.7, ["layer-3", "layer-corrected-3"]),
+    ] {
         let (corrected, integrated) = (opacity(step, "corrected"), opacity(step, "pre-integrated"));
+        device.figure(figures[0], &format!("{integrated:.4}"));
+        device.figure(figures[1], &format!("{corrected:.2}"));
         println!("step {step}: corrected {corrected:.4}, pre-integrated {integrated:.4}, truth {fine:.4}");
         assert!((integrated / fine - 1.0).abs() < 0.03, "step {step}: {integrated} for {fine}");
         assert!((corrected / fine - 1.0).abs() > 0.1, "step {step} should miss or exaggerate it: {corrected}");
@@ -254,6 +270,7 @@ fn two_sample_rules_see_all_of_the_path_through_a_sector() {
         let within = |index: f64, count: usize| (0.0..=(count - 1) as f64).contains(&index);
         within(at.sample, probe.samples) && within(at.line, probe.lines.len()) && within(at.slice, probe.slices.len())
     };
+    let mut largest = [0.0f64; 2];
     for (rule, step) in [("pre-integrated", 1.5), ("exponential", 1.5), ("pre-integrated", 0.4)] {
         let toml = format!(
             "mode = 'vr'\npicture = {{ size = [24, 24] }}\nray = {{ step = {step}, early_end = 0.0 }}\nslices = {{ pixels = 128 }}\n\
@@ -282,5 +299,8 @@ fn two_sample_rules_see_all_of_the_path_through_a_sector() {
         assert!(seen > 100, "{seen} rays");
         // A picture of R16F is truncated by up to a thousandth.
         assert!(mean.abs() < 1e-3 && worst < 4e-3, "{rule}, steps of {step} mm: {mean}, {worst}");
+        largest = [largest[0].max(mean.abs()), largest[1].max(worst)];
     }
+    device.figure("path-mean", &format!("{:.0e}", largest[0]));
+    device.figure("path-worst", &format!("{:.0e}", largest[1]));
 }

@@ -69,6 +69,7 @@ fn five_real_frames_are_converted_as_the_plus_toolkit_did() {
     }
     let share = equal as f64 / (5.0 * 820.0 * 616.0);
     println!("equal to the PLUS toolkit: {:.4} % of pixels, largest difference {largest}", 100.0 * share);
+    device.figure("plus-pixels", &format!("{:.2}", 100.0 * share));
     // f32 rounds an index near 3640 by 2.4e-4 of a sample, which can change the rounding of values that close to a half.
     assert!(share >= 0.999 && largest <= 1, "{share}, {largest}");
 
@@ -122,6 +123,7 @@ fn the_wobblers_wires_lie_within_a_tenth_of_a_millimetre() {
             assert!(worst > 0.3, "half a millimetre of shift went unnoticed: {worst}");
         } else {
             assert!(worst < 0.1, "off by {worst} mm");
+            device.figure("wires", &format!("{worst:.3}"));
         }
     }
 }

@@ -82,6 +82,9 @@ fn a_slight_blur_removes_wood_grain_artefacts() {
         ["", "blur = true", "smooth = { kernel = 3 }", "smooth = { kernel = 5 }"].map(|slices| ripple(&device, slices));
     println!("wood grain {plain:.4} mm, blurred {blurred:.4}, 3x3x3 {three:.4}, 5x5x5 {five:.4}");
     assert!(plain > 0.02, "there is grain: {plain} mm");
+    for (name, grain) in [("grain", plain), ("grain-blur", blurred), ("grain-3", three), ("grain-5", five)] {
+        device.figure(name, &format!("{grain:.3}"));
+    }
     assert!(blurred < 0.8 * plain, "{blurred} of {plain} mm");
     assert!(five < three && three < plain, "{five}, {three}, {plain} mm");
 }

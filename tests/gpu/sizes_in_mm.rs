@@ -62,5 +62,9 @@ fn a_large_picture_brought_down_equals_a_small_one() {
     }
     let (mean, ssim) = figures[0];
     assert!(mean <= 4.0 && ssim >= 0.95, "{mean} levels, {ssim}");
+    for (names, (mean, ssim)) in [["mm-levels", "mm-ssim"], ["pixels-levels", "pixels-ssim"]].iter().zip(&figures) {
+        device.figure(names[0], &format!("{mean:.2}"));
+        device.figure(names[1], &format!("{ssim:.3}"));
+    }
     assert!(figures[1].1 < ssim, "sizes in pixels change the picture more: {figures:?}");
 }

@@ -1,5 +1,6 @@
 //! Convergence orders of the compositing rules in f64, and what degrades them.
 
+use crate::common::figures::figure;
 use echolume::low_level::error_report::convergence::{Field, Fit, Flaw, NONE, Range, errors, fit, steps, stiffness};
 use echolume::low_level::passes::raycast::composite::Rule;
 
@@ -30,17 +31,18 @@ fn is_order(fit: &Fit, order: f64) -> bool {
 #[test]
 fn every_rule_has_its_order() {
     let orders = [
-        (Rule::Riemann, 1.0),
-        (Rule::CorrectedLeft, 1.0),
-        (Rule::Corrected, 2.0),
-        (Rule::PreIntegrated, 2.0),
-        (Rule::Exponential, 2.0),
-        (Rule::PreIntegratedUnshaded, 1.0),
+        (Rule::Riemann, 1.0, "order-riemann"),
+        (Rule::CorrectedLeft, 1.0, "order-left"),
+        (Rule::Corrected, 2.0, "order-midpoint"),
+        (Rule::PreIntegrated, 2.0, "order-pre-integrated"),
+        (Rule::Exponential, 2.0, "order-exponential"),
+        (Rule::PreIntegratedUnshaded, 1.0, "order-unshaded"),
     ];
-    for (rule, order) in orders {
+    for (rule, order, name) in orders {
         let Found { fit, .. } = found(rule, Field::Open, NONE);
         assert!(is_order(&fit, order), "{rule:?}: order {:.3}, expected {order}", fit.order);
         assert!(fit.standard_error < 0.02, "{rule:?}: the points lie on no line: +-{:.3}", fit.standard_error);
+        figure(name, &format!("{:.2}", fit.order));
     }
 }
 

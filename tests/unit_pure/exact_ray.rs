@@ -1,9 +1,10 @@
 //! The exact reference of a ray against formulas, against sums of very many samples, and with faults planted in it.
 
+use crate::common::figures::figure;
 use crate::common::files::data;
 use crate::common::probes::{voxels, wobbler};
 use crate::common::scenes::{FLOATS, scene};
-use echolume::low_level::error_report::convergence::{Range, fit};
+use echolume::low_level::error_report::convergence::{Fit, Range, fit};
 use echolume::low_level::error_report::metrics::{distances, pictures};
 use echolume::low_level::exact_ray::gauss_kronrod::RULE;
 use echolume::low_level::exact_ray::picture::{self, Effort};
@@ -319,6 +320,7 @@ fn rays_through_noise_are_those_of_a_hundred_thousand_samples() {
         }
     }
     println!("largest difference {worst:.1e} over {compared} rays");
+    figure("exact-rays", &format!("{worst:.1e}"));
     assert!(compared >= 20, "{compared} rays met something");
 }
 
@@ -369,14 +371,16 @@ fn the_steps_of_a_real_sweep_converge_to_the_exact_picture() {
         let pairs: Vec<[f64; 2]> = (0..shares.len()).map(|n| [shares[n], error(n)]).collect();
         let found = fit(&pairs, Range { step: [0.1, 1.0], floor: 0.0 }).expect("four steps");
         println!("{pairs:?}: order {:.3} +- {:.3}", found.order, found.standard_error);
-        found.order
+        found
     };
-    let order = order_against(&exact);
+    let Fit { order, standard_error, .. } = order_against(&exact);
+    figure("riemann-order", &format!("{order:.2}"));
+    figure("riemann-order-error", &format!("{standard_error:.2}"));
     assert!((order - 1.0).abs() < 0.15, "order {order:.3}");
     // The fault planted: light that is one part in fifty too strong. The order is lost.
     let mut planted = exact.clone();
     planted.values.iter_mut().for_each(|v| *v *= 1.02);
-    assert!((order_against(&planted) - 1.0).abs() > 0.3);
+    assert!((order_against(&planted).order - 1.0).abs() > 0.3);
 }
 
 /// Every mode by samples of 0.05 mm, and exactly.

@@ -1,5 +1,6 @@
 //! Freehand compounding: known answers, an f64 reference written from the formula, holes, and invalid poses. Needs no GPU.
 
+use crate::common::figures::figure;
 use echolume::low_level::probe::Grid;
 use echolume::low_level::source::StoredType;
 use echolume::low_level::source::freehand::*;
@@ -144,6 +145,7 @@ fn the_weighted_mean_is_that_of_the_formula_in_any_order() {
     assert!(filled > 300);
     // Some ten additions in f32 of values up to 1, and up to 1e-6 a pixel that is left out beside 0.01.
     assert!(worst < 5e-4, "{worst}");
+    figure("splat", &format!("{worst:.0e}"));
     let apart = results[0].iter().zip(&results[1]).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
     assert!(apart < 1e-5, "{apart}");
 }
@@ -174,6 +176,7 @@ fn a_linear_field_stays_linear() {
     }
     println!("{within} voxels, worst error {worst}: {} of a voxel's gradient", worst / 29f64.sqrt());
     assert!(within == 512 && worst < 0.01 * 29f64.sqrt(), "{worst}");
+    figure("splat-linear", &format!("{:.3}", worst / 29f64.sqrt()));
 }
 
 #[test]

@@ -12,6 +12,7 @@ mod cuts;
 mod default_look;
 mod error_report;
 mod exact_ray;
+mod figures;
 mod floating;
 mod freehand;
 mod geometry;

@@ -1,5 +1,6 @@
 //! The compositing rules on profiles whose light is known: what a step that is thick optically costs each rule.
 
+use crate::common::figures::figure;
 use echolume::low_level::passes::raycast::composite::{March, Medium, Place, Rule};
 use echolume::low_level::scene::{self_attenuation, transfer};
 use std::cell::OnceCell;
@@ -115,8 +116,10 @@ fn ramp(s: f64) -> f64 {
 #[test]
 fn pre_integration_shows_the_middle_of_an_opaque_step_and_self_attenuation_its_face() {
     let off = errors("ramp", 8.0, ramp, |_| 14.0, Rule::PreIntegrated);
-    for (got, stated) in off.iter().zip([0.49, 0.24, 0.12, 0.05]) {
+    for ((got, stated), name) in off.iter().zip([0.49, 0.24, 0.12, 0.05]).zip(["ramp-8", "ramp-4", "ramp-2", "ramp-1"])
+    {
         assert!((got - stated).abs() < 0.006, "{got} for {stated}");
+        figure(name, &format!("{got:.3}"));
     }
     let off = errors("ramp", 8.0, ramp, |_| 14.0, Rule::Exponential);
     assert!(off.iter().all(|e| *e < 1e-6), "the value is linear in every step: {off:?}");

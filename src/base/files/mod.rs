@@ -325,7 +325,7 @@ impl InputError {
         InputError::new(file, "file", format!("cannot be written: {error}"))
     }
 
-    /// The same error under the name by which the user knows the file.
+    /// This error with the name by which the user knows the file.
     pub fn renamed(self, name: &str) -> InputError {
         InputError { file: escaped(name, MAX_PART), ..self }
     }

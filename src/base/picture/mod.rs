@@ -135,7 +135,7 @@ impl Grey {
         self.values.iter().map(|v| f64::from(*v) / self.white()).collect()
     }
 
-    /// The same picture with other values in 0..1, each rounded to the nearest stored value.
+    /// A picture of this size and depth with other values in 0..1, each rounded to the nearest stored one.
     pub fn with(&self, shares: &[f64]) -> Grey {
         let values = shares.iter().map(|v| (v.clamp(0.0, 1.0) * self.white()).round() as u16).collect();
         Grey { values, ..*self }

@@ -49,7 +49,7 @@ pub(super) fn integral(segment: &Segment) -> f64 {
     cuts.windows(2).map(|pair| integral_between(segment, pair[0], pair[1])).sum()
 }
 
-/// The same between two places in -1..1 between which the field does not cross 0 or 1.
+/// The integral between two places in -1..1 of the segment, between which the field does not cross 0 or 1, in units of mm.
 pub(super) fn integral_between(segment: &Segment, from: f64, to: f64) -> f64 {
     let half = (to - from) / 2.0;
     let value = |x: f64| segment.field.at(from + half * (1.0 + x)).clamp(0.0, 1.0);

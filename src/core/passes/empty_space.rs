@@ -245,7 +245,7 @@ fn constants(entries: usize, from_zero: bool) -> Vec<(&'static str, i32)> {
     vec![("MAX_DISTANCE", MAX_DISTANCE as i32), ("ENTRIES", entries as i32), ("FROM_ZERO", from_zero as i32)]
 }
 
-/// The slots that every kind follows from.
+/// The bindings that bricks are classified by: the table of bricks and their ranges.
 pub(super) fn ranges() -> Vec<Bind> {
     vec![whole("brick_table", Slot::BrickTable), whole("brick_ranges", Slot::BrickRanges)]
 }
@@ -311,7 +311,7 @@ pub(crate) const DISTANCE_SURFACE: Pass = Pass {
     reference: |s, t, reads, writes| distance_reference(beyond_surface(s), t, reads, writes),
 };
 
-/// The same for the mode that composites, or takes the mean.
+/// The pass [`DISTANCE_SURFACE`] for modes that composite or take the mean.
 pub(crate) const DISTANCE_VOLUME: Pass = Pass {
     name: "brick_distance_volume",
     needed: CLASSIFY_VOLUME.needed,

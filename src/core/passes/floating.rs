@@ -82,7 +82,7 @@ pub fn find(scene: &Scene, bytes: &[u8]) -> Vec<u8> {
     floats.into_iter().map(|floats| if floats { 255 } else { 0 }).collect()
 }
 
-/// The same in f64, by flood fill from a texel of each part.
+/// The reference of the search for floating parts, in f64, by flood fill from a texel of each part.
 pub fn reference(scene: &Scene, volume: &Texels) -> Texels {
     let [columns, rows, slices] = volume.size;
     let (level, reach, sizes) = (level(scene), scene.part_reach() as i64, scene.texel_sizes());

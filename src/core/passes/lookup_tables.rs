@@ -161,7 +161,8 @@ pub(crate) fn transfer_integral(scene: &Scene) -> Vec<f32> {
     floats(sums.into_iter().flatten())
 }
 
-/// The same from an entry on over a share of the way to the next, with a width of 1 between them.
+/// The integral of absorption times colour and of absorption, from an entry (`low`) over a share of the way to the next one (`high`); the entries
+/// count as 1 apart.
 pub(super) fn transfer_integral_within(low: [f64; 4], high: [f64; 4], share: f64) -> [f64; 4] {
     let rise: [f64; 4] = std::array::from_fn(|c| high[c] - low[c]);
     let (t, kappa) = (share, low[3]);
@@ -171,7 +172,7 @@ pub(super) fn transfer_integral_within(low: [f64; 4], high: [f64; 4], share: f64
     })
 }
 
-/// How many entries before each are not transparent, and in all.
+/// For each entry of the transfer function the number of entries before it that are not transparent; last the number of all.
 pub fn opaque_before(scene: &Scene) -> Vec<f32> {
     let absorption: Vec<f32> = transfer_table(scene).chunks_exact(4).map(|entry| entry[3]).collect();
     let mut before = vec![0.0];
@@ -182,7 +183,7 @@ pub fn opaque_before(scene: &Scene) -> Vec<f32> {
     before
 }
 
-/// The same between every two sample values.
+/// Mean colour and absorption of a step between every two sample values ([`transfer::pre_integrated`]).
 pub fn pre_integrated_table(scene: &Scene) -> Vec<f32> {
     floats(transfer::pre_integrated(&transfer_of(scene)).into_iter().flatten())
 }

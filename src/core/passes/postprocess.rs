@@ -219,7 +219,7 @@ pub(crate) const ASSEMBLE: Pass = Pass {
     reference: |scene, _, reads, writes| assemble(scene, reads, writes.get_mut("picture")),
 };
 
-/// The same, toned and in 8 bits.
+/// The pass [`ASSEMBLE`] that also tones and stores 8 bits.
 pub(crate) const ASSEMBLE_TONED: Pass = Pass {
     name: "assemble_toned",
     shader: |_, _| "postprocess/assemble.toned",

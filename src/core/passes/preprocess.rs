@@ -61,7 +61,7 @@ pub(crate) const SCAN_CONVERT: Pass = Pass {
     },
 };
 
-/// The same for the volume that planes beside a rendering are cut from: scan conversion again, since a filter may have overwritten the first.
+/// Scan conversion for the section volume, made again because a filter may have overwritten the first one.
 pub(crate) const SECTION_SCAN_CONVERT: Pass = Pass {
     name: "section_scan_convert",
     link: Link::Filter(Filter::of(Chain::Sections)),

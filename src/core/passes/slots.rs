@@ -273,17 +273,18 @@ slots! {
     /// The kind of each brick to a mode: active, empty or homogeneous.
     BrickKinds = D::image("brick_kinds", per_brick, |_| Format::R8)
         .of(GREY, "(64 kind + distance in bricks) / 255; kinds: 0 active, 1 empty, 2 homogeneous");
-    /// The same with the distance to the nearest brick of another kind along x, and within x and y.
+    /// The kind of each brick and its distance to the nearest brick of another kind: along x, and within x and y.
     BrickDistancesX = D::image("brick_distances_x", per_brick, |_| Format::R8)
         .of(GREY, "(64 kind + distance in bricks) / 255; kinds: 0 active, 1 empty, 2 homogeneous");
     BrickDistancesXy = D::image("brick_distances_xy", per_brick, |_| Format::R8)
         .of(GREY, "(64 kind + distance in bricks) / 255; kinds: 0 active, 1 empty, 2 homogeneous");
-    /// The same in space: for the surface detector, and for the mode that composites or takes the mean.
+    /// The kind of each brick and its distance to the nearest brick of another kind in space: for the surface detector, and for modes that
+    /// composite or take the mean.
     SurfaceBrickDistances = D::image("surface_brick_distances", per_brick, |_| Format::R8)
         .of(GREY, "(64 kind + distance in bricks) / 255; kinds: 0 active, 1 empty, 2 homogeneous");
     VolumeBrickDistances = D::image("volume_brick_distances", per_brick, |_| Format::R8)
         .of(GREY, "(64 kind + distance in bricks) / 255; kinds: 0 active, 1 empty, 2 homogeneous");
-    /// Entries of the transfer function that are not transparent, before each.
+    /// Number of entries of the transfer function before each that are not transparent.
     OpaqueBefore = D::table(
         "opaque_before",
         |s| Shape::Buffer(4 * (s.transfer_entries() as u32 + 1)),

@@ -78,7 +78,7 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
         );
     }
     if settings.layout == Layout::Pair && settings.mode != Mode::Surface {
-        return refuse("layout", "pair shows a volume and the surface found in the same march: set mode=surface");
+        return refuse("layout", "pair shows a volume beside a surface: set mode=surface");
     }
     let s = &settings.slices;
     check_smooth(s.smooth, "slices.smooth.kernel")?;

@@ -350,7 +350,7 @@ pub(super) fn check_drawn(scene: &Scene) -> Result<(), SceneError> {
     check_removal(scene, scene.has_cuts(), "cuts", "remove the cuts")
 }
 
-/// Of a setting that removes parts of a rendering, with what to do where it cannot.
+/// Checks whether a setting can remove parts of a rendering. `remedy`: what to do if it cannot.
 ///
 /// # Errors
 /// The rendering draws both what is dark and what is bright.

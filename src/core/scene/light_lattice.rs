@@ -129,13 +129,13 @@ impl LightVolume {
         EXTINCTION.map(|ratio| ratio.powf(self.warmth) / self.depth)
     }
 
-    /// The same of the back light.
+    /// Extinction of red, green and blue back light in matter of density 1, 1/mm.
     pub(crate) fn back_extinction(&self) -> [f64; 3] {
         let [_, green, _] = BACK_EXTINCTION;
         BACK_EXTINCTION.map(|ratio| green * (ratio / green).powf(self.warmth) / self.depth)
     }
 
-    /// The same of ambient light, of any colour.
+    /// Extinction of ambient light of any colour in matter of density 1, 1/mm.
     pub(crate) fn ambient_extinction(&self) -> f64 {
         AMBIENT_EXTINCTION / self.depth
     }

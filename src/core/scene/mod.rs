@@ -472,8 +472,8 @@ impl Scene {
         ray.adaptive && ray.rays > 1 && is_alone && self.still().is_none() && !self.has_caps()
     }
 
-    /// The largest error of each pixel, levels of 8 bits. None if steps do not follow from an error. The picture must follow from the
-    /// colour along each ray alone.
+    /// The error that each pixel may have, levels of 8 bits, by which steps are chosen. `None` if no tolerance is set, or in scenes other
+    /// than volume rendering without a light volume and without a still.
     pub fn tolerance(&self) -> Option<f64> {
         let is_alone = self.settings.mode == Mode::Volume && !self.lights_volume() && self.still().is_none();
         Some(self.settings.ray.tolerance).filter(|levels| *levels > 0.0 && is_alone)
@@ -669,7 +669,7 @@ impl Scene {
         [lateral, depth, elevation]
     }
 
-    /// The same of the volume that planes beside a rendering are cut from.
+    /// Standard deviations of the 3D Gaussian of the section volume, in slice pixels, slice pixels and slices.
     pub(crate) fn section_smoothing(&self) -> [f64; 3] {
         self.deviations(self.section_smooth.unwrap_or_default())
     }
@@ -761,7 +761,7 @@ impl Scene {
         }
     }
 
-    /// Distance between these samples, mm: together they span the skin's depth.
+    /// Distance between the samples behind the surface that skin shading averages, mm. Together they span the skin's depth.
     pub(crate) fn step_behind(&self) -> f64 {
         self.settings.light.skin.map_or(0.0, |skin| skin.depth) / f64::from(self.samples_behind().max(1))
     }

@@ -22,9 +22,9 @@ const BRICK_COST: f64 = 90.0;
 const DISPATCHES_COST: f64 = 1e6;
 /// Saved per sample of a ray by compositing (1 to 10).
 const COMPOSITING_SAVING: f64 = 3.0;
-/// The same by the largest or the smallest value of a ray (1.2 to 1.6).
+/// Saved per sample of a ray by the largest or the smallest value (1.2 to 1.6).
 const EXTREME_SAVING: f64 = 1.4;
-/// The same by the surface detector and the mean: between 1.9 lost and 1.1 saved, about nothing in the median.
+/// Saved per sample of a ray by the surface detector and the mean: from -1.9 to 1.1, about nothing in the median.
 const NO_SAVING: f64 = 0.0;
 
 impl Scene {

@@ -29,7 +29,7 @@ pub struct BackgroundSweep {
 pub struct PositionLog {
     /// Time 0 of the positions.
     start: Instant,
-    /// The same, s since 1970.
+    /// Time 0 of the positions, s since 1970.
     start_since_1970: f64,
     state: Arc<Mutex<State>>,
 }

@@ -104,7 +104,7 @@ impl RotatingLog {
         Ok(log)
     }
 
-    /// The same log, but each time that `reopens` becomes true it opens its file again before the next line. After another program has
+    /// This log, but each time that `reopens` becomes true it opens its file again before the next line. After another program has
     /// renamed the file, the lines go to a new one.
     #[must_use]
     pub fn reopened(mut self, reopens: Arc<AtomicBool>) -> RotatingLog {

@@ -102,7 +102,7 @@ impl Views {
     }
 }
 
-/// Result of a step between pictures.
+/// Result of the step between two pictures, in which the next one may begin.
 pub(super) enum Begun {
     /// A picture is being drawn.
     Picture,

@@ -94,7 +94,7 @@ pub(super) struct Flat {
     pub warnings: BTreeSet<String>,
 }
 
-/// The region, otherwise the whole picture. The scale of the region counts, otherwise the pixel spacing.
+/// The ultrasound region of a picture with its scale; without one the whole picture with its pixel spacing.
 pub(super) fn flat(root: &Item, size: [usize; 2]) -> Flat {
     let (region, count) = Region::choose(root, size);
     let mut warnings = BTreeSet::new();

@@ -34,7 +34,7 @@ pub fn decode(bytes: &[u8], limit: usize) -> Result<Decoded, DecodeError> {
     decode_with(bytes, limit, false)
 }
 
-/// The same, with messages whose checksum is 0 if that is asked for: some senders compute none.
+/// As [`decode`]. `takes_zero`: messages with the checksum 0 are accepted, as some senders compute none.
 pub(super) fn decode_with(bytes: &[u8], limit: usize, takes_zero: bool) -> Result<Decoded, DecodeError> {
     let Some(head) = bytes.first_chunk::<HEADER>() else { return Ok(Decoded::Need(HEADER - bytes.len())) };
     let framing =

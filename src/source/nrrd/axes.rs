@@ -145,7 +145,7 @@ pub(super) struct Axes {
     pub channels: usize,
     pub size: [usize; 3],
     pub volumes: usize,
-    /// None if the axes are colours, space, time from the fastest on.
+    /// How samples are reordered; `None` if the axes are colours, space and time already, the fastest first.
     pub reorder: Option<StoredOrder>,
 }
 

@@ -1,4 +1,4 @@
-//! When the user acted and changed something, and how long an input waits for the picture that shows its effect.
+//! When the user last acted and changed something, and how long an input waits for the picture that shows its effect.
 
 use std::time::{Duration, Instant};
 
@@ -8,14 +8,14 @@ const STEP_PAUSE: Duration = Duration::from_millis(500);
 /// A picture that takes longer is said to be drawn.
 const PATIENCE: Duration = Duration::from_millis(500);
 
-/// What the user did last, and what of it no picture shows yet.
+/// The user's last actions, and those that no picture shows yet.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Activity {
     acted: Instant,
     changed: Instant,
-    /// The first input whose settings the stream has not been given yet.
+    /// The first input whose settings are not sent to the stream yet.
     unsent: Option<Instant>,
-    /// The first input that no picture shows yet, and when its settings were given to the stream.
+    /// The first input that no picture shows yet, and when its settings were sent to the stream.
     unshown: Option<(Instant, Instant)>,
 }
 
@@ -24,50 +24,50 @@ impl Activity {
         Activity { acted: now, changed: now, unsent: None, unshown: None }
     }
 
-    /// The user did something.
+    /// Records that the user did something.
     pub(super) fn acts(&mut self, now: Instant) {
         self.acted = self.acted.max(now);
     }
 
-    /// When the user did something last.
+    /// Time of the user's last action.
     pub(super) fn acted(&self) -> Instant {
         self.acted
     }
 
-    /// Something changed: settings, or marks on the picture.
+    /// Records a change of settings or of marks on the picture.
     pub(super) fn changes(&mut self, now: Instant) {
         self.changed = now;
     }
 
-    /// The user changed settings: a picture will show it.
+    /// Records a change of settings, which a picture will show.
     pub(super) fn changes_settings(&mut self, now: Instant) {
         self.changes(now);
         self.awaits_picture(now);
     }
 
-    /// A picture will show what the user did.
+    /// Records that a picture will show the effect of what the user did.
     pub(super) fn awaits_picture(&mut self, now: Instant) {
         self.unsent.get_or_insert(now);
     }
 
-    /// True if nothing changed for so long that the next change is another step for undo.
+    /// True if nothing changed for so long that the next change is a step of undo of its own.
     pub(super) fn has_paused(&self, now: Instant) -> bool {
         now.saturating_duration_since(self.changed) > STEP_PAUSE
     }
 
-    /// Other settings were given to the stream.
+    /// Records that settings were sent to the stream.
     pub(super) fn settings_sent(&mut self, now: Instant) {
         let first = self.unsent.take().or(self.unshown.map(|(input, _)| input));
         self.unshown = first.map(|input| (input, now));
     }
 
-    /// When it is to be said that a picture of what the user did is being drawn; none while nothing waits for one.
+    /// When the window is to say that a picture of the user's action is being drawn; none if none is awaited.
     pub(super) fn says_it_works_at(&self) -> Option<Instant> {
         let since = self.unshown.map(|(input, _)| input).or(self.unsent)?;
         Some(since + PATIENCE)
     }
 
-    /// A picture is shown that was begun then. The input whose effect it is the first to show, if there is one.
+    /// Records that a picture is shown that was begun at this time. Returns the first input whose effect it shows, if there is one.
     pub(super) fn answered_by(&mut self, begun: Option<Instant>) -> Option<Instant> {
         let answered = self.unshown.take_if(|(_, sent)| begun.is_some_and(|begun| begun >= *sent));
         answered.map(|(input, _)| input)

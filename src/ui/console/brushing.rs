@@ -1,4 +1,4 @@
-//! The brush: where a drag over a rendering went along its surface.
+//! The brush: projects a drag over a rendering onto the surface.
 
 use super::Console;
 use super::surface::SurfaceMap;
@@ -16,7 +16,7 @@ const SPACING: f64 = 0.25;
 type Strokes = Vec<Vec<[f64; 3]>>;
 
 impl Console {
-    /// Removes what is near the surface along the stroke that ended.
+    /// Removes what is near the surface along the finished stroke.
     pub(super) fn end_stroke(&mut self, now: Instant) {
         let pixels = self.controls.take_stroke();
         if pixels.is_empty() {

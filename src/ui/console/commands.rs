@@ -1,4 +1,4 @@
-//! Commands in the console: what they do besides changing settings.
+//! Execution of commands in the console, apart from changes of settings.
 
 use super::Console;
 use crate::cine_player::Loop;
@@ -173,7 +173,7 @@ impl Console {
         }
     }
 
-    /// Turns on, if the view turns by itself.
+    /// Rotates the view further, if the turntable runs.
     pub(super) fn turn(&mut self, now: Instant) {
         let can_draw = !self.stream.is_drawing() && self.stream.is_idle();
         let Some(by) = self.turntable.step(can_draw, now) else { return };
@@ -192,7 +192,7 @@ impl Console {
         }
     }
 
-    /// The cine loop as it is played.
+    /// The cine loop with its playback settings.
     pub(super) fn cine_loop(&self) -> Loop<'_> {
         loop_of(&self.controls, &self.stream)
     }
@@ -271,25 +271,25 @@ impl Console {
         question.is_some()
     }
 
-    /// True if volumes of the loop exist nowhere else: neither in a file that they were read from or recorded to, nor in one that was saved.
+    /// True if volumes of the loop are in no file: neither the one they were read from, nor a recording, nor a saved loop.
     pub(super) fn has_unsaved_loop(&self) -> bool {
         let newest = self.stream.cine().volumes().back().map(|kept| kept.volume);
         self.leaving.loses(newest, self.stream.feed_counts().unrecorded)
     }
 
-    /// The user asked the windowing system to close the window: asks first if that loses anything. False if it may be closed at once.
+    /// Handles a request of the windowing system to close the window. True if the console asks first, because something would be lost.
     pub(crate) fn asks_before_closing(&mut self) -> bool {
         let asks = !self.leaving.asks() && self.asks_before_leaving();
         self.presentation.redraw_if(asks);
         asks
     }
 
-    /// Tells whether the window fills the screen and can leave it.
+    /// Sets whether the window fills the screen and can leave that state.
     pub fn set_full_screen(&mut self, is_full_screen: bool) {
         self.presentation.set_full_screen(is_full_screen);
     }
 
-    /// True while the console asks whether to save what would be lost before it leaves.
+    /// True while the console asks whether to save before it leaves.
     pub fn asks_to_leave(&self) -> bool {
         self.leaving.asks()
     }

@@ -1,4 +1,4 @@
-//! The source of the console: whether it is open, connected, or silent.
+//! The source of the console: whether it is open, connected or silent.
 
 use crate::live::Feed;
 use crate::silence::Silence;
@@ -6,14 +6,14 @@ use crate::source::live::SourceKind;
 use crate::source_supervisor::{SourceNotice, SourceState, SourceSupervisor};
 use std::time::{Duration, Instant};
 
-/// The source and what came from it.
+/// The source, and what is known of it.
 pub(super) struct Connection {
     source: SourceSupervisor,
     kind: SourceKind,
     silence: Silence,
-    /// Why it is not connected, as it was shown last.
+    /// The reason shown last why the source is not connected.
     disconnected: Option<String>,
-    /// Number of frames that came.
+    /// Number of frames received.
     frames: u64,
     /// When a probe or a pipe ended for good.
     ended: Option<Instant>,
@@ -36,22 +36,22 @@ impl Connection {
         matches!(self.source.state(), SourceState::Open)
     }
 
-    /// True if it ended for good.
+    /// True if the source ended for good.
     pub(super) fn is_over(&self) -> bool {
         matches!(self.source.state(), SourceState::Ended(_))
     }
 
-    /// How long ago a probe or a pipe ended for good. Nothing is live since.
+    /// Time since a probe or a pipe ended for good; nothing is live since then.
     pub(super) fn ended_for(&self, now: Instant) -> Option<Duration> {
         self.ended.map(|at| now.saturating_duration_since(at))
     }
 
-    /// How often it could not be opened.
+    /// Number of failed attempts to open the source.
     pub(super) fn not_opened(&self) -> u64 {
         self.source.not_opened()
     }
 
-    /// Why there was nothing to show: it could not be opened.
+    /// The reason why the source could not be opened.
     pub(super) fn fault(&self) -> Option<String> {
         match self.source.state() {
             SourceState::Ended(why) if self.not_opened() > 0 => why.clone(),
@@ -59,22 +59,22 @@ impl Connection {
         }
     }
 
-    /// Waits no longer for the source that is being opened. False if none is.
+    /// Cancels opening the source. False if it is not being opened.
     pub(super) fn cancel(&mut self) -> bool {
         self.source.cancel()
     }
 
-    /// An update of the console begins.
+    /// Begins an update of the console.
     pub(super) fn begin_update(&mut self, now: Instant) {
         self.silence.begin_update(now);
     }
 
-    /// The update that began at `now` ends after `took`; `is_busy`: the device still works.
+    /// Ends an update that began at `now` and took this time. `is_busy`: the device still works.
     pub(super) fn end_update(&mut self, now: Instant, took: Duration, is_busy: bool) {
         self.silence.end_update(now, took, is_busy);
     }
 
-    /// What was opened since the last call. `is_wanted`: it is to be shown.
+    /// The source opened since the last call. `is_wanted`: it is to be shown.
     pub(super) fn poll(&mut self, is_wanted: bool, now: Instant) -> Option<Feed> {
         let feed = self.source.poll(now).filter(|_| is_wanted);
         if feed.is_some() {
@@ -83,7 +83,7 @@ impl Connection {
         feed
     }
 
-    /// Takes how many frames came in all, and why the source is not connected. True if the reason is another one.
+    /// Takes the number of frames received, and the reason why the source is not connected. True if the reason changed.
     pub(super) fn follow(&mut self, frames: u64, disconnected: Option<String>, now: Instant) -> bool {
         if frames != self.frames {
             self.frames = frames;
@@ -94,7 +94,7 @@ impl Connection {
         is_other
     }
 
-    /// The source ended. `why`: the fault, if that was unexpected.
+    /// Records the end of the source. `why`: the fault, if the end was unexpected.
     pub(super) fn ended(&mut self, why: Option<String>, now: Instant) {
         if let Some(why) = &why {
             tracing::warn!("source: {why}");
@@ -103,12 +103,12 @@ impl Connection {
         self.ended = Some(now).filter(|_| self.is_live() && self.is_over());
     }
 
-    /// True for a probe or a pipe.
+    /// True if the source is a probe or a pipe.
     pub(super) fn is_live(&self) -> bool {
         matches!(self.kind, SourceKind::Pipe | SourceKind::Probe)
     }
 
-    /// What there is to say of it. `disconnected`: why it is not connected. `has_shown`: a volume was shown.
+    /// The message about the source, if there is one. `disconnected`: why it is not connected. `has_shown`: a volume was shown.
     pub(super) fn notice(
         &self,
         disconnected: Option<&str>,
@@ -120,7 +120,7 @@ impl Connection {
         self.source.state().notice(self.kind, disconnected, is_silent, has_shown)
     }
 
-    /// When to look at it again.
+    /// When the connection is to be polled again.
     pub(super) fn due(&self, is_frozen: bool, now: Instant) -> impl Iterator<Item = Instant> {
         let is_listening = self.is_open() && !is_frozen;
         let silence = Some(self.silence.due()).filter(|at| is_listening && *at > now);

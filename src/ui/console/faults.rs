@@ -1,4 +1,4 @@
-//! Faults that last: a configuration that cannot be used, shaders that do not compile, a device that fails or did not finish.
+//! Lasting faults: an invalid configuration, shaders that do not compile, a device that fails or hung.
 
 use super::options::StartupFault;
 use crate::gpu::Wake;
@@ -17,19 +17,19 @@ const MAX_DEVICE_FAULTS: u32 = 5;
 /// Lines of a shader compiler's message that are shown.
 const MAX_SHADER_LINES: usize = 12;
 
-/// The faults that last.
+/// The present lasting faults.
 #[derive(Default)]
 pub(super) struct Faults {
-    /// Of the start, and when to check it next.
+    /// The fault of the start, and when to check it next.
     startup: Option<(StartupFault, Instant)>,
-    /// Number of those of the device since the last picture.
+    /// Number of faults of the device since the last picture.
     of_device: u32,
-    /// The device did not finish and was opened again; a banner says so until then.
+    /// End of the banner that the device hung and was opened again.
     stall_shown_until: Option<Instant>,
     shaders: Option<Arc<ShaderFolder>>,
-    /// Why the picture is not drawn with the shaders as they are in their folder now.
+    /// Why the picture is not drawn with the present shaders of their folder.
     of_shaders: Option<String>,
-    /// Reloads `shaders`.
+    /// Watches the folder of shaders and reloads them.
     _watch: Option<Watch>,
 }
 
@@ -38,7 +38,7 @@ impl Faults {
         Faults { startup: startup.map(|fault| (fault, now + FAULT_CHECK_INTERVAL)), ..Faults::default() }
     }
 
-    /// Watches a folder of shaders from now on.
+    /// Starts to watch a folder of shaders.
     ///
     /// # Errors
     /// One line: it cannot be watched.
@@ -48,41 +48,41 @@ impl Faults {
         Ok(())
     }
 
-    /// True if there is a startup fault: nothing is opened.
+    /// True if a fault of the start prevents the view: nothing is opened.
     pub(super) fn prevents_view(&self) -> bool {
         self.startup.is_some()
     }
 
-    /// Checks the startup fault when that is due. True if it is resolved.
+    /// Checks the fault of the start when that is due. True if it is resolved.
     pub(super) fn is_resolved(&mut self, now: Instant) -> bool {
         let Some((fault, at)) = self.startup.as_mut().filter(|(_, at)| now >= *at) else { return false };
         *at = now + FAULT_CHECK_INTERVAL;
         (fault.is_resolved)()
     }
 
-    /// The device drew a picture.
+    /// Records that the device drew a picture.
     pub(super) fn picture_finished(&mut self) {
         self.of_device = 0;
     }
 
-    /// The device failed. True if it failed so often that it is treated as lost.
+    /// Records that the device failed. True if it failed so often that it counts as lost.
     pub(super) fn device_failed(&mut self) -> bool {
         let is_lost = self.of_device >= MAX_DEVICE_FAULTS;
         self.of_device = if is_lost { 0 } else { self.of_device + 1 };
         is_lost
     }
 
-    /// Shows for a while that the device did not finish and was opened again.
+    /// Shows the banner that the device hung and was opened again.
     pub(super) fn show_stall(&mut self, now: Instant) {
         self.stall_shown_until = Some(now + STALL_TIME);
     }
 
-    /// True if that was shown long enough just now.
+    /// True once when that banner ends.
     pub(super) fn stall_ends(&mut self, now: Instant) -> bool {
         self.stall_shown_until.take_if(|until| *until <= now).is_some()
     }
 
-    /// Looks at the shaders again. True if another fault is to be shown, or none any more.
+    /// Polls the shaders. True if their fault changed.
     pub(super) fn poll_shaders(&mut self) -> bool {
         let fault = self.shaders.as_ref().and_then(|folder| folder.fault());
         let is_other = fault != self.of_shaders;
@@ -90,17 +90,17 @@ impl Faults {
         is_other
     }
 
-    /// Why the picture is not drawn with the shaders as they are in their folder now.
+    /// Why the picture is not drawn with the present shaders of their folder.
     pub(super) fn of_shaders(&self) -> Option<&str> {
         self.of_shaders.as_deref()
     }
 
-    /// When to look at them again.
+    /// When the faults are to be polled again.
     pub(super) fn due(&self) -> impl Iterator<Item = Instant> {
         self.startup.as_ref().map(|(_, at)| *at).into_iter().chain(self.stall_shown_until)
     }
 
-    /// The message for the first of them.
+    /// The banner of the most important fault, if there is one.
     pub(super) fn banner(&self) -> Option<Banner> {
         let banner = |title: &str, text: &str| Some(Banner { title: title.into(), text: text.into(), is_fault: true });
         if let Some((fault, _)) = &self.startup {

@@ -1,4 +1,4 @@
-//! The hints of the first start: when they are shown, and that they do not come again.
+//! The hints of the first start: when they are shown, and that they are shown once.
 
 use crate::command::Command;
 use crate::files;
@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 /// The hints of the first start.
 #[derive(Debug, Default)]
 pub(super) struct FirstSteps {
-    /// The file that keeps that they were shown. None: they are not to be shown.
+    /// The file that records that they were shown; `None`: they are never shown.
     file: Option<PathBuf>,
     is_shown: bool,
 }
@@ -17,7 +17,7 @@ impl FirstSteps {
         FirstSteps { file, is_shown: false }
     }
 
-    /// Shows them if that is due, and keeps that they were shown. True while they are.
+    /// Shows the hints if they are due, and records that. True while they are shown.
     pub(super) fn show(&mut self) -> bool {
         let Some(file) = &self.file else { return false };
         if !std::mem::replace(&mut self.is_shown, true) {
@@ -26,7 +26,7 @@ impl FirstSteps {
         true
     }
 
-    /// Ends them with the first action of the user. True if the command was meant for them alone.
+    /// Ends the hints at the user's first action. True if the command only closes them.
     pub(super) fn end(&mut self, command: &Command) -> bool {
         if !std::mem::take(&mut self.is_shown) {
             return *command == Command::CloseHints;

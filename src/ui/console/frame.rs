@@ -201,7 +201,7 @@ impl Console {
         self.measured.write(&self.stream, &self.context, source, now);
     }
 
-    /// Writes the metrics for the last time: the program ends in order.
+    /// Writes the metrics for the last time, at the regular end of the program.
     pub fn end_metrics(&mut self) {
         self.measured.end(&mut self.stream, &self.context);
     }
@@ -289,7 +289,7 @@ impl Console {
         Ok(())
     }
 
-    /// Why there was nothing to show: the source could not be opened.
+    /// Why there was nothing to show: the reason why the source could not be opened.
     pub fn source_fault(&self) -> Option<String> {
         self.connection.fault()
     }

@@ -6,7 +6,7 @@ use crate::input::{Input, Key, Modifiers};
 use crate::keyboard_pointer::{KeyboardPointer, PictureArea, Pointed, PointerMark};
 use crate::picking::Viewport;
 
-/// What the hands of the user do.
+/// The state of keys, gestures and pointer.
 #[derive(Default)]
 pub(super) struct Hands {
     gestures: Gestures,
@@ -19,7 +19,7 @@ impl Hands {
         self.keys.modifiers()
     }
 
-    /// Takes note of an input, whoever it is for.
+    /// Records an input, whatever uses it.
     pub(super) fn see(&mut self, input: &Input) {
         self.pointer.other_input(input);
     }
@@ -34,12 +34,12 @@ impl Hands {
         self.gestures.input(input, on, tool, modifiers)
     }
 
-    /// The command that sets the place of a text that is begun by a letter.
+    /// The command that sets the position of a text started by typing.
     pub(super) fn place_of_text(&self, on: &Viewport) -> Option<Command> {
         gestures::place_of_text(on, self.gestures.pointer())
     }
 
-    /// Where an input is, or else the pointer, pixels of the window.
+    /// Position of an input, or else of the pointer, pixels of the window.
     pub(super) fn place(&self, input: &Input) -> Option<[f64; 2]> {
         match input {
             Input::Moved(at) | Input::Touch { at, .. } => Some(*at),
@@ -52,22 +52,22 @@ impl Hands {
         self.pointer.is_on()
     }
 
-    /// True while it drags: a drag may pause between two keys.
+    /// True while the pointer by keyboard holds a button: the drag may pause between two keys.
     pub(super) fn holds(&self) -> bool {
         self.pointer.is_held()
     }
 
-    /// Turns the pointer by keyboard on or off. Returns what it does, as if a mouse did it.
+    /// Turns the pointer by keyboard on or off. Returns the resulting inputs of a mouse.
     pub(super) fn toggle_pointer(&mut self, picture: PictureArea) -> Vec<Pointed> {
         self.pointer.toggle(self.gestures.pointer(), picture)
     }
 
-    /// What a key does with the pointer; none if it is none of the pointer's.
+    /// The inputs of a mouse that a key makes with the pointer; none if the pointer does not use the key.
     pub(super) fn point(&mut self, key: Key, picture: PictureArea) -> Option<Vec<Pointed>> {
         self.pointer.key(key, &self.keys, picture)
     }
 
-    /// What is drawn of the pointer.
+    /// How the pointer by keyboard is drawn.
     pub(super) fn mark(&self, picture: PictureArea) -> Option<PointerMark> {
         self.pointer.mark(picture)
     }

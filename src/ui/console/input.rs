@@ -1,4 +1,4 @@
-//! Input of the user: whom keys, pointers and fingers are for.
+//! Passes keys, pointers and fingers to the part of the console that they are for.
 
 use super::Console;
 use crate::command::Command;
@@ -69,13 +69,13 @@ impl Console {
         }
     }
 
-    /// What a letter begins with the tool for texts: the place of a text.
+    /// The command for a letter that starts a text with the text tool: it sets the text's position.
     pub(super) fn place_of_text(&self) -> Option<Command> {
         let is_over_panel = self.hands.place(&Input::FocusLost).is_some_and(|at| self.panels.covers(at));
         self.hands.place_of_text(&self.viewport(is_over_panel, Instant::now()))
     }
 
-    /// Turns the pointer by keyboard on or off. Without panels nobody would see it.
+    /// Turns the pointer by keyboard on or off. It needs panels, without which it would be invisible.
     pub(super) fn toggle_keyboard_pointer(&mut self, now: Instant) {
         if !self.fixed.overlay {
             return;

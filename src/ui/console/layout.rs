@@ -1,4 +1,4 @@
-//! The panels of the console: what they show, and the commands that they give.
+//! Lays out the panels of the console and executes their commands.
 
 use super::Console;
 use crate::gpu;

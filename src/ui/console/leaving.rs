@@ -1,5 +1,5 @@
-//! Leaving the program: whether that loses volumes that exist nowhere else, the question about them and about what was made by hand, and leaving once
-//! all is saved. Volumes are named by their numbers.
+//! Leaving the program: whether that loses volumes or handiwork that are in no file, the question about them, and leaving once everything is saved.
+//! Volumes are identified by their numbers.
 
 use crate::export::Holds;
 use crate::source::live::SourceKind;
@@ -10,20 +10,20 @@ use std::time::{Duration, Instant};
 /// How long a warning holds: what is asked for again within this time is done.
 const WARNED: Duration = Duration::from_secs(10);
 
-/// What was saved of the cine loop, and what is asked before the program ends.
+/// What was saved of the cine loop, and the question before the program ends.
 #[derive(Debug, Default)]
 pub(super) struct Leaving {
-    /// The volumes of the source can be had once only.
+    /// Whether the source delivers each volume only once.
     comes_once: bool,
-    /// Everything that arrives is recorded to a file.
+    /// Whether everything that arrives is recorded to a file.
     is_recorded: bool,
-    /// The question that is shown.
+    /// The question, while it is shown.
     question: Option<&'static Unsaved>,
-    /// The program ends when so many files are saved.
+    /// Number of files that have to be saved before the program ends.
     awaited: Option<usize>,
-    /// The newest volume of the loops that were saved whole.
+    /// The newest volume of the completely saved loops.
     saved: Option<u32>,
-    /// The recording that was not closed at once, and when.
+    /// The recording whose closing was warned of last, and when.
     warned: Option<(PathBuf, Instant)>,
 }
 
@@ -34,8 +34,8 @@ impl Leaving {
         Leaving { comes_once, is_recorded, ..Leaving::default() }
     }
 
-    /// True if volumes of the loop exist nowhere else: neither in a file that they were read from or recorded to, nor in one that was saved.
-    /// `newest`: of the loop; `unrecorded`: number of volumes or frames that the recording lacks.
+    /// True if volumes of the loop are in no file: neither the one they were read from, nor a recording, nor a saved loop. `newest`: the loop's
+    /// newest volume; `unrecorded`: number of volumes or frames that the recording lacks.
     pub(super) fn loses(&self, newest: Option<u32>, unrecorded: u64) -> bool {
         let is_only_here = self.comes_once && !(self.is_recorded && unrecorded == 0);
         is_only_here && newest.is_some() && newest != self.saved
@@ -53,17 +53,17 @@ impl Leaving {
         self.question = Some(question);
     }
 
-    /// Asks no longer. False if nothing was asked.
+    /// Removes the question. False if there was none.
     pub(super) fn dismiss(&mut self) -> bool {
         self.question.take().is_some()
     }
 
-    /// The program ends as soon as so many files are saved; never, if there are none.
+    /// Ends the program once this number of files is saved; never, if it is 0.
     pub(super) fn after(&mut self, files: usize) {
         self.awaited = Some(files).filter(|files| *files > 0);
     }
 
-    /// A file was saved. True if the program ends now.
+    /// Records that a file was saved. True if the program ends now.
     pub(super) fn saved(&mut self, holds: &Holds) -> bool {
         if let Holds::Loop(newest) = holds {
             self.saved = self.saved.max(Some(*newest));
@@ -74,14 +74,14 @@ impl Leaving {
         self.awaited == Some(0)
     }
 
-    /// A file was not saved: the program goes on if it is one that it waits for.
+    /// Records that a file could not be saved: the program continues if it waited for that file.
     pub(super) fn not_saved(&mut self, holds: &Holds) {
         if *holds != Holds::Nothing {
             self.awaited = None;
         }
     }
 
-    /// True if closing a recording is to be warned of: it was not within the last seconds.
+    /// True if closing a recording needs a warning: there was none within the last seconds.
     pub(super) fn warns_of(&mut self, recording: &Path, now: Instant) -> bool {
         let is_warned =
             |(path, at): (PathBuf, Instant)| path == recording && now.saturating_duration_since(at) < WARNED;

@@ -1,4 +1,4 @@
-//! Presets in the console: taking one, keeping the present look, and the pictures of the list.
+//! Presets in the console: applying one, saving the present look, and the pictures of the list.
 
 use super::Console;
 use crate::command::{Command, InspectorTab};
@@ -13,7 +13,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 impl Console {
-    /// The small pictures of the list of presets; none while it is not shown.
+    /// The thumbnails of the list of presets; none while it is not shown.
     pub fn thumbnails(&self) -> &[Option<Arc<Picture>>] {
         self.presets.thumbnails()
     }
@@ -29,7 +29,7 @@ impl Console {
         self.presets.settings(n, &self.controls, scene, self.connection.kind() == SourceKind::Demo)
     }
 
-    /// Takes the n-th preset of the list, and closes the list.
+    /// Applies the n-th preset of the list, and closes the list.
     pub(super) fn take_preset(&mut self, n: usize, now: Instant) {
         if n >= self.presets.count() {
             return;
@@ -50,7 +50,7 @@ impl Console {
         }
     }
 
-    /// Begins to type a name: of a new preset, or of the n-th of the user.
+    /// Starts to type a name: of a new preset, or of the user's n-th.
     pub(super) fn begin_naming(&mut self, of: Option<usize>) {
         match self.presets.begin_naming(of) {
             // Space and Enter are the name's.
@@ -60,7 +60,7 @@ impl Console {
         }
     }
 
-    /// Keeps the name that was typed: the present look under it, or another name of a preset.
+    /// Saves under the typed name: the present look, or a renamed preset.
     pub(super) fn end_naming(&mut self) {
         let said = self.presets.end_naming(self.controls.settings());
         self.say(said);
@@ -71,7 +71,7 @@ impl Console {
         self.say(said);
     }
 
-    /// Brings the presets of the user back as they were before the last change.
+    /// Restores the user's presets as they were before the last change.
     pub(super) fn restore_presets(&mut self) {
         let restored = self.presets.restore();
         self.say(restored.map(|is_done| is_done.then(|| texts::PRESETS_RESTORED.to_string())));
@@ -85,7 +85,7 @@ impl Console {
         }
     }
 
-    /// Makes small pictures of the present volume in each look, and again when volume or view change much; and of the volumes of the loop.
+    /// Updates the thumbnails: of the present volume in each look when volume or view have changed much, and of the volumes of the loop.
     pub(super) fn poll_thumbnails(&mut self, now: Instant) {
         let (acted, is_drawing) = (self.activity.acted(), self.stream.is_drawing());
         let has_new = self.presets.poll(acted, is_drawing, now) | self.reel.poll(acted, is_drawing, now);

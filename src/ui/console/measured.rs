@@ -1,4 +1,4 @@
-//! What the view measures of itself: the display of times, the log, the summary at the end, and metrics in a file.
+//! Times that the view measures of itself: for the display, the log, the summary at the end, and metrics in a file.
 
 use crate::gpu::{Context, GpuError};
 use crate::live::metrics::{LiveMetrics, SourceStatus};
@@ -10,14 +10,14 @@ use std::time::{Duration, Instant};
 /// The times of the view, and when statistics are due.
 pub(super) struct Measured {
     times: Times,
-    /// When statistics were taken last.
+    /// When statistics were last collected.
     taken: Instant,
     interval: Duration,
     metrics: Option<LiveMetrics>,
 }
 
 impl Measured {
-    /// Statistics at this interval. Metrics, if there are any, are written at their own.
+    /// `interval`: that of the statistics. Metrics, if there are any, have an interval of their own.
     pub(super) fn new(interval: Duration, metrics: Option<LiveMetrics>, now: Instant) -> Measured {
         Measured { times: Times::default(), taken: now, interval, metrics }
     }
@@ -41,7 +41,7 @@ impl Measured {
         self.times.scan_out.add(time);
     }
 
-    /// True if statistics are to be taken now: once an interval.
+    /// True once an interval: statistics are to be collected.
     pub(super) fn is_due(&mut self, now: Instant) -> bool {
         let is_due = now.saturating_duration_since(self.taken) >= self.interval;
         if is_due {
@@ -50,8 +50,8 @@ impl Measured {
         is_due
     }
 
-    /// Adds the statistics of an interval. `acquisition_time`: least time to acquire a volume, s; `totals`: a line of all intervals. True if anything
-    /// came or was drawn.
+    /// Adds the statistics of an interval. `acquisition_time`: least time to acquire a volume, s; `totals`: a line about all intervals. True if
+    /// anything was received or drawn.
     pub(super) fn add(
         &mut self,
         statistics: &Statistics,
@@ -68,7 +68,7 @@ impl Measured {
         is_active
     }
 
-    /// When they are due again, while the display of times is shown and has something to say; and when metrics are.
+    /// When statistics are due, while the display of times is shown and has content, and when metrics are.
     pub(super) fn due(&self, shows_times: bool) -> impl Iterator<Item = Instant> {
         let has_pictures = self.times.pictures.newest().is_some();
         let statistics = (shows_times && has_pictures).then_some(self.taken + self.interval);
@@ -86,7 +86,7 @@ impl Measured {
         }
     }
 
-    /// Writes the metrics for the last time: the program ends in order.
+    /// Writes the metrics for the last time, at the regular end of the program.
     pub(super) fn end(&mut self, stream: &mut Stream, context: &Context) {
         let Some(mut metrics) = self.metrics.take() else { return };
         if let Ok(statistics) = stream.take_statistics() {

@@ -1,4 +1,4 @@
-//! On what the next point of a measurement is set: the picture that is shown, its volume, and the plane there.
+//! The picture, volume and plane on which the next point of a measurement is set.
 
 use super::Console;
 use crate::command::{Command, Tool};
@@ -6,7 +6,7 @@ use crate::measure::made;
 use crate::scene::Made;
 
 impl Console {
-    /// Tells the controls on what a command sets a point, if it sets one.
+    /// Tells the controls on what the point of a command is set, if the command sets one.
     pub(super) fn note_what_is_measured_on(&mut self, command: &Command) {
         let (point, on_surface) = match *command {
             Command::Point(point, on_surface) => (point, on_surface),
@@ -31,7 +31,7 @@ impl Console {
         })
     }
 
-    /// What is known of a measurement on the whole of a volume.
+    /// What is known of a measurement on a whole volume.
     pub(super) fn made_on(&self, volume: u32) -> Made {
         let kept = self.stream.cine().volumes().iter().find(|kept| kept.volume == volume);
         let time = kept.and_then(|kept| kept.frames.first()?.time).filter(|time| time.is_finite());
@@ -39,7 +39,7 @@ impl Console {
         Made { volume, time, plane: String::new(), settings: settings.unwrap_or_default() }
     }
 
-    /// The name of the recording, for results: that of its file or folder; empty for live volumes.
+    /// The recording's name for results, that of its file or folder; empty for live volumes.
     pub(super) fn recording_name(&self) -> String {
         let recording = self.fixed.origin.as_ref().and_then(|origin| origin.recording.as_ref());
         let name = recording.and_then(|path| path.file_name()).map(|name| name.to_string_lossy().into_owned());

@@ -1,4 +1,4 @@
-//! Measuring in the console: points of the rendered surface, counted voxels, typed texts, and results that leave the program.
+//! Measuring in the console: points on the rendered surface, counted voxels, typed texts, and export of results.
 
 use super::Console;
 use super::opening::ListKey;
@@ -25,7 +25,7 @@ const TEXT: Tool = Tool::Measure(MeasureKind::Text);
 const VOXEL: f64 = 0.5;
 
 impl Console {
-    /// Picks the point of the surface under a pixel of the picture, for the tool in use.
+    /// Sets a point of the tool in use on the surface under a pixel of the picture.
     pub(super) fn pick_surface(&mut self, pixel: [f64; 2]) {
         let Tool::Measure(kind) = self.controls.tool() else { return };
         match self.picked(kind, pixel) {
@@ -78,7 +78,7 @@ impl Console {
         Ok(Some(Measurement { kind, points, on_surface: true, ..Measurement::default() }))
     }
 
-    /// Begins to count the voxels of the region whose echo reaches the threshold of the mode.
+    /// Starts to count the voxels of the region whose echo reaches the threshold of the mode.
     pub(super) fn count_voxels(&mut self) {
         match self.voxels_to_count() {
             Ok(count) => match self.survey.count(count) {
@@ -118,7 +118,7 @@ impl Console {
         })
     }
 
-    /// Takes what was counted.
+    /// Takes the result of counting.
     pub(super) fn poll_counting(&mut self) {
         let Some(counted) = self.survey.poll() else { return };
         self.presentation.redraw();
@@ -158,7 +158,7 @@ impl Console {
         }
     }
 
-    /// Saves settings, recording and measurements as a workspace.
+    /// Saves settings, recording and measurements as a workspace. False if that is impossible.
     pub(super) fn save_workspace(&mut self) -> bool {
         let origin = self.fixed.origin.clone().ok_or_else(|| texts::WHY_NO_ORIGIN.to_string());
         let saved = origin.and_then(|mut origin| {
@@ -184,7 +184,7 @@ impl Console {
         is_saved
     }
 
-    /// Saves what was made by hand of a recording that is kept. False if it cannot be.
+    /// Saves the handiwork on a recording that is not shown. False if that is impossible.
     pub(super) fn save_kept(&mut self, path: PathBuf, kept: &Kept) -> bool {
         let work = kept.controls.handiwork();
         // The flags of the geometry are those of all recordings.
@@ -198,7 +198,7 @@ impl Console {
         saved.is_ok()
     }
 
-    /// Leaves what is being measured, or typed, or the tool. False if nothing is.
+    /// Discards the measurement in progress, or a text that is typed, or leaves the tool. False if there was nothing to leave.
     pub(super) fn leave_measuring(&mut self) -> bool {
         self.survey.end_distance();
         if self.controls.work().is_some() || self.controls.typing().is_some() {
@@ -216,7 +216,7 @@ impl Console {
         is_measuring
     }
 
-    /// The commands of a key that is typed into a text, ends a contour, or chooses a file or a format. None if the key is one of the view's own.
+    /// The commands of a key that is typed into a text, ends a contour, or chooses a file or format; none if the key belongs to the view.
     pub(super) fn typed(&mut self, input: &Input) -> Option<Vec<Command>> {
         let Input::Key { key, pressed: true } = *input else { return None };
         let modifiers = self.hands.modifiers();
@@ -271,7 +271,7 @@ impl Console {
         }
     }
 
-    /// Ends the contour or the line in work.
+    /// The command by which Enter ends the contour or line in progress.
     pub(super) fn what_enter_ends(&self) -> Option<Command> {
         match (self.controls.work(), self.controls.line()) {
             (Some(_), _) => Some(Command::EndMeasure),

@@ -1,5 +1,5 @@
-//! The console of the live view. It connects the stream with gestures, keys, panels and the screen. It depends on no window: inputs, the
-//! time and a screen (which may be missing) are passed in, so that everything a window can do is tested without one.
+//! The console of the live view. It connects the stream with gestures, keys, panels and the screen. It depends on no window: inputs, the time and an
+//! optional screen are passed in, so that everything is tested without one.
 
 mod activity;
 mod brushing;
@@ -70,18 +70,18 @@ use std::time::Instant;
 /// What the event loop does after an update of the console.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LoopRequest {
-    /// When to update again even if no event comes. None: wait for an event.
+    /// When to update again if no event comes; `None`: not before an event.
     pub wake_at: Option<Instant>,
     pub exit: bool,
     pub toggle_full_screen: bool,
-    /// Replace this console with a new one.
+    /// Whether this console is to be replaced by a new one.
     pub restart: bool,
 }
 
 /// Why the console cannot continue by itself.
 #[derive(Debug, thiserror::Error)]
 pub enum ConsoleError {
-    /// [`Console::revive`] continues on another device.
+    /// The device is lost; [`Console::revive`] continues on another one.
     #[error("{0}")]
     DeviceLost(GpuError),
     /// The screen is lost; [`Console::set_screen`] continues on another one.
@@ -89,7 +89,7 @@ pub enum ConsoleError {
     Screen(GpuError),
 }
 
-/// The live view without its window: the owner of its parts, none of which knows another. What a part needs of another is passed to it here.
+/// The live view without its window. It owns the parts, none of which knows another, and passes between them what they need.
 pub struct Console {
     // Fields are dropped in this order: the screen, which is in the first, before the stream whose pictures it shows.
     presentation: Presentation,
@@ -126,16 +126,16 @@ struct Fixed {
     overlay: bool,
     exit: Option<Chord>,
     is_kiosk: bool,
-    /// What a workspace keeps of the source.
+    /// What a workspace stores of the source.
     origin: Option<Origin>,
     plays_once: bool,
-    /// Panels have small pictures of looks and volumes.
+    /// Whether the panels have thumbnails of looks and volumes.
     small_pictures: bool,
     /// Most volumes of the cine loop.
     cine_volumes: usize,
-    /// The settings are those with which the recording was left.
+    /// Whether the settings are those with which the recording was left.
     is_kept: bool,
-    /// It came in place of another one.
+    /// Whether this console replaced another one.
     follows_another: bool,
 }
 
@@ -233,7 +233,7 @@ impl Console {
         console
     }
 
-    /// Why the picture is not drawn with the shaders as they are in their folder now.
+    /// Why the picture is not drawn with the present shaders of their folder.
     pub fn shader_fault(&self) -> Option<&str> {
         self.faults.of_shaders()
     }
@@ -244,13 +244,12 @@ impl Console {
         self.panels.reset();
     }
 
-    /// Ends the console and returns its screen for another one.
+    /// Ends the console and returns its screen for the next one.
     pub(super) fn into_screen(mut self) -> Option<Screen> {
         self.presentation.screen.take()
     }
 
-    /// Continues on another device, or on the same one opened again. The cine loop is kept; the live picture continues with the next
-    /// volume.
+    /// Continues on another device, or on the same one opened again. The cine loop is kept; the live picture continues with the next volume.
     ///
     /// # Errors
     /// The device cannot hold what is shown.
@@ -269,7 +268,7 @@ impl Console {
         revived
     }
 
-    /// Shows for a while that the device did not finish and was opened again.
+    /// Shows for a while that the device hung and was opened again.
     pub(crate) fn show_stall(&mut self, now: Instant) {
         self.faults.show_stall(now);
         self.presentation.redraw();
@@ -282,7 +281,7 @@ impl Console {
         }
     }
 
-    /// Draws the window again: its content was lost.
+    /// Redraws the window, whose content was lost.
     pub fn redraw(&mut self) {
         self.presentation.content_lost();
     }
@@ -298,7 +297,7 @@ impl Console {
         Room::of(self.presentation.size(), self.panels.scale(), self.visible.panels)
     }
 
-    /// Describes the panels to a screen reader from now on, or no longer.
+    /// Sets whether the panels are described to a screen reader.
     pub fn describe(&mut self, is_described: bool) {
         self.panels.describe(is_described && self.fixed.overlay);
         _ = self.presentation.take_tree();
@@ -310,19 +309,19 @@ impl Console {
         self.panels.is_described()
     }
 
-    /// What a screen reader says of the panels, if they were laid out since the last call.
+    /// The tree of the panels for a screen reader, if they were laid out since the last call.
     pub fn take_tree(&mut self) -> Option<TreeUpdate> {
         self.presentation.take_tree()
     }
 
-    /// Does what a screen reader asks of a control.
+    /// Performs a screen reader's request for a control.
     pub fn act(&mut self, request: ActionRequest) {
         self.user_acts(Instant::now());
         self.panels.act(request);
         self.presentation.redraw();
     }
 
-    /// Sets where to draw a pointer, pixels, if no windowing system draws one.
+    /// Sets the position of a pointer to draw, pixels, where no windowing system draws one.
     pub(super) fn set_pointer(&mut self, at: Option<[f64; 2]>) {
         self.presentation.set_pointer(at);
     }
@@ -349,7 +348,7 @@ impl Console {
         self.presentation.screen.as_ref()
     }
 
-    /// What the last settings that were sent to the stream leave out.
+    /// The quality of the last settings that were sent to the stream.
     pub fn quality(&self) -> Quality {
         self.quality.now()
     }

@@ -1,5 +1,5 @@
-//! Opening recordings and workspaces while the view runs, from a list, by dropping files, or from those that are open already: what is shown stays
-//! until the next one is open, and is kept as it was left.
+//! Opens recordings and workspaces while the view runs: from a list, by dropping files, or from the open recordings. The present one stays until the
+//! next is open, and its state is kept.
 
 use super::options::{OpenFile, Opened, OpeningOptions};
 use crate::controls::Handiwork;
@@ -20,35 +20,35 @@ const SHOWN_AFTER: Duration = Duration::from_millis(200);
 /// How often it is looked at how far it is.
 const LOOK_INTERVAL: Duration = Duration::from_millis(100);
 
-/// What can be opened, and what is being opened.
+/// The files that can be opened, and the one that is being opened.
 pub(super) struct Opening {
     open: Option<OpenFile>,
     recent: Option<PathBuf>,
     wake: Wake,
     recordings: OpenRecordings,
-    /// The file that is being read, in place of which the present one is still shown.
+    /// The file that is being read while the present one is still shown.
     file: Option<BeingRead>,
-    /// Files that were dropped on the window since the last update.
+    /// Files dropped on the window since the last update.
     dropped: Vec<PathBuf>,
-    /// The list while it is shown.
+    /// The list, while it is shown.
     list: Option<List>,
-    /// The source of this console, while it is being opened.
+    /// Progress of opening this console's own source.
     source: Progress,
-    /// What the window said last of what is being read.
+    /// What the window last showed of the file being read.
     told: Option<Reading>,
 }
 
-/// A file that is read in the background.
+/// A file that is being read in the background.
 pub(super) struct BeingRead {
     path: PathBuf,
     progress: Progress,
     opened: Receiver<Result<Opened, String>>,
     since: Instant,
-    /// It was not in the list of recordings before.
+    /// Whether it was not in the list of recordings before.
     is_new: bool,
-    /// The recording that is shown is closed for it.
+    /// Whether the shown recording is closed for it.
     closes: bool,
-    /// What was opened goes on to be read.
+    /// Whether it was opened, and its volume is still being read.
     is_opened: bool,
 }
 
@@ -70,25 +70,25 @@ impl Drop for Opening {
 
 struct List {
     folder: String,
-    /// So many of the entries are the recent files, which come first.
+    /// Number of recent files, which are the first entries.
     recent: usize,
     entries: Vec<(Kind, PathBuf)>,
     names: Vec<String>,
-    /// The path that is being typed, and why it was not taken.
+    /// The path that is being typed, and why it was rejected.
     typed: Option<(String, Option<String>)>,
 }
 
 /// Longest path that is typed, characters.
 const MAX_TYPED: usize = 1000;
 
-/// What a key does while the list is shown.
+/// The effect of a key while the list is shown.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum ListKey {
     /// Chooses the n-th entry.
     Entry(usize),
     /// Opens a file.
     Open(PathBuf),
-    /// It was typed, or does nothing.
+    /// Nothing else: the key was typed into the path, or has no effect.
     Taken,
 }
 
@@ -115,12 +115,12 @@ impl Opening {
         self.list.as_ref().is_some_and(|list| list.typed.is_some())
     }
 
-    /// Takes the path back that is being typed. False if none is.
+    /// Removes the path that is being typed. False if there is none.
     pub(super) fn stop_typing(&mut self) -> bool {
         self.list.as_mut().is_some_and(|list| list.typed.take().is_some())
     }
 
-    /// Takes a key while the list is shown; none for Escape. `is_upper`: Shift is held.
+    /// Handles a key while the list is shown; none for Escape. `is_upper`: Shift is held.
     pub(super) fn key(&mut self, key: Key, is_upper: bool) -> Option<ListKey> {
         let list = self.list.as_mut()?;
         // A keyboard without a windowing system tells its keys, not their signs.
@@ -173,7 +173,7 @@ impl Opening {
         self.recordings().list()
     }
 
-    /// What is being read, as the window says it.
+    /// The file being read, as the window shows it.
     pub(super) fn told(&self) -> Option<&Reading> {
         self.told.as_ref()
     }
@@ -182,7 +182,7 @@ impl Opening {
         self.recordings.lock().unwrap_or_else(|e| e.into_inner())
     }
 
-    /// Puts a file first on the list of recent files, if one is kept.
+    /// Puts a file at the top of the recent files, if they are stored.
     pub(super) fn remember(&self, file: &Path) {
         self.recent.iter().filter(|_| file.exists()).for_each(|list| open_list::remember(list, file));
     }
@@ -207,12 +207,12 @@ impl Opening {
         List { folder: folder.display().to_string(), recent: count, entries, names, typed: None }
     }
 
-    /// True if other files can be opened.
+    /// True if files can be opened.
     pub(super) fn is_offered(&self) -> bool {
         self.open.is_some()
     }
 
-    /// Shows the list of a folder, with the recent files first.
+    /// Shows the list for a folder, with the recent files first.
     pub(super) fn show_list(&mut self, folder: &Path) {
         self.list = Some(self.list(folder, true));
     }
@@ -222,7 +222,7 @@ impl Opening {
         self.list.take().is_some()
     }
 
-    /// Takes the n-th entry of the list: a file, which is returned to be opened, or a folder, whose list is shown then.
+    /// Chooses the n-th entry of the list. A file is returned to be opened; a folder is listed.
     pub(super) fn choose(&mut self, n: usize) -> Option<PathBuf> {
         let (kind, path) = self.list.as_ref()?.entries.get(n)?.clone();
         let is_folder = matches!(kind, Kind::Folder | Kind::FolderAbove);
@@ -230,7 +230,7 @@ impl Opening {
         (!is_folder).then_some(path)
     }
 
-    /// Takes a file that was dropped on the window.
+    /// Records a file that was dropped on the window.
     pub(super) fn drop_file(&mut self, path: &Path) {
         self.dropped.push(path.to_path_buf());
     }
@@ -240,7 +240,7 @@ impl Opening {
         std::mem::take(&mut self.dropped)
     }
 
-    /// Puts recordings on the list of those that are open. False if there is no room for all.
+    /// Adds recordings to the list of open ones. False if there is no room for all.
     pub(super) fn add(&self, paths: &[PathBuf]) -> bool {
         let mut list = self.recordings();
         paths.iter().filter(|path| !list.add(path)).count() == 0
@@ -250,8 +250,7 @@ impl Opening {
         self.file.is_some()
     }
 
-    /// Reads a file in the background, in place of another one that is being read, which stays in the list. `closes`: the recording that is shown is
-    /// closed for it.
+    /// Reads a file in the background, instead of the one being read, which stays in the list. `closes`: the shown recording is closed for it.
     ///
     /// # Errors
     /// One line: no other files can be opened, too many are, or no thread can be started.
@@ -293,7 +292,7 @@ impl Opening {
         }
     }
 
-    /// Ends the reading of a file. Its name, if one was being read.
+    /// Stops reading a file and returns its name, if one was being read.
     pub(super) fn end_reading(&mut self) -> Option<String> {
         let file = self.file.take()?;
         let name = self.recordings().name(&file.path);
@@ -301,27 +300,27 @@ impl Opening {
         Some(name)
     }
 
-    /// The source of the console is wanted no longer.
+    /// Cancels opening the console's own source.
     pub(super) fn cancel_source(&self) {
         self.source.cancel();
     }
 
-    /// The n-th of the recordings that are open, and whether it is the one that is shown.
+    /// The n-th open recording, and whether it is shown.
     pub(super) fn recording(&self, n: usize) -> Option<(PathBuf, bool)> {
         let list = self.recordings();
         let path = list.path(n)?;
         Some((path.to_path_buf(), Some(path) == list.shown()))
     }
 
-    /// The recording so many places further than the one that is shown, or on its way to be. None if there is no other one.
+    /// The index of the recording so many positions after the shown or next one; none if there is no other.
     pub(super) fn further(&self, by: i32) -> Option<usize> {
         let list = self.recordings();
         let from = self.file.as_ref().map(|file| file.path.as_path()).or(list.shown())?;
         list.index(list.step(from, by)?).filter(|_| list.list().len() > 1)
     }
 
-    /// Closes the n-th recording, or the one that is shown if that is more than there can be. The name of one that is closed now; of the one that is shown,
-    /// which one comes in its place: the next, or else the one before. None if there is no such one.
+    /// Closes the n-th recording, or the shown one if there is no n-th. Returns the name of one that is closed now. For the shown one it returns the
+    /// recording to show instead: the next one, or else the previous one. None if there is no such recording.
     pub(super) fn close(&mut self, n: usize) -> Option<Result<String, Option<PathBuf>>> {
         let list = self.named();
         let shown = list.iter().position(|named| named.is_shown);
@@ -342,8 +341,7 @@ impl Opening {
         Some(Ok(name))
     }
 
-    /// The recording that [`Opening::close`] would close in place of another one: its name, its path, and what is kept of it if that is not saved; that
-    /// it is shown, if it is. None if it would close none.
+    /// The name and path of the recording that [`Opening::close`] would close, with whether it is shown; none if that would close none.
     pub(super) fn to_close(&self, n: usize) -> Option<(String, PathBuf, bool)> {
         let list = self.named();
         let shown = list.iter().position(|named| named.is_shown);
@@ -353,19 +351,19 @@ impl Opening {
         Some((list.get(n)?.name.clone(), path, shown == Some(n)))
     }
 
-    /// The recordings that are not shown of which something made by hand is in no file, with what is kept of them.
+    /// The recordings in the background with unsaved handiwork, and their kept state.
     pub(super) fn unsaved(&self) -> Vec<(PathBuf, Kept)> {
         let recordings = self.recordings();
         let of = |n: usize| Some((recordings.path(n)?.to_path_buf(), recordings.unsaved(n)?.clone()));
         (0..MAX_OPEN).filter_map(of).collect()
     }
 
-    /// What was made of this recording is in a file.
+    /// Records that this handiwork on a recording is saved.
     pub(super) fn saved(&self, path: &Path, work: Handiwork) {
         self.recordings().saved(path, work);
     }
 
-    /// The file that was opened since the last call, which is to be shown.
+    /// The file that was opened since the last call and is to be shown.
     ///
     /// # Errors
     /// One line: why it was not. It is read no longer.
@@ -386,13 +384,12 @@ impl Opening {
         Some(Err(fault))
     }
 
-    /// The next console shows this file. `kept`: of the recording that is shown now.
+    /// Makes the next console show this file. `kept`: state of the recording that is shown now.
     pub(super) fn show(&self, file: &BeingRead, kept: Option<Kept>, display: Display) {
         self.recordings().show(&file.path, kept, file.closes, display);
     }
 
-    /// Looks how far what is being read is. `source_since`: when the source of the console began to be opened, while it is. True if the window says
-    /// something else then.
+    /// Polls the progress of reading. `source_since`: when opening the console's own source began, while it lasts. True if the window's text changes.
     pub(super) fn look(&mut self, source_since: Option<Instant>, now: Instant) -> bool {
         let told = self.being_read(source_since, now);
         let is_other = told != self.told;
@@ -420,7 +417,7 @@ impl Opening {
         Some(Reading { name, share, text })
     }
 
-    /// When it is to be looked at what is being read. `reads_source`: the source of the console is being opened.
+    /// When the progress of reading is to be polled. `reads_source`: the console's own source is being opened.
     pub(super) fn due(&self, reads_source: bool, now: Instant) -> Option<Instant> {
         (self.is_reading() || reads_source).then_some(now + LOOK_INTERVAL)
     }

@@ -13,11 +13,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// What a console is created with.
+/// The options with which a console is created.
 pub struct ConsoleOptions {
     pub settings: Settings,
-    /// Of the stream: what was chosen of the settings, volume images, queues, time stamps, the cine loop, and shaders, whose folder is watched. The console sets
-    /// what follows from its window.
+    /// Options of the stream: chosen settings, volume images, queues, time stamps, cine loop, and the watched folder of shaders. The console sets
+    /// what depends on its window.
     pub stream: StreamOptions,
     /// Interval of the statistics in the log and in the display of times.
     pub statistics_interval: Duration,
@@ -25,7 +25,7 @@ pub struct ConsoleOptions {
     pub budget: Option<Duration>,
     /// The quality ladder, from full quality down.
     pub rungs: Vec<Rung>,
-    /// How long to wait before a source that ended is opened again. None: the end of the source is final.
+    /// Time before a source that ended is opened again; `None`: the end of the source is final.
     pub retry: Option<Duration>,
     /// Where the frames come from, for messages.
     pub source: SourceKind,
@@ -35,21 +35,21 @@ pub struct ConsoleOptions {
     pub prometheus: Option<PathBuf>,
     /// The folder for saved pictures and loops.
     pub folder: PathBuf,
-    /// Draws panels, notes and marks over the picture.
+    /// Whether panels, notes and marks are drawn over the picture.
     pub overlay: bool,
-    /// Shows sliders and buttons at the start.
+    /// Whether sliders and buttons are shown at the start.
     pub panels: bool,
     /// Pixels per point.
     pub scale: f32,
     /// The keys that end a kiosk, if any.
     pub exit: Option<Chord>,
     pub is_kiosk: bool,
-    /// What a workspace keeps of the source. None: it cannot be saved.
+    /// What a workspace stores of the source; `None`: no workspace can be saved.
     pub origin: Option<Origin>,
-    /// The volumes of the source are numbered as in its recording.
+    /// Whether the volumes of the source are numbered as in its recording.
     pub plays_once: bool,
     pub opening: OpeningOptions,
-    /// The file that keeps that the hints of the first start were shown. None: they are not to be shown.
+    /// The file that records that the hints of the first start were shown; `None`: they are never shown.
     pub first_steps: Option<PathBuf>,
     /// The file with the presets of the user.
     pub presets: Option<PathBuf>,
@@ -57,9 +57,9 @@ pub struct ConsoleOptions {
     pub wake: Wake,
     /// A fault that prevents the view: only its message is shown.
     pub startup_fault: Option<StartupFault>,
-    /// Compiles the pipelines of every mode, layout and preset in advance while the user rests.
+    /// Whether the pipelines of every mode, layout and preset are compiled in advance while the user rests.
     pub warms: bool,
-    /// While the user rests, makes small pictures of looks and of the volumes of the loop for the panels. A kiosk makes none.
+    /// Whether thumbnails of looks and of the loop's volumes are made while the user rests. A kiosk makes none.
     pub small_pictures: bool,
 }
 
@@ -95,24 +95,23 @@ impl Default for ConsoleOptions {
     }
 }
 
-/// What else can be opened than the source of the console.
+/// The files that can be opened besides the console's own source.
 #[derive(Clone, Default)]
 pub struct OpeningOptions {
-    /// How another recording or workspace is opened. None: none is.
+    /// Opens another recording or workspace; `None`: none can be opened.
     pub open_file: Option<OpenFile>,
-    /// The recordings that are open, of which one is shown.
+    /// The open recordings, one of which is shown.
     pub recordings: OpenRecordings,
-    /// How far the source of the console is read while it is being opened.
+    /// Progress of opening the console's own source.
     pub progress: Progress,
     /// The file with the list of recent files.
     pub recent: Option<PathBuf>,
 }
 
-/// Opens a recording or a workspace, or returns the reason in one line. It may take long; how far it is is in the progress, by which it can be
-/// ended.
+/// Opens a recording or a workspace, or returns the reason in one line. It may take long; [`Progress`] reports how far it is and can cancel it.
 pub type OpenFile = Arc<dyn Fn(&Path, &Progress) -> Result<Opened, String> + Send + Sync>;
 
-/// What was opened. Called when the console asks to be replaced: the next one shows it. Dropped, nothing changes.
+/// An opened file. Called when the console asks to be replaced: the next one shows the file. Nothing changes if it is dropped.
 pub type Opened = Box<dyn FnOnce() + Send>;
 
 /// A fault that prevents the view, such as a wrong configuration, and how to find out that it is resolved.

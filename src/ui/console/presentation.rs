@@ -1,4 +1,4 @@
-//! The window: what of it is out of date, and when it is presented again. Nothing is presented unless something changed.
+//! What of the window is out of date, and when it is presented again. Nothing is presented unless something changed.
 
 use crate::gpu::window::Screen;
 use crate::panels::accesskit::TreeUpdate;
@@ -18,53 +18,53 @@ const BLANK_INTERVAL: Duration = Duration::from_millis(20);
 /// Panels that want to be drawn again later than this are not.
 const LATEST_REPAINT: Duration = Duration::from_secs(3600);
 
-/// How far the picture is when the window is to be presented.
+/// The state of the picture when the window is to be presented.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct PictureState {
-    /// There is one of the present volume.
+    /// Whether there is a picture of the present volume.
     pub(super) has_drawn: bool,
-    /// One is being drawn.
+    /// Whether a picture is being drawn.
     pub(super) is_drawing: bool,
-    /// Time since that was begun.
+    /// Time since that picture was begun.
     pub(super) drawn_for: Option<Duration>,
-    /// Panels can be drawn while a picture is.
+    /// Whether panels can be drawn while a picture is.
     pub(super) is_paced: bool,
-    /// Nothing is to be drawn.
+    /// Whether there is nothing to draw.
     pub(super) is_idle: bool,
-    /// One was drawn in full: the start is over.
+    /// Whether a picture was drawn in full, which ends the start.
     pub(super) has_started: bool,
 }
 
 /// The window and what of it is out of date.
 pub(super) struct Presentation {
     pub(super) screen: Option<Screen>,
-    /// Pixels.
+    /// Size of the window, pixels.
     size: [u32; 2],
     is_full_screen: bool,
-    /// Something besides the picture changed.
+    /// Whether something besides the picture changed.
     needs_redraw: bool,
-    /// A picture was drawn that has not been shown.
+    /// Whether a picture was drawn that is not shown yet.
     has_new_picture: bool,
     /// The last picture that was drawn: the device's image holds it until the next one begins.
     drawn: Option<Arc<ShownPicture>>,
-    /// The last one that was shown: the screen has a copy of it while the next one is drawn.
+    /// The last picture that was shown: the screen has a copy of it while the next one is drawn.
     shown: Option<Arc<ShownPicture>>,
     /// Since when there is no picture to show.
     blank_since: Option<Instant>,
     /// When the panels want to be drawn again.
     repaint_at: Option<Instant>,
-    /// There was no surface to present to; do not try again before this time.
+    /// Time of the next attempt after there was no surface to present to.
     retry_at: Option<Instant>,
     /// Number of presentations of the panels while a picture was being drawn.
     shown_between: u64,
     /// Where to draw the pointer, pixels of the window.
     pointer: Option<[f64; 2]>,
-    /// What a screen reader says of the panels, since they were laid out last.
+    /// The tree of the panels for a screen reader, since they were last laid out.
     tree: Option<TreeUpdate>,
 }
 
 impl Presentation {
-    /// A window of this size, pixels, that has no screen yet.
+    /// A window of this size, pixels, without a screen.
     pub(super) fn new(size: [u32; 2]) -> Presentation {
         Presentation {
             screen: None,
@@ -93,7 +93,7 @@ impl Presentation {
         self.redraw();
     }
 
-    /// Sets the size, pixels; 0 while the window is minimised. False if it stays.
+    /// Sets the size, pixels; 0 while the window is minimised. False if it did not change.
     pub(super) fn resize(&mut self, size: [u32; 2]) -> bool {
         if let Some(screen) = &mut self.screen {
             screen.resize(size);
@@ -105,12 +105,12 @@ impl Presentation {
         is_open
     }
 
-    /// Pixels.
+    /// Size of the window, pixels.
     pub(super) fn size(&self) -> [u32; 2] {
         self.size
     }
 
-    /// True if it fills the screen and can leave it.
+    /// True if the window fills the screen and can leave that state.
     pub(super) fn is_full_screen(&self) -> bool {
         self.is_full_screen
     }
@@ -124,39 +124,39 @@ impl Presentation {
         [self.screen.as_ref().map_or(0, |screen| screen.shown()), self.shown_between]
     }
 
-    /// Something besides the picture changed.
+    /// Records that something besides the picture changed.
     pub(super) fn redraw(&mut self) {
         self.needs_redraw = true;
     }
 
-    /// The same, if it did.
+    /// Like [`Presentation::redraw`], if something changed.
     pub(super) fn redraw_if(&mut self, has_changed: bool) {
         self.needs_redraw |= has_changed;
     }
 
-    /// The content of the window was lost, or there is a surface again.
+    /// Records that the content of the window was lost, or that there is a surface again.
     pub(super) fn content_lost(&mut self) {
         (self.needs_redraw, self.retry_at) = (true, None);
     }
 
-    /// A picture was drawn.
+    /// Records that a picture was drawn.
     pub(super) fn picture_finished(&mut self, picture: ShownPicture) {
         self.drawn = Some(Arc::new(picture));
         self.has_new_picture = true;
     }
 
-    /// The picture that the window shows; before the first, and without one, the last that it showed.
+    /// The picture that the window shows; while it shows none, the last one that it showed.
     pub(super) fn shown(&self) -> Option<&ShownPicture> {
         self.shown.as_deref()
     }
 
-    /// The picture that is shown if the window is presented now.
+    /// The picture that the window would show if it were presented now.
     pub(super) fn content(&self, picture: &PictureState) -> Option<Arc<ShownPicture>> {
         let latest = if picture.is_drawing { &self.shown } else { &self.drawn };
         latest.clone().filter(|_| picture.has_drawn)
     }
 
-    /// Where to draw the pointer, pixels of the window, if no windowing system draws one.
+    /// Sets where to draw the pointer, pixels of the window, where no windowing system draws one.
     pub(super) fn set_pointer(&mut self, at: Option<[f64; 2]>) {
         self.needs_redraw |= self.pointer != at;
         self.pointer = at;
@@ -166,18 +166,18 @@ impl Presentation {
         self.pointer
     }
 
-    /// What a screen reader says of the panels, if they were laid out since the last call.
+    /// The tree of the panels for a screen reader, if they were laid out since the last call.
     pub(super) fn take_tree(&mut self) -> Option<TreeUpdate> {
         self.tree.take()
     }
 
-    /// The panels were laid out: what a screen reader says of them, and after which time they want to be laid out again.
+    /// Records a layout of the panels: their tree for a screen reader, and the time after which they want to be laid out again.
     pub(super) fn laid_out(&mut self, tree: Option<TreeUpdate>, repaint_after: Duration, now: Instant) {
         self.repaint_at = (repaint_after < LATEST_REPAINT).then(|| now + repaint_after);
         self.tree = tree.or(self.tree.take());
     }
 
-    /// The panels are drawn again if they wanted that by now.
+    /// Marks the panels for drawing if they wanted it by now.
     pub(super) fn repaint(&mut self, now: Instant) {
         self.needs_redraw |= self.repaint_at.is_some_and(|at| at <= now);
     }
@@ -204,36 +204,36 @@ impl Presentation {
         true
     }
 
-    /// The old content stays: there is nothing to draw over it.
+    /// Keeps the old content, as there is nothing to draw over it.
     pub(super) fn keep_content(&mut self) {
         self.needs_redraw = false;
     }
 
-    /// The window shows this picture, if any, and the panels show what there is. `has_more`: inputs for them remain.
+    /// Records that the window shows this picture, if any, and that the panels are up to date. `has_more`: inputs for the panels remain.
     pub(super) fn up_to_date(&mut self, content: Option<Arc<ShownPicture>>, has_more: bool) {
         (self.has_new_picture, self.needs_redraw) = (false, has_more);
         self.shown = content.or(self.shown.take());
     }
 
-    /// The window was presented with this picture. `is_between`: while another one was being drawn.
+    /// Records that the window was presented with this picture. `is_between`: while another one was being drawn.
     pub(super) fn presented(&mut self, content: Option<Arc<ShownPicture>>, is_between: bool, has_more: bool) {
         self.up_to_date(content, has_more);
         self.shown_between += u64::from(is_between);
         self.retry_at = None;
     }
 
-    /// There is no surface to present to.
+    /// Records that there is no surface to present to.
     pub(super) fn not_presentable(&mut self, now: Instant) {
         self.retry_at = Some(now + PRESENT_RETRY);
     }
 
-    /// True if something is to be presented, and can be.
+    /// True if something is to be presented and can be.
     pub(super) fn waits(&self) -> bool {
         let can_present = self.screen.is_some() && self.blank_since.is_none() && self.retry_at.is_none();
         self.needs_redraw && can_present
     }
 
-    /// When to look at it again.
+    /// When the window is to be looked at again.
     pub(super) fn due(&self, now: Instant) -> impl Iterator<Item = Instant> {
         [self.retry_at, self.repaint_at, self.blank_since.map(|_| now + BLANK_INTERVAL)].into_iter().flatten()
     }

@@ -1,4 +1,4 @@
-//! The list of presets: built-in ones as they look with the present volume, and those of the user, which are saved, renamed and deleted here.
+//! The list of presets: built-in ones with thumbnails of the present volume, and the user's, which are saved, renamed and deleted here.
 
 use crate::command::Command;
 use crate::controls::{Controls, EXAMS};
@@ -16,9 +16,9 @@ use std::time::{Duration, Instant};
 
 /// Least time between two rounds of thumbnails of volumes that go on coming.
 const LIVE_INTERVAL: Duration = Duration::from_secs(5);
-/// How long after an input thumbnails are made.
+/// Time after an input before thumbnails of the shown list are made.
 pub(super) const REST: Duration = Duration::from_millis(300);
-/// The same of those that nobody asked for.
+/// Time after an input before thumbnails are made that nobody asked for.
 pub(super) const LONG_REST: Duration = Duration::from_secs(2);
 /// The view changed much: it turned by so many degrees, or zoom or an edge of the region changed by this share.
 const MUCH_DEGREES: f64 = 15.0;
@@ -26,25 +26,25 @@ const MUCH: f64 = 0.1;
 
 /// The list while it is shown, and the presets of the user.
 pub(super) struct Presets {
-    /// The presets of the user. None: there are none.
+    /// The file with the user's presets; `None`: there are none.
     file: Option<PathBuf>,
     is_shown: bool,
     own: Vec<UserPreset>,
-    /// Why they cannot be read.
+    /// Why the user's presets cannot be read.
     fault: Option<String>,
     naming: Option<Naming>,
-    /// Those of the user before the last change.
+    /// The user's presets before the last change.
     before: Option<Vec<UserPreset>>,
     keeps_pictures: bool,
     thumbnails: Thumbnails,
-    /// What the thumbnails were made of.
+    /// The volume and view of the thumbnails.
     made_of: Option<MadeOf>,
 }
 
 /// A name that is being typed.
 struct Naming {
     text: String,
-    /// The name of the preset that is renamed; none: a new one.
+    /// The name of the preset that is renamed; `None`: a new preset.
     of: Option<String>,
 }
 
@@ -56,7 +56,7 @@ struct MadeOf {
 }
 
 impl Presets {
-    /// `keeps_pictures`: the inspector shows them, too.
+    /// `keeps_pictures`: the inspector shows the thumbnails, too.
     pub(super) fn new(file: Option<PathBuf>, keeps_pictures: bool, wake: Wake) -> Presets {
         let mut presets = Presets {
             keeps_pictures,
@@ -83,7 +83,7 @@ impl Presets {
         self.naming.is_some()
     }
 
-    /// The thumbnails are made again: their device is gone.
+    /// Discards the thumbnails, whose device is lost.
     pub(super) fn device_lost(&mut self) {
         self.thumbnails.stop();
         self.made_of = None;
@@ -105,7 +105,7 @@ impl Presets {
         };
     }
 
-    /// What the panels show of the list.
+    /// The list for the panels, while it is shown.
     pub(super) fn shown(&self) -> Option<PresetsShown<'_>> {
         self.is_shown.then(|| PresetsShown {
             tiles: self.tiles(),
@@ -116,7 +116,7 @@ impl Presets {
         })
     }
 
-    /// Every preset, with its picture as far as it is made.
+    /// All presets, with their thumbnails if they are made.
     pub(super) fn tiles(&self) -> Vec<PresetTile<'_>> {
         let pictures = self.thumbnails.pictures();
         let picture = |n: usize| pictures.get(n).cloned().flatten();
@@ -135,7 +135,7 @@ impl Presets {
         built_in.chain(own).collect()
     }
 
-    /// Shows the list, or closes it. The fault, if those of the user cannot be read.
+    /// Shows or closes the list. Returns the fault if the user's presets cannot be read.
     pub(super) fn toggle(&mut self) -> Option<&str> {
         if self.is_shown {
             self.close();
@@ -146,12 +146,13 @@ impl Presets {
         self.fault.as_deref()
     }
 
-    /// Number of presets, built-in ones and those of the user.
+    /// Number of built-in presets and the user's together.
     pub(super) fn count(&self) -> usize {
         EXAMS.len() + self.own.len()
     }
 
-    /// The settings of the n-th preset with what `controls` have besides; `is_phantom`: the built-in ones suit the phantom then.
+    /// The settings of the n-th preset, with everything in `controls` that a preset leaves alone. `is_phantom`: built-in presets are framed for the
+    /// phantom.
     ///
     /// # Errors
     /// One line: there is no such preset, or the volume cannot be drawn so.
@@ -169,7 +170,7 @@ impl Presets {
         controls.with_look(&own.look()?, scene).map_err(str::to_string)
     }
 
-    /// Begins to type a name: of a new preset, or of the n-th of the user. False if there is nothing to name.
+    /// Starts to type a name: of a new preset, or of the user's n-th. False if there is nothing to name.
     ///
     /// # Errors
     /// One line: the user has as many as there can be.
@@ -189,7 +190,7 @@ impl Presets {
         Ok(true)
     }
 
-    /// Keeps the name that was typed: these settings under it, or another name of a preset. What is said of it; none if no name is typed.
+    /// Saves under the typed name: these settings, or a renamed preset. Returns a message; none if no name is typed.
     ///
     /// # Errors
     /// One line: it cannot be kept. The name can be corrected.
@@ -239,7 +240,7 @@ impl Presets {
         Ok(())
     }
 
-    /// Deletes the n-th preset of the user. What is said of it; none if there is no such one.
+    /// Deletes the user's n-th preset. Returns a message; none if there is no such preset.
     ///
     /// # Errors
     /// One line: that cannot be written.
@@ -252,7 +253,7 @@ impl Presets {
         Ok(Some(texts::preset_is_deleted(name)))
     }
 
-    /// Brings the presets of the user back as they were before the last change. False if there was none.
+    /// Restores the user's presets as they were before the last change. False if there was none.
     ///
     /// # Errors
     /// One line: another window changed them since, or they cannot be written.
@@ -268,7 +269,7 @@ impl Presets {
         Ok(true)
     }
 
-    /// Leaves the name that is being typed, or the list. False if the list is not shown.
+    /// Discards the name that is typed or, if there is none, closes the list. False if the list is not shown.
     pub(super) fn leave(&mut self) -> bool {
         if self.naming.take().is_none() && self.is_shown {
             self.close();
@@ -277,7 +278,7 @@ impl Presets {
         self.is_shown
     }
 
-    /// What a key does in the list; none for Escape. `is_upper`: a letter is a capital one.
+    /// The commands of a key in the list; none for Escape. `is_upper`: the letter is a capital.
     pub(super) fn key(&mut self, key: Key, is_upper: bool) -> Option<Vec<Command>> {
         let Some(naming) = &mut self.naming else {
             return match key {
@@ -306,18 +307,18 @@ impl Presets {
         Some(Vec::new())
     }
 
-    /// The small pictures; none while the list is not shown.
+    /// The thumbnails; none while the list is not shown.
     pub(super) fn thumbnails(&self) -> &[Option<Arc<Picture>>] {
         self.thumbnails.pictures()
     }
 
-    /// Goes on with the thumbnails; `acted`: when the user acted last. True if there are new ones.
+    /// Takes finished thumbnails; `acted`: time of the user's last action. True if there are new ones.
     pub(super) fn poll(&mut self, acted: Instant, is_drawing: bool, now: Instant) -> bool {
         self.thumbnails.poll(now >= acted + REST && !is_drawing)
     }
 
-    /// True if thumbnails are to be made: of another volume, another view, or other presets. In the list those of volumes that go on coming are made more
-    /// rarely than those of one that `rests`; in the inspector those of a first volume and of one that rests alone, after a longer rest.
+    /// True if thumbnails are to be made: of another volume, another view, or other presets. The shown list has them made less often for arriving
+    /// volumes than for one that `rests`; the inspector has them made for the first volume and for one that rests, after a longer pause.
     pub(super) fn wants_thumbnails(
         &self,
         (volume, settings): (u32, &Settings),
@@ -337,13 +338,13 @@ impl Presets {
         })
     }
 
-    /// Begins to make thumbnails of a volume.
+    /// Starts to make thumbnails of a volume.
     pub(super) fn make_thumbnails(&mut self, job: Job, volume: u32, settings: &Settings, now: Instant) {
         self.made_of = Some(MadeOf { volume, settings: settings.clone(), own: self.own.clone(), at: now });
         self.thumbnails.begin(job);
     }
 
-    /// When thumbnails are looked at again, while the list is shown.
+    /// When thumbnails are to be looked at again, while the list is shown.
     pub(super) fn due(&self, acted: Instant, now: Instant) -> Option<Instant> {
         let at = if self.thumbnails.is_working() { Duration::from_millis(50) } else { REST };
         let is_waiting = self.thumbnails.is_working() || (self.is_shown && self.made_of.is_none());

@@ -1,4 +1,4 @@
-//! The quality of the next picture: what is left out of it while the view moves, and the pipelines of that, compiled in advance.
+//! The quality of the next picture: what it leaves out while the view moves, and the pipelines of the lower qualities, compiled in advance.
 
 use crate::command::Tool;
 use crate::controls::Controls;
@@ -12,23 +12,23 @@ use std::time::{Duration, Instant};
 /// How long after the last input pipelines that may be needed next are compiled.
 const REST_BEFORE_WARMING: Duration = Duration::from_secs(1);
 
-/// What the pictures leave out, and the settings that the stream has.
+/// The quality of the pictures, and the settings that were sent to the stream.
 pub(super) struct PictureQuality {
     pace: Pace,
     rungs: Arc<Vec<Rung>>,
-    /// What the settings that the stream was given last leave out.
+    /// The quality of the last settings that were sent.
     quality: Quality,
-    /// The settings that the stream was given last.
+    /// The last settings that were sent.
     sent: Option<Settings>,
     /// Settings that could not be drawn, to report them only once.
     rejected: Option<Settings>,
-    /// Number of volumes that had come from a live source.
+    /// Number of volumes received from a live source.
     live_volumes: u64,
-    /// When a light moved last.
+    /// When a light last moved.
     light_moved: Option<Instant>,
-    /// Compiles pipelines in advance.
+    /// Whether pipelines are compiled in advance.
     warms: bool,
-    /// The settings around which that was done last.
+    /// The settings around which pipelines were last compiled in advance.
     warmed: Option<Settings>,
 }
 
@@ -48,7 +48,7 @@ impl PictureQuality {
         }
     }
 
-    /// What the rungs make of a scene at full quality; none without a budget.
+    /// The settings on each rung for a scene at full quality, for stage 1; none without a budget.
     pub(super) fn lowered(&self) -> Option<Lowered> {
         let rungs = self.rungs.clone();
         self.budget().map(|_| Arc::new(move |scene: &Scene| frame_budget::lowered(&rungs, scene)) as Lowered)
@@ -58,17 +58,17 @@ impl PictureQuality {
         self.pace.budget()
     }
 
-    /// What the last settings that were sent to the stream leave out.
+    /// The quality of the last settings that were sent to the stream.
     pub(super) fn now(&self) -> Quality {
         self.quality
     }
 
-    /// The same for the display of times.
+    /// The quality's label for the display of times.
     pub(super) fn label(&self) -> &str {
         frame_budget::label(self.quality, &self.rungs)
     }
 
-    /// The user moved what takes this work.
+    /// Records that the user moved something whose picture takes this work.
     pub(super) fn moved(&mut self, work: Work, now: Instant) {
         self.pace.moved(work, now);
     }
@@ -77,12 +77,12 @@ impl PictureQuality {
         self.light_moved = Some(now);
     }
 
-    /// Another scene takes another time.
+    /// Discards times: another scene takes another time.
     pub(super) fn scene_changed(&mut self) {
         self.pace.forget();
     }
 
-    /// Measures how often volumes come. `count`: of those that came from a live source; none without one.
+    /// Measures the rate of volumes. `count`: number received from a live source; `None` without one.
     pub(super) fn follow_volumes(&mut self, count: Option<u64>, now: Instant) {
         match count {
             Some(count) if count > self.live_volumes => self.pace.volumes_came(count - self.live_volumes, now),
@@ -101,14 +101,14 @@ impl PictureQuality {
         self.pace.rests_at(now)
     }
 
-    /// The quality and the settings that the stream is to be given now; none if it has them, or cannot draw them.
+    /// The quality and settings to send to the stream now; none if it has them, or cannot draw them.
     pub(super) fn to_send(&self, controls: &Controls, now: Instant) -> Option<(Quality, Settings)> {
         let (quality, settings) = self.effective(controls, now);
         let is_known = self.sent.as_ref() == Some(&settings) || self.rejected.as_ref() == Some(&settings);
         (!is_known).then_some((quality, settings))
     }
 
-    /// The stream is given settings of this quality. True if it is another one.
+    /// Records that settings of this quality are sent. True if the quality changes.
     pub(super) fn choose(&mut self, quality: Quality) -> bool {
         std::mem::replace(&mut self.quality, quality) != quality
     }
@@ -143,8 +143,8 @@ impl PictureQuality {
         has_moved || self.pace.is_live(now) || settings.light.follows == Follows::Camera
     }
 
-    /// While the user rests, what may be asked for next: every mode, layout and preset, and the lower rungs of the quality ladder. Each with the
-    /// settings at full quality if it is lower. `acted`: when the user acted last; `has_warmed`: the stream was given such settings since the last source.
+    /// The settings to compile in advance while the user rests: every mode, layout and preset, and the lower rungs of the quality ladder, each with
+    /// its settings at full quality. `acted`: time of the user's last action; `has_warmed`: the stream was given such settings since the last source.
     pub(super) fn warm(
         &mut self,
         controls: &Controls,
@@ -171,12 +171,12 @@ impl PictureQuality {
         Some(next)
     }
 
-    /// The user acts: nothing more is compiled in advance. True if something was.
+    /// Stops compiling in advance, as the user acts. True if it was in progress.
     pub(super) fn stop_warming(&mut self) -> bool {
         self.warmed.take().is_some()
     }
 
-    /// When pipelines are compiled in advance, if that is not yet done.
+    /// When compiling in advance begins, if it is not done.
     pub(super) fn warms_at(&self, acted: Instant, now: Instant) -> Option<Instant> {
         let at = acted + REST_BEFORE_WARMING;
         (self.warms && self.warmed.is_none() && at > now).then_some(at)

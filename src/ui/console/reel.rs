@@ -1,4 +1,4 @@
-//! Small pictures of the volumes of the cine loop, for the line of time. They are made while the loop rests.
+//! Thumbnails of the volumes of the cine loop, for its time line. They are made while the loop rests.
 
 use super::presets::{LONG_REST, REST};
 use crate::gpu::Wake;
@@ -18,12 +18,12 @@ fn stride(count: usize) -> usize {
     count.div_ceil(MOST).max(1)
 }
 
-/// The pictures, and what they are of.
+/// The thumbnails of the loop.
 pub(super) struct Reel {
     thumbnails: Thumbnails,
     /// The numbers of the volumes, in the order of the pictures.
     volumes: Vec<u32>,
-    /// What a picture in another mode would not look like.
+    /// Mode and layout of the thumbnails; others need new ones.
     look: Option<(Mode, Layout)>,
 }
 
@@ -36,12 +36,12 @@ impl Reel {
         Reel { thumbnails: Thumbnails::new(wake), volumes: Vec::new(), look: None }
     }
 
-    /// Goes on with the pictures; `acted`: when the user acted last. True if there are new ones.
+    /// Takes finished thumbnails; `acted`: time of the user's last action. True if there are new ones.
     pub(super) fn poll(&mut self, acted: Instant, is_drawing: bool, now: Instant) -> bool {
         self.thumbnails.poll(now >= acted + REST && !is_drawing)
     }
 
-    /// The picture of each volume of the loop, as far as it is made, or of the volume before it in a long loop.
+    /// For each volume of the loop its thumbnail; in a long loop, that of the nearest earlier volume that has one. None while it is not made.
     pub(super) fn pictures(&self, volumes: &VecDeque<CineVolume>) -> Vec<Option<Arc<Picture>>> {
         let stride = stride(volumes.len());
         (0..volumes.len()).map(|n| self.picture(volumes.get(n - n % stride)?.volume)).collect()
@@ -52,7 +52,7 @@ impl Reel {
         self.thumbnails.pictures().get(at).cloned().flatten()
     }
 
-    /// For each volume of the loop, whether it is to have a picture and has none in the present mode.
+    /// For each volume of the loop, whether it needs a thumbnail and has none in the present mode.
     pub(super) fn missing(&self, volumes: &VecDeque<CineVolume>, settings: &Settings) -> Vec<bool> {
         let is_same = self.look == Some(look_of(settings));
         let stride = stride(volumes.len());
@@ -60,7 +60,7 @@ impl Reel {
         volumes.iter().enumerate().map(|(n, of)| n % stride == 0 && is_missing(of)).collect()
     }
 
-    /// True if pictures are to be made: of several volumes, of which some have none, after a rest.
+    /// True if thumbnails are to be made: several volumes, some without one, after a pause.
     pub(super) fn wants(
         &self,
         volumes: &VecDeque<CineVolume>,
@@ -72,7 +72,7 @@ impl Reel {
         can_begin && self.missing(volumes, settings).contains(&true)
     }
 
-    /// Begins to make the pictures of a job, which has none for volumes whose picture stays.
+    /// Starts to make the thumbnails of a job, which leaves out the volumes that keep theirs.
     pub(super) fn make(&mut self, job: Job, volumes: &VecDeque<CineVolume>, settings: &Settings) {
         let kept = volumes.iter().map(|of| self.picture(of.volume)).collect();
         self.volumes = volumes.iter().map(|of| of.volume).collect();
@@ -80,7 +80,7 @@ impl Reel {
         self.thumbnails.begin_with(job, kept);
     }
 
-    /// The pictures are made again: their device is gone, or another source has other volumes.
+    /// Discards the thumbnails: their device is lost, or another source has other volumes.
     pub(super) fn forget(&mut self) {
         self.thumbnails.clear();
         (self.volumes, self.look) = (Vec::new(), None);

@@ -1,4 +1,4 @@
-//! When it is said that the fluid is lost at which it should.
+//! When the user is told that rendering cannot start at the fluid because the fluid was lost.
 
 use crate::passes::unveil::Outcome;
 use std::time::{Duration, Instant};
@@ -6,22 +6,22 @@ use std::time::{Duration, Instant};
 /// That fluid is lost is said at most so often: it may come and go with each live volume.
 const LOST_INTERVAL: Duration = Duration::from_secs(20);
 
-/// What is said of the start of the rendering.
+/// What the user was told about the start of rendering.
 #[derive(Debug, Default)]
 pub(super) struct RenderStart {
-    /// The fluid is lost, and this was said.
+    /// Whether the fluid is lost and this was reported.
     is_told: bool,
     told_at: Option<Instant>,
 }
 
 impl RenderStart {
-    /// The next loss is another one: the source is another, or the search is switched off.
+    /// Makes the next loss a new one: the source changed, or the search was switched off.
     pub(super) fn forget(&mut self) {
         (self.is_told, self.told_at) = (false, None);
     }
 
-    /// Takes what a picture found; no outcome if it did not search. Returns the outcome if the fluid is lost and that is to be said now: once each time,
-    /// and not more often than every [`LOST_INTERVAL`].
+    /// Takes the outcome of a picture's search; `None` if it did not search. Returns it if the fluid is lost and this is to be reported now: once for
+    /// each loss, and not more often than every [`LOST_INTERVAL`].
     pub(super) fn take(&mut self, outcome: Option<Outcome>, now: Instant) -> Option<Outcome> {
         if outcome.is_none() {
             self.forget();

@@ -1,13 +1,13 @@
-//! The cine loop as it is played, and the volume that is frozen again when a recording that was left comes back.
+//! Playback of the cine loop, and freezing again the volume that was frozen when a recording was left.
 
 use crate::cine_player::{CinePlayer, CineState, Loop};
 use std::time::Instant;
 
-/// Where the loop is.
+/// The playback, and the volume to be frozen.
 #[derive(Debug, Default)]
 pub(super) struct Replay {
     player: CinePlayer,
-    /// The volume of a recording that was frozen when it was left, until it is there again.
+    /// The number of the volume that was frozen when the recording was left, until it is loaded again.
     frozen: Option<u32>,
 }
 
@@ -17,7 +17,7 @@ impl Replay {
         Replay { frozen, ..Replay::default() }
     }
 
-    /// The user shows another volume, or freezes: what was frozen before counts no longer.
+    /// Forgets that volume: the user shows another one, or freezes.
     pub(super) fn forget_frozen(&mut self) {
         self.frozen = None;
     }
@@ -30,7 +30,7 @@ impl Replay {
         self.player.stop();
     }
 
-    /// Plays from `now` on, or stops.
+    /// Starts to play at `now`, or stops.
     pub(super) fn toggle(&mut self, of: Loop, now: Instant) {
         self.player.toggle(of, now);
     }
@@ -49,8 +49,8 @@ impl Replay {
         self.player.state(of, shown)
     }
 
-    /// The index of the volume that is to be frozen again now: at the end of the recording, or when the loop would drop it. `volumes`: the numbers of
-    /// the loop; `most`: how many it keeps.
+    /// The index of the volume to freeze again now, once the recording is loaded or the loop would drop the volume. `volumes`: the numbers of the
+    /// loop; `most`: how many it keeps.
     pub(super) fn refreeze(
         &mut self,
         volumes: impl ExactSizeIterator<Item = u32>,

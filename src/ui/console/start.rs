@@ -1,4 +1,4 @@
-//! The start: what is done before the first picture, as the screen says it.
+//! The start of the view: the steps before the first picture, and the text about them on the screen.
 
 use crate::live::StartStep;
 use crate::panels::Banner;
@@ -11,12 +11,12 @@ const START_INTERVAL: Duration = Duration::from_millis(100);
 /// How far the start is.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Start {
-    /// What the screen says of it, and since when.
+    /// The step that the screen names, and since when.
     step: Option<StartStep>,
     step_at: Instant,
-    /// The screen says that the first picture is being drawn.
+    /// Whether the screen says that the first picture is being drawn.
     tells_of_picture: bool,
-    /// A picture was drawn in full.
+    /// Whether a picture was drawn in full.
     is_over: bool,
 }
 
@@ -29,15 +29,14 @@ impl Start {
         self.is_over
     }
 
-    /// True once, before the first picture is drawn: no panels may be presented while the device draws, so that the screen says before what it is about
-    /// to do.
+    /// True once, before the first picture is drawn: panels cannot be presented while the device draws, so the screen has to announce it before.
     pub(super) fn tells_first(&mut self, step: Option<StartStep>) -> bool {
         let is_first = !self.tells_of_picture && step == Some(StartStep::Picture);
         self.tells_of_picture |= is_first;
         is_first
     }
 
-    /// A picture is finished. `is_coarse`: with few rays.
+    /// Records a finished picture. `is_coarse`: with few rays.
     pub(super) fn picture_finished(&mut self, is_coarse: bool) {
         if !self.is_over {
             tracing::debug!("start: a picture {}", if is_coarse { "with few rays" } else { "in full" });
@@ -45,7 +44,7 @@ impl Start {
         self.is_over |= !is_coarse;
     }
 
-    /// Goes on to what the stream does now. True if the screen is to say it.
+    /// Takes the present step of the stream. True if the screen is to name it.
     pub(super) fn follow(&mut self, step: Option<StartStep>, now: Instant) -> bool {
         let kind = |step: Option<StartStep>| step.map(|step| std::mem::discriminant(&step));
         let is_due = now.saturating_duration_since(self.step_at) >= START_INTERVAL;
@@ -56,14 +55,14 @@ impl Start {
         is_said
     }
 
-    /// Notes in the log what the screen says.
+    /// Writes to the log what the screen says.
     pub(super) fn presented(&self) {
         if let Some(step) = self.step.filter(|_| !self.is_over) {
             tracing::debug!("start: the screen says {step:?}");
         }
     }
 
-    /// What the screen says. `title`: what the source does. None: nothing but that.
+    /// The banner for the present step; none if it is the source's. `title`: what the source does, the title while frames are awaited.
     pub(super) fn banner(&self, title: &str) -> Option<Banner> {
         let banner = |title: &str, text: &str| Banner { title: title.into(), text: text.into(), is_fault: false };
         Some(match self.step? {

@@ -1,4 +1,4 @@
-//! The surface that is rendered, as its distance map shows it.
+//! The rendered surface, by its distance map.
 
 use crate::mesh::sheet::STEEPEST;
 use crate::passes::Texels;
@@ -55,7 +55,7 @@ impl SurfaceMap<'_> {
         Some(origin + direction * away)
     }
 
-    /// The points of the surface along a straight line on the picture between two points on it.
+    /// The points of the surface along the straight line on the picture between two of its points.
     pub(super) fn path(&self, from: DVec3, to: DVec3) -> Option<Vec<DVec3>> {
         let (a, b) = (self.picker.project(from)?, self.picker.project(to)?);
         let pixels = (b[0] - a[0]).hypot(b[1] - a[1]);

@@ -1,5 +1,5 @@
-//! Measurements that need the picture or the volume: the first end of a distance on the surface, voxels that are counted in the background, and the
-//! clipboard for the results.
+//! Measurements that need the picture or the volume: the first end of a distance on the surface, voxels counted in the background, and the clipboard
+//! for the results.
 
 use crate::clipboard::Clipboard;
 use crate::gpu::Wake;
@@ -8,12 +8,12 @@ use glam::DVec3;
 use std::io;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
-/// What is being measured.
+/// The state of these measurements.
 pub(super) struct Survey {
     wake: Wake,
-    /// The voxels that are being counted.
+    /// Receives the count of voxels.
     counted: Option<Receiver<Option<Measurement>>>,
-    /// Where the first end of a distance on the surface was picked.
+    /// The first end of a distance on the surface.
     first_end: Option<DVec3>,
     clipboard: Clipboard,
 }
@@ -24,7 +24,7 @@ impl Survey {
         Survey { wake, counted: None, first_end: None, clipboard: Clipboard::default() }
     }
 
-    /// Where a distance on the surface begins, while one is in work.
+    /// The first end of the distance on the surface that is in progress.
     pub(super) fn first_end(&self) -> Option<DVec3> {
         self.first_end
     }
@@ -41,7 +41,7 @@ impl Survey {
         self.counted.is_some()
     }
 
-    /// Begins to count in a thread.
+    /// Starts to count in a thread.
     ///
     /// # Errors
     /// No thread can be started.
@@ -57,7 +57,7 @@ impl Survey {
         Ok(())
     }
 
-    /// What was counted since the last call; within it none if there was nothing to count.
+    /// The count finished since the last call; it is `Some(None)` if there was nothing to count.
     pub(super) fn poll(&mut self) -> Option<Option<Measurement>> {
         let counted = match self.counted.as_ref()?.try_recv() {
             Err(TryRecvError::Empty) => return None,

@@ -1,4 +1,4 @@
-//! Recordings and workspaces in the console: which is opened, and how the one that is shown is left.
+//! Recordings and workspaces in the console: opening one, and leaving the shown one.
 
 use super::Console;
 use crate::recordings::{Display, Kept, MAX_OPEN};
@@ -21,14 +21,14 @@ impl Console {
         self.presentation.redraw();
     }
 
-    /// Opens the n-th entry of the list: a file, or a folder, whose list is shown then.
+    /// Opens the n-th entry of the list: shows a file, or lists a folder.
     pub(super) fn open_entry(&mut self, n: usize) {
         if let Some(path) = self.opening.choose(n) {
             self.open_path(&path);
         }
     }
 
-    /// Takes a file that was dropped on the window. Of several that are dropped together the first is shown, the others are listed.
+    /// Handles a file that was dropped on the window. Of several dropped together the first is shown, and the others are listed.
     pub fn drop_file(&mut self, path: &Path) {
         self.opening.drop_file(path);
     }
@@ -42,7 +42,7 @@ impl Console {
         }
     }
 
-    /// Opens a recording or a workspace and shows it. The one that is shown already is read anew.
+    /// Opens a recording or a workspace and shows it. The one that is shown already is read again.
     pub fn open_path(&mut self, path: &Path) {
         self.read(path, false);
     }
@@ -62,7 +62,7 @@ impl Console {
         }
     }
 
-    /// Ends what is being read, at the wish of the user. False if nothing is.
+    /// Cancels reading a file, as the user asked. False if none is being read.
     pub(super) fn cancel_reading(&mut self) -> bool {
         if let Some(name) = self.opening.end_reading() {
             self.notify(&texts::not_read_further(name), false);
@@ -76,13 +76,13 @@ impl Console {
         is_cancelled
     }
 
-    /// True while the source of this console is being opened and the user may end that.
+    /// True while the console's own source is being opened and the user may cancel that.
     pub(super) fn reads_source(&self) -> bool {
         let is_opening = self.connection.is_opening() && !self.faults.prevents_view();
         is_opening && self.connection.kind() == SourceKind::Recording && !self.fixed.is_kiosk
     }
 
-    /// Shows the n-th of the recordings that are open.
+    /// Shows the n-th open recording.
     pub(super) fn show_recording(&mut self, n: usize) {
         match self.opening.recording(n) {
             // Who chooses it again stays with it.
@@ -95,7 +95,7 @@ impl Console {
         }
     }
 
-    /// Shows a recording so many places further than the one that is shown, or on its way to be.
+    /// Shows the recording so many positions after the shown or next one.
     pub(super) fn step_recording(&mut self, by: i32) {
         match self.opening.further(by) {
             Some(next) => self.show_recording(next),
@@ -103,8 +103,8 @@ impl Console {
         }
     }
 
-    /// Closes the n-th recording. In place of the one that is shown comes the next, or else the one before. What was made of it by hand and is in no file
-    /// is lost only when that is asked for twice.
+    /// Closes the n-th recording and shows the next one, or else the previous one, in its place. Unsaved handiwork on it is discarded only if this is
+    /// asked for twice.
     pub(super) fn close_recording(&mut self, n: usize, now: Instant) {
         if let Some((name, path, is_shown)) = self.opening.to_close(n) {
             let is_kept = |(other, _): &(PathBuf, Kept)| *other == path;
@@ -121,7 +121,7 @@ impl Console {
         }
     }
 
-    /// Takes what was opened: the console asks to be replaced by one that shows it.
+    /// Takes an opened file: the console asks to be replaced by one that shows it.
     pub(super) fn poll_opening(&mut self, now: Instant) {
         self.open_dropped();
         match self.opening.poll() {
@@ -157,7 +157,7 @@ impl Console {
         Display { panels, times, bar, has_focus: self.panels.has_focus() }
     }
 
-    /// Freezes the volume of a recording that was frozen when it was left, once it is there.
+    /// Freezes the volume that was frozen when the recording was left, once it is loaded.
     pub(super) fn refreeze(&mut self) {
         let volumes = self.stream.cine().volumes().iter().map(|kept| kept.volume);
         if let Some(at) = self.replay.refreeze(volumes, self.fixed.cine_volumes, self.connection.is_over()) {

@@ -1,4 +1,4 @@
-//! The turntable of the view: the rendering turns by itself, as long as nobody turns it by hand.
+//! The turntable: the rendering rotates by itself until the user rotates it.
 
 use crate::command::Command;
 use std::time::{Duration, Instant};
@@ -10,7 +10,7 @@ const LONGEST: Duration = Duration::from_millis(250);
 /// Time between two pictures at least.
 const SHORTEST: Duration = Duration::from_millis(16);
 
-/// When the view turned last, while it turns by itself.
+/// When the view last rotated, while the turntable runs.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Turntable(Option<Instant>);
 
@@ -23,19 +23,19 @@ impl Turntable {
         self.0 = Some(now);
     }
 
-    /// Turns no further. False if it did not turn.
+    /// Stops the turntable. False if it did not run.
     pub(super) fn stop(&mut self) -> bool {
         self.0.take().is_some()
     }
 
-    /// A command of the user that turns the view ends it. True if it did.
+    /// Stops the turntable at a command that rotates the view. True if it ran.
     pub(super) fn stop_for(&mut self, command: &Command) -> bool {
         use Command::{LookFrom, Redo, Reset, Roll, Rotate, Undo, UndoAll};
         matches!(command, Rotate(_) | LookFrom(_) | Roll(_) | Reset | Undo | UndoAll | Redo) && self.stop()
     }
 
-    /// The angle to turn by now, degrees, by the time since the last step. `can_draw`: the picture before is finished; a slow device turns in larger
-    /// steps.
+    /// The angle to rotate by now, degrees, from the time since the last step. `can_draw`: the previous picture is finished; a slow device rotates in
+    /// larger steps.
     pub(super) fn step(&mut self, can_draw: bool, now: Instant) -> Option<f64> {
         let passed = now.saturating_duration_since(self.0?);
         if passed < SHORTEST || !can_draw {

@@ -1,4 +1,4 @@
-//! Body marks: one is added, moved, turned, changed and removed. The last one that was touched is the one that controls are about.
+//! Body marks: adding, moving, rotating, changing and removing them. Controls refer to the last one that was touched.
 
 use super::{Change, Controls};
 use crate::command::Command;
@@ -15,14 +15,14 @@ impl Controls {
         &self.settings.body_marks
     }
 
-    /// The body mark that controls are about, and its index.
+    /// The selected body mark, to which controls refer, and its index.
     pub fn body_mark(&self) -> Option<(usize, BodyMark)> {
         let last = self.settings.body_marks.len().checked_sub(1)?;
         let index = self.body_mark.min(last);
         Some((index, self.settings.body_marks[index]))
     }
 
-    /// Applies a command about body marks; none if it is about something else.
+    /// Applies a command about body marks; none if the command is about something else.
     pub(super) fn mark_body(&mut self, command: &Command) -> Option<Change> {
         let marks = &self.settings.body_marks;
         Some(match *command {

@@ -1,4 +1,4 @@
-//! How the cine loop is played: its marks, its speed and its direction. The picture stays as it is.
+//! Playback of the cine loop: its marks, speed and direction. The picture does not change.
 
 use super::{Change, Controls};
 use crate::cine_player::{marked, stepped};
@@ -6,7 +6,7 @@ use crate::command::Command;
 use crate::scene::Cine;
 
 impl Controls {
-    /// Applies a command about the cine loop that needs none of its volumes; none if it is about something else.
+    /// Applies a command about playback that needs none of the volumes; none if the command is about something else.
     pub(super) fn play(&mut self, command: &Command) -> Option<Change> {
         let now = self.settings.cine;
         let cine = match *command {
@@ -18,7 +18,7 @@ impl Controls {
         Some(self.play_as(cine, command))
     }
 
-    /// The cine loop begins or ends with the volume of this number.
+    /// Makes the volume of this number the first (`end` false) or the last of the cine loop.
     pub(crate) fn mark_cine(&mut self, volume: u32, end: bool) -> Change {
         self.play_as(marked(self.settings.cine, volume, end), &Command::MarkCine(end))
     }

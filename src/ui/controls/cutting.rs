@@ -1,4 +1,4 @@
-//! Cuts: a contour that is drawn on a rendering takes away what lies along the view within it, or outside of it; a brush what is near its strokes.
+//! Cuts: a contour drawn on a rendering removes what lies along the view inside or outside of it; a brush removes what is near its strokes.
 
 use super::{Change, Controls, drawable};
 use crate::command::{Command, Tool};
@@ -12,7 +12,7 @@ const MAX_OUTLINE: usize = 20_000;
 pub(super) const BRUSH_RADIUS: f64 = 4.0;
 pub(crate) const BRUSH_RADII: [f64; 2] = [0.5, 20.0];
 
-/// What removes parts of renderings and keeps settings from being drawn: the first that alone is in the way, or all of it together.
+/// The message about what removes parts of renderings and keeps these settings from being drawn: the first that does it alone, or all together.
 pub(super) fn in_the_way(now: &Scene, settings: &Settings) -> Option<&'static str> {
     // Cuts, the start at the fluid, the curved start line: what of them is left out.
     let ways = [
@@ -32,12 +32,12 @@ pub(super) fn in_the_way(now: &Scene, settings: &Settings) -> Option<&'static st
 }
 
 impl Controls {
-    /// The contour in work, pixels of the picture.
+    /// The contour in progress, pixels of the picture.
     pub fn outline(&self) -> &[[f64; 2]] {
         &self.outline
     }
 
-    /// The side of the next contour that stays.
+    /// The side of the next contour that is kept.
     pub(crate) fn kept_side(&self) -> KeptSide {
         self.kept_side
     }
@@ -47,12 +47,12 @@ impl Controls {
         self.brush_radius
     }
 
-    /// The places that a stroke of the brush went over, pixels of the picture; it is over.
+    /// Ends a stroke of the brush and returns its positions, pixels of the picture.
     pub(crate) fn take_stroke(&mut self) -> Vec<[f64; 2]> {
         std::mem::take(&mut self.outline)
     }
 
-    /// Applies a command about cuts; none if it is about something else, which leaves the contour in work.
+    /// Applies a command about cuts; none if the command is about something else, which discards the contour in progress.
     pub(super) fn cut(&mut self, command: &Command, scene: Option<&Scene>) -> Option<Change> {
         Some(match *command {
             Command::BeginCut(at) if is_position(at) => {
@@ -105,7 +105,7 @@ impl Controls {
         })
     }
 
-    /// Removes what is near strokes over the surface: lateral, depth, elevation, mm. Strokes with one radius are one cut.
+    /// Removes what is near strokes on the surface: lateral, depth, elevation, mm. Strokes with the same radius are one cut.
     pub(crate) fn brush(&mut self, strokes: Vec<Vec<[f64; 3]>>, scene: &Scene) -> Change {
         let radius = self.brush_radius;
         let mut new = self.settings.clone();

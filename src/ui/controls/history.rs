@@ -8,17 +8,17 @@ const MAX_STEPS: usize = 100;
 /// Most steps of a recording that is not shown: settings with many cuts take up to 400 KiB each.
 const MAX_KEPT: usize = 20;
 
-/// The settings of earlier and of undone steps.
+/// The settings before each step, and those of undone steps.
 #[derive(Clone, Debug, Default)]
 pub(super) struct History {
     past: Vec<Settings>,
     future: Vec<Settings>,
-    /// The command of the last step while it may go on.
+    /// The command of the last step, while further commands may continue it.
     last: Option<Command>,
 }
 
 impl History {
-    /// Records the settings before a change by a command. What was undone before is gone.
+    /// Records the settings before a change by a command, and forgets undone steps.
     pub(super) fn record(&mut self, before: Settings, command: &Command) {
         self.future.clear();
         let goes_on = self.last.as_ref().is_some_and(|last| command.continues(last));
@@ -32,12 +32,12 @@ impl History {
         self.past.push(before);
     }
 
-    /// The next change is a step of its own, even by the same command.
+    /// Makes the next change a step of its own, even by the same command.
     pub(super) fn seal(&mut self) {
         self.last = None;
     }
 
-    /// The settings before the last step; `now` can be restored by [`History::redo`].
+    /// Returns the settings before the last step; [`History::redo`] can restore `now`.
     pub(super) fn undo(&mut self, now: &Settings) -> Option<Settings> {
         self.last = None;
         let before = self.past.pop()?;
@@ -45,7 +45,7 @@ impl History {
         Some(before)
     }
 
-    /// The settings after the step that was undone last.
+    /// Returns the settings after the step that was undone last.
     pub(super) fn redo(&mut self, now: &Settings) -> Option<Settings> {
         self.last = None;
         let after = self.future.pop()?;
@@ -53,12 +53,12 @@ impl History {
         Some(after)
     }
 
-    /// Whether there is something to undo, and to redo.
+    /// Whether there is a step to undo, and one to redo.
     pub(super) fn has(&self) -> [bool; 2] {
         [!self.past.is_empty(), !self.future.is_empty()]
     }
 
-    /// Forgets all but the last steps.
+    /// Forgets all steps except for the last ones.
     pub(super) fn shorten(&mut self) {
         for steps in [&mut self.past, &mut self.future] {
             steps.drain(..steps.len().saturating_sub(MAX_KEPT));
@@ -67,7 +67,7 @@ impl History {
         self.last = None;
     }
 
-    /// Forgets everything: the settings follow from another source.
+    /// Forgets everything, as the settings now belong to another source.
     pub(super) fn clear(&mut self) {
         *self = History::default();
     }

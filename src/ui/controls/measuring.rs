@@ -1,4 +1,4 @@
-//! Measurements and annotations: points make them, one at a time, and commands bend, label and delete them.
+//! Measurements and annotations: their points are set one at a time; commands move, label and delete them.
 
 use super::{Change, Controls};
 use crate::command::{Command, Tool};
@@ -25,17 +25,17 @@ impl Controls {
         self.typing
     }
 
-    /// The threshold between the darker and the brighter echoes of the source, as a share of the sample range; none before its first volume.
+    /// The threshold between the darker and brighter echoes of the source, as a fraction of the sample range; none before its first volume.
     pub(crate) fn found_threshold(&self) -> Option<f64> {
         self.defaults.as_ref()?.levels.as_ref().map(|levels| levels.threshold)
     }
 
-    /// On what the next point is set; none: nobody knows.
+    /// States on what the next point is set: its volume and plane; `None`: unknown.
     pub(crate) fn measure_on(&mut self, made: Option<Made>) {
         self.made = made;
     }
 
-    /// Adds a measurement that is complete.
+    /// Adds a complete measurement.
     pub(crate) fn add_measure(&mut self, measured: Measurement) -> Change {
         let measured = Measurement { made: measured.made.clone().or_else(|| self.made.clone()), ..measured };
         if self.is_full(measured.count()) {
@@ -50,7 +50,7 @@ impl Controls {
         Change::Marks
     }
 
-    /// Applies a command about measurements; none if it is about something else.
+    /// Applies a command about measurements; none if the command is about something else.
     pub(super) fn measure(&mut self, command: &Command) -> Option<Change> {
         Some(match *command {
             Command::Point(point, on_surface) => self.add_point(point, on_surface),
@@ -101,12 +101,12 @@ impl Controls {
         })
     }
 
-    /// Leaves the measurement in work.
+    /// Discards the measurement in progress.
     pub(crate) fn leave_work(&mut self) {
         self.work = None;
     }
 
-    /// Takes back the last point of the measurement in work. False if there is none.
+    /// Removes the last point of the measurement in progress. False if there is none.
     pub(super) fn undo_point(&mut self) -> bool {
         let Some(work) = &mut self.work else { return false };
         if work.points.pop().is_none() {

@@ -31,18 +31,18 @@ use std::borrow::Cow;
 pub(super) enum Change {
     /// Nothing changed.
     Nothing,
-    /// The tool of drags changed.
+    /// Only the tool changed.
     Tool,
     Settings,
-    /// Measurements or annotations changed, nothing of the picture itself.
+    /// Measurements or annotations changed, not the rendered picture.
     Marks,
-    /// It cannot be done, and why.
+    /// The command was refused, for this reason.
     Refused(&'static str),
     /// The command does not concern settings: the caller executes it.
     Caller(Command),
 }
 
-/// What a user makes by hand: measurements with annotations, body marks, and cuts.
+/// Handiwork: measurements with annotations, body marks, and cuts.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Handiwork {
     measure: Vec<Measurement>,
@@ -62,33 +62,33 @@ impl Handiwork {
 pub struct Controls {
     settings: Settings,
     start: Settings,
-    /// As it is in a file.
+    /// The handiwork that is in a file.
     saved: Handiwork,
     tool: Tool,
-    /// The last mode that renders the volume: a layout with planes returns to it.
+    /// The last mode that rendered the volume, to which a layout with planes returns.
     rendered: Mode,
-    /// What settings that nobody chose follow from. None: they are complete.
+    /// The recording's properties from which unset settings follow; `None`: all settings are set.
     defaults: Option<Defaults>,
     history: History,
     /// The measurement whose points are being set.
     work: Option<Measurement>,
-    /// On what the next point of a measurement is set.
+    /// The volume and plane on which the next point of a measurement is set.
     made: Option<Made>,
     /// The measurement whose text is being typed.
     typing: Option<usize>,
-    /// The line of a curved plane in work.
+    /// The line of a curved plane in progress.
     line: Option<Curve>,
-    /// The contour of a cut in work, pixels of the picture, and the side of it that stays.
+    /// The contour of a cut in progress, pixels of the picture, and the side of it that is kept.
     outline: Vec<[f64; 2]>,
     kept_side: KeptSide,
-    /// Of the brush, mm.
+    /// Radius of the brush, mm.
     brush_radius: f64,
-    /// The index of the body mark that controls are about.
+    /// The index of the selected body mark.
     body_mark: usize,
 }
 
 impl Controls {
-    /// `settings`: the start, which [`Command::Reset`] restores.
+    /// `settings`: those at the start, which [`Command::Reset`] restores.
     pub(super) fn new(settings: Settings) -> Controls {
         let rendered = if settings.mode.is_flat() { Mode::default() } else { settings.mode };
         Controls {
@@ -118,23 +118,23 @@ impl Controls {
         self.tool
     }
 
-    /// What was made by hand.
+    /// The present handiwork.
     pub(super) fn handiwork(&self) -> Handiwork {
         Handiwork::of(&self.settings)
     }
 
-    /// True if something was made by hand that is in no file.
+    /// True if handiwork is in no file.
     pub(super) fn is_unsaved(&self) -> bool {
         let work = self.handiwork();
         work != self.saved && work != Handiwork::default()
     }
 
-    /// This is in a file.
+    /// Records that this handiwork is in a file.
     pub(super) fn saved(&mut self, work: Handiwork) {
         self.saved = work;
     }
 
-    /// All of it for a later time, without what is in work and with the last steps that can be undone.
+    /// A copy for a later time, without what is in progress and with only the last steps of undo.
     pub(super) fn set_aside(&self) -> Controls {
         let mut aside = Controls { work: None, typing: None, line: None, outline: Vec::new(), ..self.clone() };
         aside.history.shorten();
@@ -153,13 +153,13 @@ impl Controls {
         (self.work, self.typing, self.line) = (None, None, None);
     }
 
-    /// Whether there is something to undo, and to redo.
+    /// Whether there is a step to undo, and one to redo.
     pub(crate) fn can_undo(&self) -> [bool; 2] {
         let [past, future] = self.history.has();
         [past || self.work.is_some() || self.line.is_some(), future]
     }
 
-    /// The next change is a step of its own for undo.
+    /// Makes the next change a step of undo of its own.
     pub(super) fn seal(&mut self) {
         self.history.seal();
     }
@@ -186,7 +186,7 @@ impl Controls {
         }
     }
 
-    /// Takes what was found from a source. Settings that were changed since the start stay.
+    /// Applies what was found from a source. Settings that were changed since the start are kept.
     pub(super) fn adopt(&mut self, found: Defaults) {
         let Ok(start) = found.settings() else { return };
         let picture = self.settings.picture.clone();
@@ -213,7 +213,7 @@ impl Controls {
         }
     }
 
-    /// Settings with another mode or layout than the current ones, and what follows from it.
+    /// Settings with another mode or layout, and what follows from that.
     pub(super) fn switched(&self, to: Settings) -> Settings {
         match &self.defaults {
             Some(defaults) => defaults.switched(&self.settings, to),
@@ -238,8 +238,8 @@ impl Controls {
         self.settings.picture.size = size.map(|edge| edge.clamp(MAX_TILES, max));
     }
 
-    /// Applies a command. `scene` is the one on the screen, which may be of earlier settings. Without it only the tool, the reset and
-    /// the commands for the caller have an effect.
+    /// Applies a command. `scene` is the shown one, which may be older than the settings. Without it only the tool, the reset and commands for the
+    /// caller have an effect.
     pub(super) fn apply(&mut self, command: &Command, scene: Option<&Scene>) -> Change {
         if let Some(change) = self.cut(command, scene).or_else(|| self.curve(command, scene)) {
             return change;

@@ -1,4 +1,4 @@
-//! Presets over the present settings: the look changes, and the region, the view, cuts and measurements stay.
+//! Applies presets to the present settings: the look changes; region, view, cuts and measurements are kept.
 
 use super::cutting::in_the_way;
 use super::{Change, Controls, drawable};
@@ -12,7 +12,7 @@ pub(crate) struct Exam {
     pub title: &'static str,
     pub hint: &'static str,
     preset: &'static str,
-    /// Region and camera are made for the head of the phantom.
+    /// Whether its region and camera are made for the head of the phantom.
     is_framed: bool,
 }
 
@@ -34,7 +34,7 @@ pub(crate) const EXAMS: [Exam; 6] = [
 const PHANTOM: &str = "face-classic";
 
 impl Controls {
-    /// The settings after a built-in preset. Of the phantom, for which most of them are framed, region and camera change too.
+    /// The present settings with a built-in preset applied. For the phantom, for which most presets are framed, region and camera change too.
     ///
     /// # Errors
     /// Why it cannot be drawn.
@@ -61,7 +61,7 @@ impl Controls {
         Some(settings)
     }
 
-    /// The settings after a preset of the user.
+    /// The present settings with a preset of the user applied.
     ///
     /// # Errors
     /// Why it cannot be drawn.
@@ -80,7 +80,7 @@ impl Controls {
             .ok_or_else(|| in_the_way(&now, &settings).unwrap_or(texts::PRESET_DOES_NOT_FIT))
     }
 
-    /// Takes the settings of a preset, as one step for undo.
+    /// Takes the settings of a preset, as one step of undo.
     pub(crate) fn take(&mut self, settings: Settings, command: &Command) -> Change {
         if settings == self.settings {
             return Change::Nothing;

@@ -1,5 +1,5 @@
-//! The patient's sides and the probe's marker, as the user states them, and the bar of saved pictures. They are drawn over and below the picture,
-//! which stays as it is.
+//! The patient's sides and the probe's marker, as the user states them, and the bar of saved pictures. They are drawn over and below the rendered
+//! picture, which does not change.
 
 use super::{Change, Controls};
 use crate::command::Command;

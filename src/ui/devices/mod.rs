@@ -35,7 +35,7 @@ const MAX_QUEUED: usize = 512;
 
 /// All input devices of this machine. Dropping it releases them.
 pub struct Devices {
-    /// None after the drop began, which ends a thread that waits for room in the channel.
+    /// `None` once the drop began, which ends a thread that waits for room in the channel.
     receiver: Option<Receiver<DeviceMessage>>,
     sender: SyncSender<DeviceMessage>,
     wake_pending: Arc<AtomicBool>,
@@ -48,13 +48,12 @@ struct Shared {
     /// Size of the screen, pixels.
     size: Mutex<[u32; 2]>,
     ends: AtomicBool,
-    /// Wakes the thread after a change of the fields above.
+    /// Wakes the thread after a change of these fields.
     wake_event: OwnedFd,
 }
 
 impl Devices {
-    /// Starts to read devices. `size`: of the screen, pixels; `grab`: other programs do not get the events, such as the text
-    /// console behind.
+    /// Starts to read devices. `size`: that of the screen, pixels; `grab`: whether events are withheld from other programs, such as the text console.
     ///
     /// # Errors
     /// The thread cannot be started. Missing or unreadable devices are no error: they may appear later.
@@ -80,7 +79,7 @@ impl Devices {
         })
     }
 
-    /// The messages since the last call. Waits for the first one until a time, or without limit.
+    /// The messages since the last call. Waits for the first one until this time, or without limit.
     pub fn wait(&self, until: Option<Instant>) -> Vec<DeviceMessage> {
         let Some(receiver) = &self.receiver else { return Vec::new() };
         let first = match until {

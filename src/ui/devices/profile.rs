@@ -30,7 +30,7 @@ pub(super) struct Abilities {
     pub(super) keys: BTreeSet<u16>,
     pub(super) relative: BTreeSet<u16>,
     pub(super) absolute: BTreeMap<u16, Span>,
-    /// A touch screen: what is touched is what is shown there.
+    /// Whether it is a touch screen: the touched position is the position on the screen.
     pub(super) is_direct: bool,
     pub(super) is_accelerometer: bool,
 }
@@ -38,9 +38,9 @@ pub(super) struct Abilities {
 /// How a device points. Axes are horizontal and vertical.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Pointing {
-    /// It moves the pointer relative to its position, if at all.
+    /// Moves the pointer relative to its position, or not at all.
     Relative,
-    /// It sets the position of the pointer: a pen, or the tablet that a virtual machine uses as a mouse.
+    /// Sets the position of the pointer: a pen, or the tablet that a virtual machine uses as a mouse.
     Absolute([Span; 2]),
     /// A touch pad: a finger moves the pointer relative to its position.
     Pad([Span; 2]),
@@ -54,7 +54,7 @@ pub(super) enum Pointing {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Profile {
     pub(super) pointing: Pointing,
-    /// Its wheel also reports fractions of notches.
+    /// Whether its wheel also reports fractions of notches.
     pub(super) has_fine_wheel: bool,
 }
 
@@ -121,7 +121,7 @@ const ROWS: [(KeyCode, &str); 5] = [
     (KeyCode::KEY_KP7, "789-456+1230."),
 ];
 
-/// The meaning of a key code, if it has one here.
+/// The meaning of a key code; none if it is not used.
 pub(super) fn meaning(code: u16) -> Option<Meaning> {
     let in_row = |(first, keys): &(KeyCode, &str)| {
         let place = code.checked_sub(first.0)?;

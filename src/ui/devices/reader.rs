@@ -16,7 +16,7 @@ const FOLDER: &str = "/dev/input";
 /// Largest number of open devices.
 const MAX_DEVICES: usize = 32;
 
-/// A message of the input devices, or a wake.
+/// A message of the input devices, or a request to wake up.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum DeviceMessage {
     Input(Input),
@@ -34,7 +34,7 @@ struct Reader {
 
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Grab {
-    /// Waits until no key is down: a key that went down for the text console must also go up there, or it repeats for ever.
+    /// Waits until no key is down: a key pressed in the text console must also be released there, or it repeats forever.
     Pending,
     Active,
     Off,
@@ -46,7 +46,7 @@ pub(super) struct OpenDevices {
     translator: Translator,
     grab: bool,
     number: u32,
-    /// Devices without inputs, with the inode of their file: another device may appear under the same name.
+    /// Devices that give no inputs, with the inode of their file, as another device may appear under the same name.
     ignored: BTreeMap<PathBuf, u64>,
     /// Devices that could not be read at the last scan.
     refused: BTreeSet<PathBuf>,

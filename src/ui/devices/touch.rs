@@ -32,12 +32,12 @@ impl Area {
 struct Slot {
     /// The kernel's tracking ID of the finger.
     tracking_id: Option<i32>,
-    /// The finger is another one than that reported.
+    /// Whether the finger is another one than the reported one.
     is_replaced: bool,
     is_palm: bool,
-    /// Kept when the finger is lifted: the kernel does not repeat a value that is the same for the next finger.
+    /// The last values of the axes. They are kept when the finger is lifted, as the kernel does not repeat equal values for the next finger.
     raw: [Option<i32>; 2],
-    /// The reported finger: its number in our inputs, and its position.
+    /// The reported finger: its number in the inputs, and its position.
     reported: Option<(u64, [f64; 2])>,
 }
 
@@ -45,17 +45,17 @@ struct Slot {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Fingers {
     slots: [Slot; MAX_SLOTS],
-    /// The slot that values belong to.
+    /// The slot to which values belong.
     current: usize,
 }
 
 impl Fingers {
-    /// Selects the slot that values belong to from now on. Values for an invalid slot are ignored.
+    /// Selects the slot to which values belong. Values for an invalid slot are ignored.
     pub(super) fn select_slot(&mut self, slot: i32) {
         self.current = usize::try_from(slot).unwrap_or(MAX_SLOTS);
     }
 
-    /// Sets the tracking ID of the slot; negative: the finger is lifted.
+    /// Sets the tracking ID of the current slot; a negative one means that the finger is lifted.
     pub(super) fn set_tracking_id(&mut self, number: i32) {
         let Some(slot) = self.slots.get_mut(self.current) else { return };
         let tracking_id = (number >= 0).then_some(number);
@@ -64,7 +64,7 @@ impl Fingers {
         }
     }
 
-    /// Sets a coordinate. `axis`: 0 horizontal, 1 vertical.
+    /// Sets a coordinate of the current slot. `axis`: 0 horizontal, 1 vertical.
     pub(super) fn set_position(&mut self, axis: usize, value: i32) {
         let raw = self.slots.get_mut(self.current).and_then(|slot| slot.raw.get_mut(axis));
         if let Some(raw) = raw {
@@ -78,7 +78,7 @@ impl Fingers {
         }
     }
 
-    /// Appends the inputs of the values since the last call. `count`: number of fingers so far, of all devices.
+    /// Appends the inputs for the values since the last call. `count`: number of fingers so far, of all devices.
     pub(super) fn report(&mut self, area: &Area, spans: &[Span; 2], count: &mut u64, out: &mut Vec<Input>) {
         for slot in &mut self.slots {
             if let Some((finger, at)) = slot.reported.take_if(|_| slot.is_replaced || slot.is_palm) {
@@ -125,7 +125,7 @@ pub(super) enum PadMotion {
     Scroll(f64),
 }
 
-/// A touch pad. Its buttons are pressed, not tapped.
+/// A touch pad. Buttons are pressed; taps are ignored.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Pad {
     raw: [Option<i32>; 2],

@@ -31,15 +31,15 @@ pub(super) struct State {
 /// The state of a device from its events.
 pub(super) struct Device {
     pub(super) profile: Profile,
-    /// Keys and buttons of this device that are down.
+    /// Keys and buttons of this device that are held.
     pub(super) held: BTreeSet<u16>,
     pub(super) place: [Option<i32>; 2],
     pub(super) fingers: Fingers,
     pub(super) pad: Pad,
     pub(super) pending: PendingReport,
-    /// The kernel dropped events: ignore the rest of this report.
+    /// Whether the rest of the report is ignored, because the kernel dropped events.
     pub(super) skips_report: bool,
-    /// Events were dropped: the state has to be queried.
+    /// Whether the state has to be queried, because events were dropped.
     pub(super) needs_resync: bool,
 }
 
@@ -66,7 +66,7 @@ impl Device {
         }
     }
 
-    /// The meaning of a key or button of this device, if it has one.
+    /// The meaning of a key or button of this device; none if it is not used.
     pub(super) fn meaning(&self, code: u16) -> Option<Meaning> {
         match self.profile.pointing {
             Pointing::Absolute(_) => profile::pen_meaning(code),
@@ -120,7 +120,7 @@ const MAX_PENDING_KEYS: usize = 64;
 pub(super) struct Translator {
     area: Area,
     pointer: [f64; 2],
-    /// The current position of the pointer was sent.
+    /// Whether the current position of the pointer was sent.
     pointer_is_sent: bool,
     modifiers: Modifiers,
     devices: BTreeMap<u32, Device>,
@@ -128,7 +128,7 @@ pub(super) struct Translator {
 }
 
 impl Translator {
-    /// `size`: of the screen, pixels.
+    /// `size`: that of the screen, pixels.
     pub(super) fn new(size: [u32; 2]) -> Translator {
         let area = Area(size);
         let pointer = area.clamp(area.centre());

@@ -1,5 +1,4 @@
-//! Annotations of the picture: in every tile a scale, the patient's sides and the probe's marker; the orientation of the axes, and a colour
-//! bar.
+//! Annotations of the picture: in every tile a scale, the patient's sides and the probe's marker; the orientation of the axes, and a colour bar.
 
 use super::colours::{self, ACCENT, AXES, BACKING, MEASURE, ON_PLANE, OUTLINE, SIDES, START, TEXT, WARNING, WEAK_TEXT};
 use super::{MARK_TEXT, PanelState, body_marks, picture_rect, recordings, shown};
@@ -14,7 +13,7 @@ use crate::texts;
 use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, Ui, Vec2, pos2, vec2};
 use glam::DVec3;
 
-/// A smaller tile has no axes, points: they would lie over the anatomy.
+/// Smallest tile that has axes, points: in a smaller one they would lie over the anatomy.
 pub(super) const MIN_FOR_AXES: f32 = 480.0;
 /// A smaller picture has no colour bar, points.
 const MIN_FOR_COLOURS: f32 = 300.0;
@@ -25,7 +24,7 @@ const MIN_FOR_SCALE: f32 = 90.0;
 const RULER_WIDTH: f32 = 60.0;
 const BAR_ROOM: (f32, f32) = (0.35, 46.0);
 
-/// Where marks are that messages keep away from: those that stay where they are, and those that would give way.
+/// The areas of annotations: those that messages must not cover, and those that give way to messages.
 pub(super) fn areas(state: &PanelState, scale: f32) -> [Vec<Rect>; 2] {
     let Some((shown, whole)) = shown(state, scale) else { return Default::default() };
     let (mut fixed, mut others) = (body_marks::areas(state, scale), Vec::new());
@@ -75,7 +74,7 @@ fn plane_area(area: Rect, tile: &TileMarks) -> Rect {
     Rect::from_center_size(near_edge(area, tile.plane_corner()), vec2(20.0, 20.0))
 }
 
-/// `messages`: areas that are covered.
+/// Draws the annotations. `messages`: areas that are covered by messages.
 pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32, messages: &[Rect]) {
     let Some((shown, whole)) = shown(state, scale) else { return };
     let scene = &shown.scene;
@@ -143,7 +142,7 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32, messages: &[Rect]) 
     }
 }
 
-/// Says what the picture is of, if that is no patient, and its delay, where nothing else is drawn over it.
+/// Names what the picture shows if not a patient, and the picture's delay, where no other annotations are drawn.
 pub(super) fn paint_origin(ui: &Ui, state: &PanelState, scale: f32) {
     let picture = picture_rect(state, scale);
     let painter = ui.ctx().layer_painter(egui::LayerId::background()).with_clip_rect(picture);

@@ -1,5 +1,5 @@
-//! The bar at the bottom: what freezes the picture, the cine loop as a line of time with its marks, and what saves. No control of it moves or changes its
-//! width with what it says.
+//! The bar at the bottom: the freeze button, the cine loop as a time line with its marks, and the save buttons. Its controls keep their places and
+//! widths whatever they show.
 
 use super::colours::{
     ACCENT, BACKGROUND, BUTTON, CHOSEN, EDGE, ON_SELECTED, ON_WARNING, PANEL, SELECTED, TEXT, WARNING,

@@ -1,4 +1,4 @@
-//! Body marks over the picture, and their controls while their tool is chosen.
+//! Body marks over the picture, and their controls while their tool is selected.
 
 use super::colours::{BODY, MEASURE, OUTLINE, SELECTED, TEXT, WEAK_TEXT};
 use super::names::{self, Tell};
@@ -13,7 +13,7 @@ use egui::{Button, Label, Painter, Pos2, Rect, RichText, Sense, Stroke, StrokeKi
 /// Columns of the buttons of parts of the body.
 const COLUMNS: usize = 4;
 
-/// Draws the marks; while their tool is chosen also their squares, the one that controls are about brighter.
+/// Draws the marks, and while their tool is selected also their squares, the selected one brighter.
 pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
     let Some((shown, picture)) = shown(state, scale) else { return };
     let painter = ui.ctx().layer_painter(egui::LayerId::background()).with_clip_rect(picture_rect(state, scale));
@@ -30,7 +30,7 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
     }
 }
 
-/// The squares that the marks take from other marks of the picture, points.
+/// The squares of the body marks, which other annotations leave free, points.
 pub(super) fn areas(state: &PanelState, scale: f32) -> Vec<Rect> {
     let Some((shown, picture)) = shown(state, scale) else { return Vec::new() };
     let marks = body_marks::drawn(state.controls.body_marks(), shown.scene.picture_size().map(f64::from));
@@ -60,7 +60,7 @@ fn draw(painter: &Painter, place: impl Fn([f64; 2]) -> Pos2, scale: f32, drawn: 
     }
 }
 
-/// With the tool, what the marks show and where, and what removes them.
+/// Shows the controls of the selected body mark, while the tool is selected.
 pub(super) fn show(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
     if state.controls.tool() != Tool::BodyMark {
         return;

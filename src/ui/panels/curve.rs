@@ -1,4 +1,4 @@
-//! The line of the curved plane on the plane that it is drawn on, with its points while its tool is chosen; and the line in work.
+//! The line of the curved plane on the plane that it is drawn on, with its points while its tool is selected, and the line in progress.
 
 use super::colours::{self, OUTLINE, TEXT};
 use super::{PanelState, ShownPicture, picture_rect, shown};

@@ -1,4 +1,4 @@
-//! What a layout draws, for tests: in the order in which it is painted, in points, colours premultiplied with their opacity.
+//! The shapes of a layout, for tests: in painting order, in points, with colours premultiplied by their opacity.
 
 use egui::Shape;
 use egui::epaint::ClippedShape;
@@ -29,7 +29,7 @@ pub enum Kind {
         corners: Vec<[f32; 2]>,
         fill: Colour,
     },
-    /// The area of the letters, and the height of the largest.
+    /// A text: its area, and the height of its largest letter.
     Text {
         area: Area,
         text: String,
@@ -40,7 +40,7 @@ pub enum Kind {
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct Drawn {
-    /// Nothing is drawn outside.
+    /// The area to which the shape is clipped.
     pub clip: Area,
     pub kind: Kind,
 }

@@ -1,4 +1,4 @@
-//! The hints of the first start: a card in the lower left part of the picture, beside what is in its middle.
+//! The hints of the first start: a card in the lower left part of the picture.
 
 use super::annotations::MIN_FOR_AXES;
 use super::colours::{ACCENT, MESSAGE, TEXT};

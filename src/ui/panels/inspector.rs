@@ -1,5 +1,5 @@
-//! The inspector on the right: the options of the chosen tool, and below them one of its parts, chosen by tabs. A window that has no room for it beside the
-//! picture has it as a drawer over the picture. Where tools and views have no room at the edges either, they are its first part.
+//! The inspector on the right: the options of the selected tool, and below them one of its parts, selected by tabs. If the window has no room for it
+//! beside the picture, it is a drawer over the picture. If tools and views have no room at the edges either, they are its first part.
 
 use super::colours::{ACCENT, EDGE, PANEL, TEXT, WEAK_TEXT};
 use super::names::{self, Tell};
@@ -28,13 +28,13 @@ const LOW_DRAWER: f32 = 150.0;
 /// Between the content and the edges of the inspector, points: on the right is the scroll bar.
 const MARGINS: [f32; 2] = [12.0, 14.0];
 
-/// What of the inspector the user chose.
+/// The state of the inspector.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Inspector {
     tab: InspectorTab,
-    /// The drawer is open, in a window that has one.
+    /// Whether the drawer is open, in a window that has one.
     pub is_open: bool,
-    /// The slider that is looked for, by its index.
+    /// The index of the slider that is to be shown, after a search.
     pub sought: Option<usize>,
 }
 
@@ -47,12 +47,12 @@ impl Inspector {
         }
     }
 
-    /// It is over the picture.
+    /// True if the inspector is drawn over the picture.
     pub(super) fn is_drawn_over(&self, room: &Room) -> bool {
         room.has_drawer && self.is_open
     }
 
-    /// Executes a command for the inspector; false if it is another one's. A tool brings the part that its options and results are in.
+    /// Executes a command for the inspector; false if the command is for another part. A tool selects the part with its options and results.
     pub(crate) fn apply(&mut self, command: &Command, room: &Room) -> bool {
         self.sought = None;
         match *command {
@@ -77,7 +77,7 @@ impl Inspector {
         true
     }
 
-    /// A tool was chosen.
+    /// Selects the part with the options and results of a tool.
     pub(crate) fn follow(&mut self, tool: Tool) {
         self.tab = match tool {
             Tool::Rotate => return,
@@ -95,7 +95,7 @@ fn tabs(room: &Room) -> impl Iterator<Item = (InspectorTab, &'static str, &'stat
     TABS.into_iter().filter(move |(tab, ..)| has_tools || *tab != InspectorTab::Tools)
 }
 
-/// Beside the picture.
+/// Shows the inspector beside the picture.
 pub(super) fn show_column(
     ui: &mut Ui,
     state: &PanelState,
@@ -108,7 +108,7 @@ pub(super) fn show_column(
     column.show(ui, |ui| show(ui, state, width, TABS_HEIGHT[0], looks, execute));
 }
 
-/// Over the right part of the picture of a small window.
+/// Shows the inspector over the right part of the picture, in a small window.
 pub(super) fn show_drawer(
     ui: &mut Ui,
     state: &PanelState,

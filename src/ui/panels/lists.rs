@@ -1,4 +1,4 @@
-//! Lists over the window of which an entry is chosen: the files to open, and the formats of an export.
+//! Lists over the window from which an entry is chosen: the files to open, and the formats of an export.
 
 use super::colours::{ACCENT, FAULT, PANEL, TEXT, WEAK_TEXT};
 use super::names::{self, Tell};
@@ -19,10 +19,10 @@ use std::path::Path;
 /// The list of files to open.
 pub(in super::super) struct FilesShown<'a> {
     pub(in super::super) folder: &'a str,
-    /// So many of the entries are the recent files, which come first.
+    /// Number of recent files, which are the first entries.
     pub(in super::super) recent: usize,
     pub(in super::super) names: &'a [String],
-    /// The path that is being typed, and why it was not taken.
+    /// The path that is being typed, and why it was rejected.
     pub(in super::super) typed: Option<(&'a str, Option<&'a str>)>,
 }
 
@@ -32,19 +32,19 @@ const SHARE: f32 = 0.6;
 struct List<'a> {
     title: &'a str,
     about: &'a str,
-    /// The path that is typed in place of what it is about.
+    /// The path that is being typed, shown instead of the description.
     typed: Option<&'a str>,
-    /// A line below that: the list keeps its size.
+    /// A line below the description. Its room is kept free, so that the size of the list is constant.
     line: Option<(&'a str, Color32)>,
-    /// Headings before the n-th entry.
+    /// Headings, each with the index of the entry that it precedes.
     headings: &'a [(usize, &'a str)],
-    /// The tooltip of closing it, and what does so.
+    /// The close button: its tooltip and command.
     close: (&'a str, Command),
-    /// What an empty list says.
+    /// The text of an empty list.
     empty: &'a str,
 }
 
-/// Shows the files to open.
+/// Shows the list of files to open.
 pub(super) fn show_files(ui: &Ui, files: &FilesShown, execute: &mut dyn FnMut(Command)) {
     let line = match files.typed {
         Some((_, Some(fault))) => (fault, FAULT),
@@ -72,7 +72,7 @@ pub(super) fn show_files(ui: &Ui, files: &FilesShown, execute: &mut dyn FnMut(Co
     list.show(ui, entries, |n, execute| execute(Command::OpenFile(n)), |_, _| {}, execute);
 }
 
-/// Shows the formats of an export. `running`: the name of the one in work; `progress`: how far it is.
+/// Shows the list of export formats. `running`: name and progress of the running export.
 pub(super) fn show_exports(ui: &Ui, running: Option<(&str, Option<Progress>)>, execute: &mut dyn FnMut(Command)) {
     let about = match running {
         Some((name, Some(progress))) => texts::is_exported_so_far(name, progress.done, progress.of),

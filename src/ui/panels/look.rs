@@ -1,5 +1,4 @@
-//! The part of the inspector for the look: the mode of a rendering and its view, the six controls that every examination needs in front, colours, and
-//! all other controls by stage.
+//! The inspector's part for the look: mode and view of a rendering, the six most used controls, colours, and all other controls by stage.
 
 use super::colours::{self, EDGE, ON_SELECTED, OUTLINE, TEXT};
 use super::names::{self, Tell};
@@ -69,7 +68,7 @@ fn colours(settings: &Settings) -> &'static [(Colour, &'static str)] {
     }
 }
 
-/// In this width, points.
+/// Shows the part in this width, points.
 pub(super) fn show(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
     let settings = state.controls.settings();
     let modes = RENDERED.map(|mode| (mode, mode.title()));

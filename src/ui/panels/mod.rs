@@ -1,5 +1,5 @@
-//! The panels around and over the picture, laid out by egui. They show a [`PanelState`] and return commands. Their positions depend only on
-//! the size of the window, so that the size of the picture is known before anything is drawn.
+//! The panels around and over the picture, laid out by egui. They show a [`PanelState`] and return commands. Their positions depend only on the size
+//! of the window, so that the size of the picture is known before anything is drawn.
 //!
 //! The theme is dark, so that the picture is the brightest part of the screen. Tools, the button that freezes and those that save are large enough for
 //! gloves; a larger scale makes everything readable from 2 m.
@@ -63,18 +63,18 @@ use std::time::Duration;
 pub(super) struct PanelOutput {
     pub(super) panels: gpu::window::Panels,
     pub(super) commands: Vec<Command>,
-    /// What a screen reader says of the panels, while one listens.
+    /// The tree of the panels for a screen reader, while one listens.
     pub(super) tree: Option<TreeUpdate>,
-    /// When the panels need another layout without an event.
+    /// Time until the panels need another layout without an event.
     pub(super) repaint_after: Duration,
-    /// What is drawn, before it becomes triangles.
+    /// The shapes, before they become triangles.
     #[cfg(test)]
     pub(super) drawn: Vec<drawn::Drawn>,
 }
 
 #[cfg(test)]
 impl PanelOutput {
-    /// Corners of all triangles, points, and their colours: red, green, blue, opacity.
+    /// The corners of all triangles, points, and their colours: red, green, blue, opacity.
     pub(super) fn corners(&self) -> Vec<([f32; 2], [u8; 4])> {
         let meshes = self.panels.shapes.iter().filter_map(|shape| match &shape.primitive {
             egui::epaint::Primitive::Mesh(mesh) => Some(mesh),
@@ -90,15 +90,15 @@ pub(super) struct Panels {
     egui_input: EguiInput,
     /// Pixels per point.
     scale: f32,
-    /// A screen reader listens.
+    /// Whether a screen reader listens.
     is_described: bool,
-    /// The keyboard is on its way to a control: the next layout says to which.
+    /// Whether the next layout moves the keyboard focus to a control.
     gets_focus: bool,
     thumbnails: presets::Textures,
 }
 
 impl Panels {
-    /// `scale`: pixels per point, limited to 0.5..=4; above 1 everything is larger.
+    /// `scale`: pixels per point, limited to 0.5..=4. A larger one enlarges everything.
     pub(super) fn new(scale: f32) -> Panels {
         let context = egui::Context::default();
         apply_theme(&context);
@@ -124,7 +124,7 @@ impl Panels {
         self.describe(is_described);
     }
 
-    /// Describes the panels to a screen reader from the next layout on, or no longer.
+    /// Sets whether the panels are described to a screen reader, from the next layout on.
     pub(super) fn describe(&mut self, is_described: bool) {
         self.is_described = is_described;
         match is_described {
@@ -138,25 +138,25 @@ impl Panels {
         self.is_described
     }
 
-    /// Does what a screen reader asks of a control.
+    /// Performs a screen reader's request for a control.
     pub(super) fn act(&mut self, request: ActionRequest) {
         self.egui_input.events.push(Event::AccessKitActionRequest(request));
     }
 
-    /// True while a control has the keyboard.
+    /// True while a control has the keyboard focus.
     pub(super) fn has_focus(&self) -> bool {
         self.gets_focus || self.context.memory(|memory| memory.focused()).is_some()
     }
 
-    /// Gives the keyboard to the first control, or takes it from the one that has it.
+    /// Gives the keyboard focus to the first control, or removes it.
     pub(super) fn toggle_focus(&mut self) {
         let key = if self.has_focus() { egui::Key::Escape } else { egui::Key::Tab };
         self.gets_focus = key == egui::Key::Tab;
         self.egui_input.press(key, EguiModifiers::NONE);
     }
 
-    /// Takes a key that went down for the control that has the keyboard: Tab goes to the next one, arrows move a slider, Space and Enter press
-    /// a button, Escape leaves. False if no control has the keyboard, or it does not use the key.
+    /// Handles a key that went down for the focused control: Tab goes to the next one, arrows move a slider, Space and Enter press a button, Escape
+    /// removes the focus. False if no control has the focus, or it does not use the key.
     pub(super) fn key(&mut self, key: Key, modifiers: Modifiers) -> bool {
         let plain = modifiers == Modifiers::default();
         let back = modifiers == Modifiers { shift: true, ..Modifiers::default() };
@@ -180,7 +180,7 @@ impl Panels {
         true
     }
 
-    /// Takes a key that walks through the list that is open. `is_grid`: its entries stand beside each other too. False if it is no such key.
+    /// Handles a key that walks through the open list. `is_grid`: entries also stand side by side. False if the key does not walk.
     pub(super) fn walk(&mut self, key: Key, modifiers: Modifiers, is_grid: bool) -> bool {
         let Some(key) = walking::key(key, is_grid).filter(|_| modifiers == Modifiers::default()) else { return false };
         self.gets_focus = true;
@@ -188,7 +188,7 @@ impl Panels {
         true
     }
 
-    /// Takes the keyboard from the control that has it.
+    /// Removes the keyboard focus.
     pub(super) fn drop_focus(&mut self) {
         self.gets_focus = false;
         self.context.memory_mut(|memory| memory.focused().iter().for_each(|id| memory.surrender_focus(*id)));
@@ -451,44 +451,44 @@ impl Edges {
 /// What the panels show.
 pub(super) struct PanelState<'a> {
     pub(super) controls: &'a Controls,
-    /// The scene that is drawn next or last, which controls are about.
+    /// The scene that is drawn next or was drawn last; controls refer to it.
     pub(super) scene: Option<&'a Scene>,
-    /// The picture that is shown, which marks over it are about; none before the first.
+    /// The shown picture, to which marks over it refer; none before the first.
     pub(super) picture: Option<&'a ShownPicture>,
     pub(super) times: &'a Times,
     pub(super) room: Room,
     pub(super) visible: &'a Visible,
-    /// What the pictures show, if that is no patient.
+    /// What the pictures show if not a patient.
     pub(super) origin: Option<&'a str>,
-    /// Shows the hints of the first start.
+    /// Whether the hints of the first start are shown.
     pub(super) shows_first_steps: bool,
-    /// Shows nothing over the picture but what it is of, if that is no patient.
+    /// Whether the picture is drawn with nothing over it but what it shows, if that is no patient.
     pub(super) shows_only_origin: bool,
     /// The question about what leaving would lose.
     pub(super) leaving: Option<&'static Unsaved>,
     /// The list of files to open, while it is shown.
     pub(super) files: Option<FilesShown<'a>>,
-    /// The recordings that are open, and what is being read.
+    /// The open recordings, and the file that is being read.
     pub(super) recordings: &'a [Named],
     pub(super) reading: Option<&'a Reading>,
     /// The list of presets, while it is shown.
     pub(super) presets: Option<PresetsShown<'a>>,
-    /// Small pictures of looks and volumes are made.
+    /// Whether thumbnails of looks and volumes are made.
     pub(super) has_small_pictures: bool,
-    /// Every preset.
+    /// All presets.
     pub(super) looks: Vec<PresetTile<'a>>,
-    /// Small pictures of the volumes of the loop, as far as they are made.
+    /// Thumbnails of the loop's volumes; none where they are not made yet.
     pub(super) loop_pictures: &'a [Option<Arc<Picture>>],
-    /// The view turns by itself.
+    /// Whether the turntable runs.
     pub(super) is_turning: bool,
-    /// The name of the export in work, and how far it is.
+    /// Name and progress of the running export.
     pub(super) exporting: Option<(&'a str, Option<Progress>)>,
     pub(super) is_frozen: bool,
-    /// Frames come from a probe or a pipe.
+    /// Whether frames come from a probe or a pipe.
     pub(super) is_live: bool,
-    /// A picture of what the user did is being drawn, for more than a moment.
+    /// Whether the picture with the effect of the user's action is late.
     pub(super) is_late: bool,
-    /// How long ago the probe or the pipe ended: nothing is live since.
+    /// Time since the probe or the pipe ended; nothing is live since then.
     pub(super) ended: Option<Duration>,
     pub(super) cine: CineState,
     /// The current rung of the quality ladder, and the frame budget.
@@ -497,7 +497,7 @@ pub(super) struct PanelState<'a> {
     pub(super) notes: &'a [Note],
     /// The keys that end the program, for the help.
     pub(super) exit_key: &'a str,
-    /// Where to draw a pointer, pixels of the window. None if the windowing system draws it.
+    /// Where to draw a pointer, pixels of the window; `None` if the windowing system draws it.
     pub(super) pointer: Option<[f64; 2]>,
     /// The pointer by keyboard, while it is on.
     pub(super) keyboard_pointer: Option<PointerMark>,
@@ -534,21 +534,21 @@ pub fn picture_area(size: [u32; 2], scale: f32, shows_panels: bool) -> ([u32; 2]
     ([left, above], [size[0].saturating_sub(left + right).max(1), size[1].saturating_sub(above + below).max(1)])
 }
 
-/// What the panels leave and have in a window.
+/// Division of a window between the panels and the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Room {
     /// Upper left corner and size of the picture, pixels.
     pub(super) picture: ([u32; 2], [u32; 2]),
-    /// There is a bar at the top.
+    /// Whether there is a bar at the top.
     pub(super) has_top: bool,
-    /// The inspector is over the picture: beside it there is no room.
+    /// Whether the inspector is a drawer over the picture, as there is no room beside it.
     pub(super) has_drawer: bool,
-    /// Tools are a part of the inspector: not all of them have room in the rail.
+    /// Whether the tools are a part of the inspector, as not all have room in the rail.
     pub(super) has_tools_tab: bool,
 }
 
 impl Room {
-    /// `size`: of the window, pixels; `scale`: pixels per point.
+    /// `size`: that of the window, pixels; `scale`: pixels per point.
     pub(super) fn of(size: [u32; 2], scale: f32, shows_panels: bool) -> Room {
         let points = size.map(|n| n as f32 / scale);
         let Edges { above, left, right, below } = Edges::of(points, shows_panels);

@@ -1,5 +1,5 @@
-//! Names, roles and values of the panels for a screen reader, and the frame around the control that has the keyboard. egui makes a tree of
-//! its widgets (AccessKit) from which the desktop's interface for screen readers is served; what egui cannot know is added here.
+//! Names, roles and values of the panels for a screen reader, and the frame around the focused control. egui makes a tree of its widgets (AccessKit),
+//! which is served to the desktop's screen readers; this adds what egui cannot know.
 
 use super::colours::{FOCUS, FOCUS_EDGE};
 use super::{PanelState, picture_rect};
@@ -10,7 +10,7 @@ use crate::view;
 use egui::accesskit::{Action, Live, Node, Rect as Bounds, Role};
 use egui::{Context, Id, Key, Response, Stroke, StrokeKind, Ui};
 
-/// Where a rendering is seen from, as the panels call it.
+/// The viewpoints with their names in the panels.
 pub(super) const VIEWPOINTS: [(Viewpoint, &str); 4] = [
     (Viewpoint::Front, texts::VIEW_FRONT),
     (Viewpoint::Left, texts::VIEW_LEFT),
@@ -23,7 +23,7 @@ fn node(context: &Context, id: Id, change: impl FnOnce(&mut Node)) {
     _ = context.accesskit_node_builder(id, change);
 }
 
-/// What a control says of itself.
+/// Adds the description of a control for a screen reader.
 pub(super) trait Tell {
     /// A tooltip, which is the description in the tree.
     fn tell(self, hint: &str) -> Response;
@@ -75,7 +75,7 @@ impl Tell for Response {
     }
 }
 
-/// How much of something is done, 0 to 1, if that is known.
+/// Describes a progress bar; `share`: 0 to 1, if known.
 pub(super) fn progress(bar: &Response, share: Option<f32>) {
     node(&bar.ctx, bar.id, |node| {
         node.set_min_numeric_value(0.0);
@@ -87,7 +87,7 @@ pub(super) fn progress(bar: &Response, share: Option<f32>) {
     });
 }
 
-/// The range of what is set as a slider is, and its step.
+/// Describes the range and step of a control that is set like a slider.
 pub(super) fn range(control: &Response, [low, high]: [f64; 2], step: f64) {
     node(&control.ctx, control.id, |node| {
         node.set_min_numeric_value(low);
@@ -97,7 +97,7 @@ pub(super) fn range(control: &Response, [low, high]: [f64; 2], step: f64) {
     });
 }
 
-/// Gives what a [`Ui`] holds a role and a name.
+/// Gives the content of a [`Ui`] a role and a name.
 pub(super) fn name(ui: &Ui, role: Role, name: &str) {
     node(ui.ctx(), ui.unique_id(), |node| {
         node.set_role(role);
@@ -105,7 +105,7 @@ pub(super) fn name(ui: &Ui, role: Role, name: &str) {
     });
 }
 
-/// Entries of a list, under a name.
+/// Adds the entries of a list with this name.
 pub(super) fn list<R>(ui: &mut Ui, title: &str, add: impl FnOnce(&mut Ui) -> R) -> R {
     ui.scope(|ui| {
         name(ui, Role::List, title);
@@ -114,7 +114,7 @@ pub(super) fn list<R>(ui: &mut Ui, title: &str, add: impl FnOnce(&mut Ui) -> R) 
     .inner
 }
 
-/// Controls that belong together, under a name.
+/// Adds a group of controls with this name.
 pub(super) fn group<R>(ui: &mut Ui, title: &str, add: impl FnOnce(&mut Ui) -> R) -> R {
     ui.scope(|ui| {
         name(ui, Role::Group, title);
@@ -123,14 +123,14 @@ pub(super) fn group<R>(ui: &mut Ui, title: &str, add: impl FnOnce(&mut Ui) -> R)
     .inner
 }
 
-/// A message that a screen reader reads when it appears: a fault at once, others when it has finished.
+/// Announces a message: a screen reader reads a fault at once, and others when it has finished.
 pub(super) fn announce(ui: &Ui, text: &str, is_fault: bool) {
     name(ui, if is_fault { Role::Alert } else { Role::Status }, text);
     let live = if is_fault { Live::Assertive } else { Live::Polite };
     node(ui.ctx(), ui.unique_id(), |node| node.set_live(live));
 }
 
-/// The picture: what it shows, in words.
+/// Describes in words what the picture shows.
 pub(super) fn picture(ui: &Ui, state: &PanelState, scale: f32) {
     let at = picture_rect(state, scale);
     let (title, about) = in_words(state);
@@ -192,7 +192,7 @@ fn view_in_words(scene: &Scene) -> String {
     }
 }
 
-/// True if the keyboard or a screen reader asks a slider for another value. egui reports a change without any input too.
+/// True if the keyboard or a screen reader changes a slider. (egui also reports changes without any input.)
 pub(super) fn asks_for_value(ui: &Ui, slider: &Response) -> bool {
     let has_focus = slider.has_focus();
     ui.input(|input| {
@@ -209,7 +209,7 @@ fn keep_in_view(control: &Response) {
     }
 }
 
-/// A frame around the control that has the keyboard: bright over a dark edge, which shows on every colour.
+/// Draws the frame around the focused control: bright with a dark edge, so that it is visible on every colour.
 pub(super) fn mark_focus(context: &Context) {
     let focused = context.memory(|memory| memory.focused()).and_then(|id| context.read_response(id));
     let Some(control) = focused else { return };

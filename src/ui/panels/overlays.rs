@@ -1,4 +1,4 @@
-//! What is drawn over the picture: banner and notes, times, help, a question with its answers, and the pointer where no windowing system draws one.
+//! Drawn over the picture: banner and notes, times, help, a question with its answers, and the pointer where no windowing system draws one.
 
 use super::annotations;
 use super::colours::{
@@ -83,9 +83,9 @@ impl Message {
     }
 }
 
-/// Shows banner and notes in the picture, one above the other. The newest notes go before the older ones, and where there is no room for both, before the banner,
-/// which comes back when they have gone. `taken`: height at the lower edge of the picture that is not theirs. Returns the areas that they cover: no side
-/// letter and no marker is there, and no scale if they have room elsewhere.
+/// Shows banner and notes in the picture, one above the other. If there is not enough room, newer notes displace older ones and then the banner,
+/// until they expire. `taken`: height at the lower edge of the picture that is in use. Returns the covered areas: side letters and markers are not
+/// drawn there, and the scale only if it has no other place.
 pub(super) fn show_notes(ui: &mut Ui, state: &PanelState, scale: f32, taken: f32) -> Vec<Rect> {
     if state.banner.is_none() && state.notes.is_empty() {
         return Vec::new();
@@ -128,7 +128,7 @@ const WIDTHS: [f32; 4] = [1.0, 0.7, 0.5, 0.35];
 struct Messages {
     banner: (Rect, Vec<Message>),
     notes: (Rect, Vec<Message>),
-    /// How bad it is what they cover; 0 for nothing.
+    /// How much the covered annotations matter; 0 if nothing is covered.
     covered: f32,
 }
 
@@ -437,15 +437,15 @@ fn help_line(ui: &mut Ui, row: &HelpRow, size: f32) {
     }
 }
 
-/// A button that is meant first.
+/// The primary button of a question.
 pub(super) fn first<'a>(text: RichText) -> Button<'a> {
     Button::new(text.color(ON_SELECTED)).fill(SELECTED)
 }
 
-/// In a lower window lists and questions are as small as they can be, points.
+/// Below this height of the window, points, lists and questions have their smallest size.
 pub(super) const LOW_WINDOW: f32 = 360.0;
 
-/// Asks whether to save what is lost when the program ends.
+/// Asks whether to save what would be lost when the program ends.
 pub(super) fn ask_to_leave(ui: &Ui, unsaved: &Unsaved, execute: &mut dyn FnMut(Command)) {
     let screen = ui.ctx().content_rect();
     // Nothing behind it reacts.

@@ -1,4 +1,4 @@
-//! The part of the inspector for planes: which one is moved, where they cross, and how they look.
+//! The inspector's part for planes: which one is moved, where they cross, and their look.
 
 use super::names::{self, Tell};
 use super::widgets::{row_of, slider, switch};

@@ -1,4 +1,4 @@
-//! The list of presets: a tile with a small picture of the present volume for each, and what saves, renames and deletes those of the user.
+//! The list of presets: a tile with a thumbnail of the present volume for each, and buttons to save, rename and delete the user's.
 
 use super::colours::{ACCENT, BACKGROUND, BUTTON, EDGE, FAULT, PANEL, TEXT, UNCOLOURED, WEAK_TEXT};
 use super::names::{self, Tell};
@@ -19,9 +19,9 @@ use std::sync::Arc;
 /// The list while it is shown.
 pub(crate) struct PresetsShown<'a> {
     pub tiles: Vec<PresetTile<'a>>,
-    /// The user has presets.
+    /// Whether presets of the user can be saved.
     pub(crate) can_save: bool,
-    /// Why those of the user cannot be read.
+    /// Why the user's presets cannot be read.
     pub fault: Option<&'a str>,
     /// The name that is being typed, and whether a preset is renamed.
     pub naming: Option<(&'a str, bool)>,
@@ -33,7 +33,7 @@ pub(crate) struct PresetTile<'a> {
     pub name: &'a str,
     pub hint: &'a str,
     pub picture: Option<Arc<Picture>>,
-    /// Its number among those of the user.
+    /// The index among the user's presets, if it is one of them.
     pub own: Option<usize>,
 }
 
@@ -51,7 +51,7 @@ const BUTTONS: f32 = 36.0;
 pub(super) struct Textures(Vec<(Arc<Picture>, TextureHandle)>);
 
 impl Textures {
-    /// The textures of pictures, for each of the lists. Those of other pictures are given back.
+    /// The textures of the pictures of each list. Textures of other pictures are released.
     pub(super) fn of<const N: usize>(
         &mut self,
         context: &Context,
@@ -81,7 +81,7 @@ const COLUMNS: usize = 4;
 const ROWS: usize = 2;
 const SMALL_NAME: f32 = 16.0;
 
-/// Looks as small pictures, and what opens the list in which they are saved, renamed and deleted.
+/// Shows presets as thumbnails, and a button that opens the list in which they are saved, renamed and deleted.
 pub(super) fn show_strip(
     ui: &mut Ui,
     state: &PanelState,

@@ -1,4 +1,4 @@
-//! The rail on the left: every tool as an icon, with a word where there is room. Where not even the icons have room, a button opens them in the inspector.
+//! The rail on the left: every tool as an icon, with a word if there is room. If not all icons have room, a button opens them in the inspector.
 
 use super::colours::{ACCENT, BUTTON, CHOSEN, EDGE, PANEL, TEXT, WEAK_TEXT};
 use super::icons::{self, Icon};
@@ -65,7 +65,7 @@ fn button_height(height: f32) -> Option<f32> {
     (each >= HEIGHTS[2]).then(|| each.min(HEIGHTS[0]).floor())
 }
 
-/// True if a rail of this height has every tool, points.
+/// True if a rail of this height, points, has room for every tool.
 pub(super) fn has_all(height: f32) -> bool {
     button_height(height).is_some()
 }
@@ -100,7 +100,7 @@ pub(super) fn show(ui: &mut Ui, state: &PanelState, height: f32, execute: &mut d
     });
 }
 
-/// Tools in the inspector.
+/// Shows the tools in the inspector.
 pub(super) fn show_grid(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
     names::group(ui, texts::TOOLS, |ui| {
         heading(ui, texts::TOOLS);
@@ -165,7 +165,7 @@ pub(super) fn paint(painter: &egui::Painter, icon: Icon, square: Rect, colour: e
     }
 }
 
-/// A button with an icon and perhaps a text, as wide as it is told; `name`: what a screen reader calls it.
+/// A button of this width with an icon and an optional text; `name`: its name for a screen reader.
 pub(super) fn icon_button(
     ui: &mut Ui,
     icon: Icon,

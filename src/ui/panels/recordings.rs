@@ -1,4 +1,4 @@
-//! The recordings that are open, as a list of which one is chosen, and the file that is being read.
+//! The list of open recordings, and the file that is being read.
 
 use super::colours::{ACCENT, BAR, EDGE, TEXT, WHOLE_BAR};
 use super::names::{self, Tell};
@@ -12,11 +12,11 @@ use egui::{
     WidgetType, vec2,
 };
 
-/// What is being read.
+/// The file that is being read.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reading {
     pub name: String,
-    /// How far it is, if that is known, and the same in words.
+    /// Progress 0..=1, if known, and its description.
     pub share: Option<f32>,
     pub text: String,
 }
@@ -24,7 +24,7 @@ pub struct Reading {
 /// Width of the button that closes a recording, points.
 const CLOSE: f32 = 36.0;
 
-/// The list, while more than one recording is open.
+/// Shows the list of recordings, if more than one is open.
 pub(super) fn show_list(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
     if state.recordings.len() < 2 {
         return;
@@ -61,9 +61,9 @@ struct ReadingPlace {
     has_bar: bool,
     height: f32,
     width: f32,
-    /// The middle of its upper edge.
+    /// The middle of the upper edge.
     top: Pos2,
-    /// Nothing else is there: it is in the middle of the picture.
+    /// Whether nothing else is shown, so that it is in the middle of the picture.
     is_alone: bool,
 }
 
@@ -78,7 +78,7 @@ fn reading_place(state: &PanelState, scale: f32) -> ReadingPlace {
     ReadingPlace { has_bar, height, width, top, is_alone }
 }
 
-/// The area of the picture that [`show_reading`] covers, if anything is being read.
+/// The area of the picture that [`show_reading`] covers, while a file is being read.
 pub(super) fn reading_area(state: &PanelState, scale: f32) -> Option<Rect> {
     state.reading?;
     let ReadingPlace { height, width, top, .. } = reading_place(state, scale);
@@ -86,7 +86,7 @@ pub(super) fn reading_area(state: &PanelState, scale: f32) -> Option<Rect> {
     Some(Rect::from_min_size(top - vec2(width / 2.0, 0.0), vec2(width, height)).expand2(vec2(16.0, 0.0)))
 }
 
-/// Shows what is being read, below the messages. Returns the height that it takes of their room.
+/// Shows the file that is being read, below the messages. Returns the height that it takes from them.
 pub(super) fn show_reading(ui: &mut Ui, state: &PanelState, scale: f32, execute: &mut dyn FnMut(Command)) -> f32 {
     let Some(reading) = state.reading else { return 0.0 };
     let ReadingPlace { has_bar, height, width, top, is_alone } = reading_place(state, scale);

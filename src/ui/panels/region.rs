@@ -1,5 +1,5 @@
-//! The region as a box, while its tool is chosen: its section on the planes beside a rendering with a handle on each side, its start line in green on
-//! plane A, and its edges in the rendering.
+//! The region as a box while its tool is selected: its section on the planes beside a rendering with a handle on each side, its start line in green
+//! on plane A, and its edges in the rendering.
 
 use super::colours::{OUTLINE, START, TEXT};
 use super::{PanelState, ShownPicture, picture_rect, shown};

@@ -1,4 +1,4 @@
-//! The search of all commands and controls: a line that is typed, and what is found.
+//! The search of all commands and controls: a line for typing, and the results.
 
 use super::colours::{ACCENT, BACKGROUND, CHOSEN, EDGE, PANEL, TEXT, WEAK_TEXT};
 use super::icons;

@@ -1,4 +1,4 @@
-//! The patient's sides along the axes of the volume, and the place of the probe's marker: what the user states of both.
+//! Controls for the patient's sides along the axes of the volume and for the position of the probe's marker.
 
 use super::names::{self, Tell};
 use super::widgets::switch;

@@ -1,4 +1,4 @@
-//! What belongs to a tool, first in the inspector: clip faces, cuts and the brush, the curved plane, the start line.
+//! The options of tools, at the top of the inspector: clip faces, cuts and brush, the curved plane, the start line.
 
 use super::colours::ACCENT;
 use super::names::{self, Tell};
@@ -12,12 +12,12 @@ use crate::texts;
 use crate::view;
 use egui::{Button, Label, RichText, Ui, vec2};
 
-/// The numbers of the controls of clip faces that are there.
+/// The indices of the sliders for clip faces that exist in these settings.
 pub(super) fn of_clip(settings: &Settings) -> [Option<usize>; 2] {
     ["cap.enabled", "cap.level"].map(|key| front(&[key], settings))
 }
 
-/// While there are clip planes, whether their faces show echoes, and from which on.
+/// Shows, while there are clip planes, the switch and the level of the echoes on their faces.
 pub(super) fn clip(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
     let there = of_clip(state.controls.settings());
     if there == [None; 2] {
@@ -32,12 +32,13 @@ pub(super) fn clip(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dy
     });
 }
 
-/// The number of the slider that is with the cuts while their tool is chosen, if it is there.
+/// The index of the slider for the depth of the last cut, if it is shown.
 pub(super) fn depth_of_cut(state: &PanelState) -> Option<usize> {
     front(&["cuts.depth"], state.controls.settings()).filter(|_| state.controls.tool() == Tool::Cut)
 }
 
-/// With the tool for cuts, which side of a contour stays, and how deep the last cut is; and what removes the cuts, while there are any.
+/// Shows, with the tool for cuts, the side of a contour that is kept and the depth of the last cut; and a button that removes the cuts, if there are
+/// any.
 pub(super) fn cuts(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
     let is_chosen = state.controls.tool() == Tool::Cut;
     let is_brush = state.controls.tool() == Tool::Brush;
@@ -70,7 +71,7 @@ pub(super) fn cuts(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dy
     });
 }
 
-/// With its tool, what to do next for a curved plane; and what removes it, while there is one.
+/// Shows, with its tool, the next step for a curved plane; and a button that removes the plane, if there is one.
 pub(super) fn curve(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
     let (is_chosen, line) = (state.controls.tool() == Tool::Curve, state.controls.line());
     let has_curve = state.controls.settings().planes.curve.is_some();
@@ -109,8 +110,8 @@ pub(super) fn curve(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut d
     });
 }
 
-/// With the tool for the region, whether its start line is bent, how deep its handles are, and how many it has; without that tool, the switch of a line
-/// that is bent.
+/// Shows, with the tool for the region, the switch of the start line, the depths of its handles and their number; without that tool only the switch,
+/// if the line is bent.
 pub(super) fn start_line(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
     let Some(scene) = state.scene.filter(|scene| scene.renders()) else { return };
     let points = state.controls.settings().region.start_curve.as_deref();

@@ -1,4 +1,4 @@
-//! The bar at the top: files and the recordings that are open, the views, undo and redo, the search of all commands, and help.
+//! The bar at the top: files and open recordings, views, undo and redo, the search of all commands, and help.
 
 use super::colours::{ACCENT, BUTTON, CHOSEN, EDGE, PANEL, TEXT, WARNING, WEAK_TEXT};
 use super::icons::{self, Icon};
@@ -243,7 +243,7 @@ fn clipped(ui: &Ui, text: &str, area: Rect) {
     ui.painter().galley(pos2(area.left(), area.center().y - galley.size().y / 2.0), galley, TEXT);
 }
 
-/// The same in the inspector of a window without this bar.
+/// Shows the buttons of this bar in the inspector of a window without it.
 pub(super) fn show_buttons(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
     if state.room.has_top {
         return;

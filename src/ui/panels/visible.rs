@@ -1,4 +1,4 @@
-//! What the user chose to see: panels, lists and texts over the picture, each opened and closed by a command; and what is typed for them.
+//! What is shown besides the picture: panels, lists and texts, each opened and closed by a command; and what is typed into them.
 
 use super::Room;
 use super::inspector::Inspector;
@@ -14,28 +14,28 @@ const MAX_NUMBER: usize = 10;
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Search {
     pub text: String,
-    /// The place of the chosen entry among what is found.
+    /// The index of the selected result.
     pub chosen: usize,
 }
 
-/// What is to be seen besides the picture.
+/// What is shown besides the picture.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Visible {
-    /// Bars and inspector.
+    /// Whether bars and inspector are shown.
     pub panels: bool,
     pub help: bool,
     pub search: Option<Search>,
-    /// The display of times.
+    /// Whether the display of times is shown.
     pub times: bool,
-    /// The list of formats.
+    /// Whether the list of export formats is shown.
     pub exports: bool,
     pub inspector: Inspector,
-    /// The number that is typed for a slider, by its index.
+    /// The index of the slider for which a number is being typed, and the typed text.
     pub value: Option<(usize, String)>,
 }
 
 impl Visible {
-    /// Executes a command that opens or closes something; false if it is another one.
+    /// Executes a command that opens or closes something; false if it is another command.
     pub(crate) fn apply(&mut self, command: &Command, room: &Room) -> bool {
         match *command {
             Command::ToggleHelp => self.help = !self.help,
@@ -51,7 +51,7 @@ impl Visible {
         true
     }
 
-    /// True if something is open that the user may want to close.
+    /// True if something is open that the user can close.
     pub(crate) fn is_any_open(&self, room: &Room) -> bool {
         self.help || self.times || self.exports || self.search.is_some() || self.inspector.is_drawn_over(room)
     }
@@ -61,12 +61,12 @@ impl Visible {
         std::mem::take(&mut self.exports)
     }
 
-    /// Closes what is typed, the search or the help, one of them. False if none is open.
+    /// Closes one of these, in this order: a typed number, the search, the help. False if none is open.
     pub(crate) fn close_help(&mut self) -> bool {
         self.value.take().is_some() || self.search.take().is_some() || std::mem::take(&mut self.help)
     }
 
-    /// Closes the display of times. False if it is not open.
+    /// Closes the display of times. False if it is not shown.
     pub(crate) fn close_times(&mut self) -> bool {
         std::mem::take(&mut self.times)
     }
@@ -78,7 +78,7 @@ impl Visible {
         is_open
     }
 
-    /// Takes a key for the number that is typed, or for the search: the commands that it gives, or none if it is another one's key.
+    /// The commands of a key for a typed number or the search; none if the key is for something else.
     pub(crate) fn key(&mut self, key: Key, modifiers: Modifiers) -> Option<Vec<Command>> {
         if modifiers.control || modifiers.alt {
             return None;

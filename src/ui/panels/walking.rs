@@ -1,5 +1,5 @@
-//! Walking through the entries of a list: arrows, Home, End, Page up and Page down give the keyboard from one to another, and Enter chooses the one that has
-//! it.
+//! Walking through a list by keys: arrows, Home, End, Page up and Page down move the keyboard focus between its entries, and Enter chooses the
+//! focused one.
 
 use crate::input::Key as InputKey;
 use egui::{FocusDirection, Id, Key, Response, Ui};
@@ -7,7 +7,7 @@ use egui::{FocusDirection, Id, Key, Response, Ui};
 /// Entries that Page up and Page down pass.
 const PAGE: usize = 10;
 
-/// The key of egui that walks; none for keys that do not. Where entries stand beside each other, left and right walk too.
+/// The key of egui for a key that walks; none for others. In a grid, left and right walk too.
 pub(super) fn key(key: InputKey, is_grid: bool) -> Option<Key> {
     Some(match key {
         InputKey::Up => Key::ArrowUp,
@@ -22,15 +22,15 @@ pub(super) fn key(key: InputKey, is_grid: bool) -> Option<Key> {
     })
 }
 
-/// A list that is walked through in this layout.
+/// A list of this layout that can be walked through.
 pub(super) struct Walk {
     id: Id,
-    /// The entry that gets the keyboard now.
+    /// The entry that gets the keyboard focus now.
     wanted: Option<usize>,
 }
 
 impl Walk {
-    /// Before the entries are shown. `columns`: how many stand beside each other.
+    /// Called before the entries are shown. `columns`: number of entries side by side.
     pub(super) fn new(ui: &Ui, title: &str, count: usize, columns: usize) -> Walk {
         let id = Id::new(("walk", title));
         // Where the keyboard was in the layout before; an entry that still has it says so again.
@@ -59,7 +59,7 @@ impl Walk {
         Walk { id, wanted }
     }
 
-    /// After the n-th entry is shown.
+    /// Called after the n-th entry is shown.
     pub(super) fn entry(&self, n: usize, entry: &Response) {
         if self.wanted == Some(n) {
             entry.request_focus();

@@ -1,4 +1,4 @@
-//! What controls are made of: the sliders of settings, those of other lengths, switches, and the frame of messages.
+//! Building blocks of panels: sliders of settings and of other values, switches, and the frame of messages.
 
 use super::colours::{ABSENT, ACCENT, BACKGROUND, BUTTON, EDGE, MESSAGE, ON_SELECTED, SELECTED, TEXT, WEAK_TEXT};
 use super::names::{self, Tell};
@@ -13,9 +13,9 @@ use egui::{
     Ui, WidgetInfo, WidgetType, pos2, vec2,
 };
 
-/// Between messages, points.
+/// Distance between messages, points.
 pub(super) const BETWEEN_MESSAGES: f32 = 8.0;
-/// Between messages and the upper and the lower edge of the picture.
+/// Distance of messages from the upper and from the lower edge of the picture, points.
 pub(super) const MESSAGE_EDGES: [f32; 2] = [12.0, 14.0];
 
 /// Height of a row with a slider or a switch, points: a finger has it, too.
@@ -28,12 +28,12 @@ pub(super) fn message_frame(edge: Color32) -> Frame {
     Frame::new().fill(MESSAGE).inner_margin(Margin::symmetric(16, 10)).corner_radius(8).stroke(Stroke::new(2.0, edge))
 }
 
-/// The index of the first slider of these keys that the mode has.
+/// The index of the first slider among these keys that exists in the mode.
 pub(super) fn front(keys: &[&str], settings: &Settings) -> Option<usize> {
     keys.iter().find_map(|key| SLIDERS.iter().position(|s| s.key == *key && s.applies(settings)))
 }
 
-/// A slider of the settings: its name, the rail, and its value, which a click begins to type.
+/// A slider of the settings: name, rail, and value, which can be typed after a click.
 pub(super) fn slider(ui: &mut Ui, state: &PanelState, number: usize, name: &str, execute: &mut dyn FnMut(Command)) {
     let slider = &SLIDERS[number];
     let settings = state.controls.settings();
@@ -160,7 +160,7 @@ fn row(
     .inner
 }
 
-/// A control that the mode has not: it keeps its place.
+/// Placeholder for a control that the mode does not have.
 pub(super) fn absent(ui: &mut Ui, name: &str) {
     let (area, response) = ui.allocate_exact_size(vec2(ui.available_width(), SLIDER_ROW), Sense::hover());
     let font = FontId::proportional(TEXT_SIZE);
@@ -170,7 +170,7 @@ pub(super) fn absent(ui: &mut Ui, name: &str) {
     response.on_hover_text(texts::NO_SUCH_CONTROL);
 }
 
-/// Buttons of which one is chosen, in rows of so many in this width, points, under a title.
+/// Buttons of which one is selected, under a title, in rows that fill this width, points.
 pub(super) fn row_of<T: Copy>(
     ui: &mut Ui,
     title: &str,
@@ -198,13 +198,12 @@ pub(super) fn row_of<T: Copy>(
     });
 }
 
-/// A slider in mm of what is no setting of its own. Returns the value that the user sets.
+/// A slider in mm for a value that is no setting. Returns the value if the user changes it.
 pub(super) fn plain_slider(ui: &mut Ui, name: &str, before: f64, range: [f64; 2], hint: &str) -> Option<f64> {
     scale_slider(ui, name, before, (range, 0.5), texts::millimetres(before), hint)
 }
 
-/// A slider of what is no setting of its own, with its range and its step; `shown`: the value as the user reads it. Returns the value that the user
-/// sets.
+/// A slider for a value that is no setting, with its range and step; `shown`: the displayed value. Returns the value if the user changes it.
 pub(super) fn scale_slider(
     ui: &mut Ui,
     name: &str,

@@ -1,4 +1,4 @@
-//! The formats of an export.
+//! Texts about the formats of an export.
 
 use std::fmt::Display;
 

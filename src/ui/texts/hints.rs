@@ -1,4 +1,4 @@
-//! What each control does, in one or two sentences: the tooltips of the view.
+//! Tooltips of the view: what each control does, in one or two sentences.
 
 use crate::command::{Tool, Viewpoint};
 use crate::scene::{Layout, MeasureKind, Mode};

@@ -1,4 +1,4 @@
-//! What the keys do, for the help.
+//! Descriptions of the keys in the help.
 
 // Keys; those that are not here are called by their names in English.
 pub(crate) const CTRL: &str = "Ctrl+";

@@ -1,4 +1,4 @@
-//! Measuring: tools, steps and what stands in the way.
+//! Texts about measuring: tools, steps and reasons why something cannot be measured.
 
 use std::fmt::Display;
 

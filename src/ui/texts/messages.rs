@@ -1,10 +1,10 @@
-//! Notes and banners over the picture. Names that begin with `WHY_` are the reason in a sentence of another text, so they begin in lower case.
+//! Notes and banners over the picture. Texts whose names begin with `WHY_` are reasons within other sentences, so they begin in lower case.
 
 use std::fmt::Display;
 use std::path::Path;
 
 // What was saved, what a start is at.
-/// The file with the folder that it is in.
+/// The message about a saved file: its name and folder.
 pub fn saved(file: &Path) -> String {
     format!("Saved {}", std::path::absolute(file).unwrap_or_else(|_| file.into()).display())
 }

@@ -1,6 +1,5 @@
-//! Every text of the window, in English: a translation is another copy of this folder. Names of modes are in [`Mode`](crate::scene::Mode), those of sliders
-//! and what they do at their settings; faults that the
-//! panels pass on are of the modules that found them.
+//! Every text of the window, in English: a translation is another copy of this folder. Names of modes are in [`Mode`](crate::scene::Mode), names and
+//! hints of sliders are at their settings; faults that the panels show are worded by the modules that find them.
 
 mod exports;
 mod first_steps;

@@ -75,7 +75,7 @@ pub(crate) fn played_part(first: usize, last: usize) -> String {
     format!("loop {first} to {last}")
 }
 
-/// What the picture is, such as "Frozen".
+/// States of the picture, in short.
 pub(crate) const STATE_FROZEN: &str = "Frozen";
 pub(crate) const STATE_LIVE: &str = "Live";
 pub(crate) const STATE_DRAWING: &str = "drawing ...";
@@ -187,7 +187,7 @@ pub(crate) fn slider_hint(hint: impl Display) -> String {
 }
 pub(crate) const LIGHT_BALL_HINT: &str = "Drag here to move the lamp; on the picture, drag with Ctrl.";
 pub(crate) const LIGHT_BALL: &str = "Light ball";
-/// Degrees from the front.
+/// The position of the light, as degrees from the front.
 pub(crate) fn lamp_place(right: f64, up: f64) -> String {
     let side = if right < 0.0 { "left" } else { "right" };
     let height = if up < 0.0 { "below" } else { "above" };
@@ -413,7 +413,7 @@ pub(crate) const LEAVE_WITHOUT_SAVING: &str = "Leave without saving  (L)";
 pub(crate) const STAY: &str = "Stay  (Esc)";
 pub(crate) const STAY_HINT: &str = "Goes on as before.";
 
-/// The question before leaving: what is not saved, and what the answers do.
+/// The question before leaving: what is not saved, and the answers.
 #[derive(Debug)]
 pub(crate) struct Unsaved {
     pub(crate) title: &'static str,

@@ -1,4 +1,4 @@
-//! The patient's sides and the probe's marker.
+//! Texts about the patient's sides and the probe's marker.
 
 use crate::scene::{ProbeMarker, Sides, VolumeAxis};
 use std::fmt::Display;
@@ -23,7 +23,7 @@ pub fn axis(axis: VolumeAxis) -> &'static str {
     }
 }
 
-/// Sides as they are read aloud.
+/// Sides in words, as they are read aloud.
 pub fn sides(sides: Sides) -> &'static str {
     match sides {
         Sides::None => "no letters",
@@ -36,7 +36,7 @@ pub fn sides(sides: Sides) -> &'static str {
     }
 }
 
-/// What sides along an axis say.
+/// The tooltip for sides along an axis.
 pub(crate) fn sides_hint(axis: VolumeAxis, sides: Sides) -> String {
     let (first, last) = match sides {
         Sides::None => return "Not known: no letters.".into(),
@@ -56,7 +56,7 @@ pub(crate) fn sides_hint(axis: VolumeAxis, sides: Sides) -> String {
 
 pub(crate) const PROBE_MARKER: &str = "Probe marker (dot)";
 
-/// Where the marker is, in short.
+/// The position of the marker, in short.
 pub(crate) fn probe_marker(marker: ProbeMarker) -> &'static str {
     match marker {
         ProbeMarker::First => "First",
@@ -65,7 +65,7 @@ pub(crate) fn probe_marker(marker: ProbeMarker) -> &'static str {
     }
 }
 
-/// What the place of the marker means.
+/// What the position of the marker means.
 pub(crate) fn probe_marker_hint(marker: ProbeMarker) -> &'static str {
     match marker {
         ProbeMarker::First => "The marker on the probe's housing is at the first scan line.",

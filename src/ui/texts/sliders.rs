@@ -1,4 +1,4 @@
-//! Names of the groups of sliders, and names and hints of sliders of no single setting; those of others are in the rows of the settings.
+//! Names of the groups of sliders, and names and hints of sliders that belong to no single setting; those of others are at their settings.
 
 pub(crate) const IMAGE: &str = "Image";
 pub(crate) const FILTERS: &str = "Filters";

@@ -40,7 +40,7 @@ pub const SLICE: Pass = Pass {
 
 /// Smallest difference that counts as a gradient: half a level of 255, as Wang, Vagnucci and Li do on integer levels.
 pub(super) const LEAST: f64 = 0.5 / 255.0;
-/// The same on distances, mm: a 32nd of the detector's step, below its resolution.
+/// Smallest difference of distances that counts as a gradient, mm: a 32nd of the detector's step, below its resolution.
 pub(super) fn least_distance(scene: &Scene) -> f64 {
     scene.ring.step / 32.0
 }

@@ -10,9 +10,9 @@ pub enum Rule {
     Riemann,
     /// a = 1 - exp(-y), kappa from the step's middle.
     Corrected,
-    /// The same, with kappa from the begin of the step. No setting offers it. It shows what the middle of the step gains.
+    /// a = 1 - exp(-y), kappa from the beginning of the step. No setting offers it. It shows what the middle of the step gains.
     CorrectedLeft,
-    /// The same with the mean kappa, and the mean colour weighted by it, between the values at the step's two ends.
+    /// a = 1 - exp(-y), with the mean kappa, and the mean colour weighted by it, between the values at the step's two ends.
     PreIntegrated,
     /// The light and the opacity of the step's own integral between the values at its two ends: every place is dimmed by what lies in
     /// front of it in the same step.

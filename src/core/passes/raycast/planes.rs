@@ -46,7 +46,7 @@ pub(crate) const PASS: Pass = Pass {
     },
 };
 
-/// The same, toned and in 8 bits.
+/// The pass [`PASS`] that also tones and stores 8 bits.
 pub(crate) const TONED: Pass = Pass {
     name: "raycast_planes_toned",
     shader: |_, _| "raycast/planes.toned",

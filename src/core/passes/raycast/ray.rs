@@ -85,7 +85,7 @@ pub(super) fn marching_constants(scene: &Scene, skipping: Skipping) -> Vec<(&'st
     constants
 }
 
-/// The same for a pass that casts no ray: a camera that moves changes nothing.
+/// Parameters of a pass that casts no ray: they do not depend on the camera.
 pub(in crate::passes) fn unmoved_params(scene: &Scene, view: View) -> Params {
     params(&unmoved(scene, [DVec3::ZERO, DVec3::ZERO, DVec3::ZERO, DVec3::Y]), view, 1.0)
 }

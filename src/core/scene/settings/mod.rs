@@ -191,7 +191,7 @@ pub enum Layout {
     Four,
     /// The rendering of the mode, and the three orthogonal planes in a column on its right; in a picture that is higher than wide, in a row below it.
     Beside,
-    /// Volume rendering on the left and surface rendering on the right, of one march along the same rays. Mode surface only.
+    /// Volume rendering on the left and surface rendering on the right, along the same rays. Mode surface only.
     Pair,
 }
 
