@@ -85,11 +85,13 @@ pub(super) fn show(ui: &mut Ui, state: &PanelState, height: f32, execute: &mut d
         let right = row.right() - of_right.iter().map(|item| width_of(item) + GAP).sum::<f32>() + GAP;
         let font = FontId::proportional(TEXT_SIZE);
         let words = |ui: &Ui, text: &str| ui.painter().layout_no_wrap(text.into(), font.clone(), TEXT).size().x;
-        let spare = if is_wide { 24.0 } else { 14.0 };
-        let segments = VIEWS.map(|(name, ..)| words(ui, name) + spare);
-        let all: f32 = segments.iter().sum();
-        // In the middle of the window where there is room, else as far to the right as it goes.
-        let from = (bar.center().x - all / 2.0).clamp(left, (right - all - 2.0 * GAP).max(left));
+        let spare = if is_wide { 20.0 } else { 10.0 };
+        let names = VIEWS.map(|(name, ..)| if is_wide { name } else { short(name) });
+        let segments = names.map(|name| (name, words(ui, name) + spare));
+        let all: f32 = segments.iter().map(|(_, width)| width).sum();
+        // In the middle of the window where that leaves room for the tabs, else as far to the right as it goes.
+        let of_tabs = state.recordings.len() as f32 * TAB[0] + GAP;
+        let from = (bar.center().x - all / 2.0).max(left + of_tabs).clamp(left, (right - all - 2.0 * GAP).max(left));
         let tabs = from - GAP - left;
         // In the order in which they are read.
         if tabs >= TAB[0] {
@@ -149,15 +151,24 @@ fn show_item(
     });
 }
 
-/// The views as parts of one button.
-fn show_views(ui: &mut Ui, state: &PanelState, area: Rect, segments: &[f32], execute: &mut dyn FnMut(Command)) {
+/// The name of a view where there is little room.
+fn short(name: &'static str) -> &'static str {
+    match name {
+        texts::LAYOUT_BESIDE => texts::LAYOUT_BESIDE_SHORT,
+        texts::LAYOUT_PAIR => texts::LAYOUT_PAIR_SHORT,
+        name => name,
+    }
+}
+
+/// The views as parts of one button: the text on each, and its width.
+fn show_views(ui: &mut Ui, state: &PanelState, area: Rect, segments: &[(&str, f32)], execute: &mut dyn FnMut(Command)) {
     let settings = state.controls.settings();
     ui.scope_builder(UiBuilder::new().max_rect(area), |ui| {
         names::name(ui, Role::Group, texts::VIEW);
         ui.painter().rect_stroke(area, 6.0, Stroke::new(1.0, EDGE), StrokeKind::Inside);
-        let share = area.width() / segments.iter().sum::<f32>();
+        let share = area.width() / segments.iter().map(|(_, width)| width).sum::<f32>();
         let mut left = area.left();
-        for ((name, command, hint), width) in VIEWS.into_iter().zip(segments) {
+        for ((name, command, hint), (text, width)) in VIEWS.into_iter().zip(segments) {
             let part = place(area, left, width * share);
             left += width * share;
             let is_chosen = is_view(settings, command);
@@ -171,7 +182,7 @@ fn show_views(ui: &mut Ui, state: &PanelState, area: Rect, segments: &[f32], exe
                 painter.rect_filled(part.shrink(2.0), 5.0, BUTTON);
             }
             let colour = if is_chosen || is_over { TEXT } else { WEAK_TEXT };
-            painter.text(part.center(), Align2::CENTER_CENTER, name, FontId::proportional(TEXT_SIZE), colour);
+            painter.text(part.center(), Align2::CENTER_CENTER, text, FontId::proportional(TEXT_SIZE), colour);
             if response.tell(hint).clicked() {
                 execute(command);
             }
@@ -250,8 +261,9 @@ pub(super) fn show_buttons(ui: &mut Ui, state: &PanelState, width: f32, execute:
     }
     let settings = state.controls.settings();
     let views = VIEWS.map(|(name, command, _)| (command, name));
+    let columns = ((width / WITH_TEXT) as usize).clamp(1, 3);
     let hint = |command| VIEWS.iter().find(|(_, other, _)| *other == command).map_or("", |(.., hint)| hint);
-    row_of(ui, texts::VIEW, &views, (3, width), |view| is_view(settings, view), hint, &mut *execute);
+    row_of(ui, texts::VIEW, &views, (columns, width), |view| is_view(settings, view), hint, &mut *execute);
     names::group(ui, texts::PROGRAM, |ui| {
         let all = [OPEN, SAVE, UNDO, REDO, FIND, HELP, TIMES, FULL_SCREEN];
         let columns = (width / 52.0).floor().clamp(1.0, 8.0);

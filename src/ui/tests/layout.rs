@@ -275,7 +275,7 @@ fn every_tool_view_and_command_has_a_visible_way_to_it_in_every_window() {
             }
             press(&mut shown, "Inspector", Role::Tab, "Tools");
             // What is below is scrolled to.
-            let names = TOOLS.into_iter().chain(["3D", "4-up", "Slices", "Find a command", "Open"]);
+            let names = TOOLS.into_iter().chain(["3D", "3D + planes", "4-up", "Slices", "Find a command", "Open"]);
             for name in names.filter(|name| room.has_top || !name.is_empty()) {
                 let there =
                     shown.tree.iter().find(|(_, node)| node.role() == Role::Button && node.label() == Some(name));
@@ -289,8 +289,32 @@ fn every_tool_view_and_command_has_a_visible_way_to_it_in_every_window() {
         for name in TOOLS {
             assert!(in_sight(&shown, name, 28.0), "{what}: {name}");
         }
-        for name in ["3D", "VR | SR", "4-up", "3 planes", "Plane", "Slices", "Open", "Undo", "Find a command", "Help"] {
+        for name in [
+            "3D",
+            "3D + planes",
+            "VR | SR",
+            "4-up",
+            "3 planes",
+            "Plane",
+            "Slices",
+            "Open",
+            "Undo",
+            "Find a command",
+            "Help",
+        ] {
             assert!(in_sight(&shown, name, 30.0), "{what}: {name}");
+        }
+        let view = |node: &Node| {
+            let is_one =
+                ["3D", "3D + planes", "VR | SR", "4-up", "3 planes", "Plane", "Slices"].contains(&node.label()?);
+            (node.role() == Role::Button && is_one).then(|| place(node)).flatten()
+        };
+        for area in shown.tree.values().filter_map(view) {
+            for drawn in &shown.drawn {
+                let Kind::Text { area: text, .. } = &drawn.kind else { continue };
+                let is_in_it = common(*text, area).is_none() || is_inside(*text, area);
+                assert!(is_in_it, "{what}: a text at {text:?} reaches beyond its view at {area:?}");
+            }
         }
         // With words where the smallest usual window is.
         let has_word = |name: &str| {

@@ -24,8 +24,10 @@ pub(crate) const PRESETS_HINT: &str =
     "The looks of an examination, with small pictures of this volume, and your own. (Ctrl+P)";
 pub const PRESETS: &str = "Presets";
 pub(crate) const LAYOUT_BESIDE: &str = "3D + planes";
+pub(crate) const LAYOUT_BESIDE_SHORT: &str = "3D+";
 pub(crate) const LAYOUT_FOUR: &str = "4-up";
 pub(crate) const LAYOUT_PAIR: &str = "VR | SR";
+pub(crate) const LAYOUT_PAIR_SHORT: &str = "VR|SR";
 pub(crate) const PROGRAM: &str = "Echolume";
 pub(crate) const TOP_BAR: &str = "Files, views and search";
 pub(crate) const TOOLS: &str = "Tools";
