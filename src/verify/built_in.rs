@@ -457,6 +457,11 @@ fn plane_scenes() -> Vec<SceneSpec> {
             "ray = { tolerance = 1, spread = 0, early_end = 0.05 }\nvolume = { compositing = 'pre-integrated', shading = 'depth-coded' }",
         ),
         (
+            "3D + planes, higher than wide, half the rays, toned",
+            &voxels,
+            "layout = 'beside'\nray.subsampling = 2\npost.colour_map = 'ice'",
+        ),
+        (
             "Cartesian, steps by their error, 4-up, toned",
             &voxels,
             "layout = 'four'\nray.tolerance = 0.2\nray.rays = 2\npost = { gamma = 1.6, contrast = 1.2, colour_map = 'ice' }\n\
@@ -809,8 +814,8 @@ fn ray_scenes() -> Vec<SceneSpec> {
             "layout = 'four'\nslices = { pixels = 12 }\ndistance = { median = 9, sigma = { window = 7 } }\nray = { subsampling = 2 }",
         ),
         (
-            "3D + planes, higher than wide, an eighth of the rays, filtered",
-            "mode = 'sr'\nlayout = 'beside'\npicture = { size = [27, 41] }\nray = { subsampling = 8 }\npost = { sigma = {}, gamma = 1.4 }",
+            "3D + planes, an eighth of the rays, filtered",
+            "mode = 'sr'\nlayout = 'beside'\nslices = { pixels = 12 }\nray = { subsampling = 8 }\npost = { sigma = {}, gamma = 1.4 }",
         ),
         ("4-up, three rays", "mode = 'mip'\nlayout = 'four'\nslices = { pixels = 12 }\nray = { rays = 3 }"),
         (

@@ -89,10 +89,13 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32, messages: &[Rect]) 
     taken.0.extend(recordings::reading_area(state, scale));
     taken.0.extend(messages);
     tiles().for_each(|(_, tile, area)| sides(&painter, &mut taken, area, tile, messages));
-    match (state.origin, state.recordings.iter().find(|recording| recording.is_shown)) {
-        (Some(origin), _) => name_origin(&painter, &mut taken, picture, origin, WARNING),
-        (None, Some(shown)) => name_origin(&painter, &mut taken, picture, &shown.name, TEXT),
-        (None, None) => {}
+    let recording = state.recordings.iter().find(|recording| recording.is_shown).map(|recording| &*recording.name);
+    if let Some((name, colour)) = state.origin.map(|origin| (origin, WARNING)).or(recording.map(|name| (name, TEXT))) {
+        // Over the rendering, where it has the left part of the picture.
+        let is_left = |tile: &TileMarks| tile.is_rendering && tile.corner == [0.0; 2];
+        let rendering = tiles().find(|(_, tile, _)| is_left(tile)).map(|(.., area)| area.intersect(picture));
+        let has_it = rendering.is_some_and(|area| name_origin(&painter, &mut taken, area, name, colour));
+        _ = has_it || name_origin(&painter, &mut taken, picture, name, colour);
     }
     tell_state(&painter, &mut taken, picture, state);
     state.delay().iter().for_each(|delay| tell_delay(&painter, &mut taken, picture, delay));
@@ -147,7 +150,7 @@ pub(super) fn paint_origin(ui: &Ui, state: &PanelState, scale: f32) {
     let picture = picture_rect(state, scale);
     let painter = ui.ctx().layer_painter(egui::LayerId::background()).with_clip_rect(picture);
     let mut taken = Taken::default();
-    state.origin.iter().for_each(|origin| name_origin(&painter, &mut taken, picture, origin, WARNING));
+    state.origin.iter().for_each(|origin| _ = name_origin(&painter, &mut taken, picture, origin, WARNING));
     let delay = state.delay().filter(|_| !state.shows_only_origin);
     delay.iter().for_each(|delay| tell_delay(&painter, &mut taken, picture, delay));
 }
@@ -183,8 +186,8 @@ fn tell_delay(painter: &Painter, taken: &mut Taken, picture: Rect, delay: &str) 
     text_at_one_of(painter, taken, places, Align2::LEFT_TOP, delay, WARNING);
 }
 
-/// Says what the picture is of, near its upper right corner.
-fn name_origin(painter: &Painter, taken: &mut Taken, picture: Rect, origin: &str, colour: Color32) {
+/// Says what the picture is of, near the upper right corner of this part of it. False if there is no room.
+fn name_origin(painter: &Painter, taken: &mut Taken, picture: Rect, origin: &str, colour: Color32) -> bool {
     // Between the letter of the upper edge and a marker in the corner; in a narrow picture further down.
     let lower = (5..40).map(|n| vec2(-6.0, 6.0 + 5.0 * n as f32));
     // On the right or the left of that letter, or of the lower edge's.
@@ -194,8 +197,8 @@ fn name_origin(painter: &Painter, taken: &mut Taken, picture: Rect, origin: &str
     let places = places.map(|away| picture.right_top() + away);
     // In the smallest pictures without what stands in brackets.
     let short = origin.split(" (").next().unwrap_or(origin);
-    _ = text_at_one_of(painter, taken, places.clone(), Align2::RIGHT_TOP, origin, colour)
-        || text_at_one_of(painter, taken, places, Align2::RIGHT_TOP, short, colour);
+    text_at_one_of(painter, taken, places.clone(), Align2::RIGHT_TOP, origin, colour)
+        || text_at_one_of(painter, taken, places, Align2::RIGHT_TOP, short, colour)
 }
 
 /// The areas that marks have taken: no other is drawn there.

@@ -35,7 +35,7 @@ pub(crate) fn of_tool(tool: Tool) -> &'static str {
         Tool::Rotate => "Drag turns the view.",
         Tool::Light => "Drag moves the lamp.",
         Tool::Region => {
-            "Drag moves the nearest face of the region; on the planes of 4-up a side of its box, or all of it; on plane A also the green start line. (G)"
+            "Drag moves the nearest face of the region; on planes beside it a side of its box, or all of it; on plane A also the green start line. (G)"
         }
         Tool::Clip => "Drag up cuts away what is nearer to you.",
         Tool::Cut => "Drag round what is in the way: it is cut away along the view. (F)",

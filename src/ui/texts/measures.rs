@@ -46,7 +46,8 @@ pub(crate) const TOO_MANY_MEASUREMENTS: &str = "There are as many measurements a
 pub(crate) const CONTOUR_LIMITS: &str = "A contour needs three points or more; a volume has at most 64.";
 
 // What stands in the way, and counting voxels.
-pub(crate) const OUTLINE_NEEDS_PLANE: &str = "Outlines are traced on a plane: choose Plane, 3 planes or 4-up";
+pub(crate) const OUTLINE_NEEDS_PLANE: &str =
+    "Outlines are traced on a plane: choose Plane, 3 planes, 3D + planes or 4-up";
 pub(crate) const POINT_NEEDS_SURFACE: &str = "Points on a rendering need its surface: choose the mode Surface or Mixed";
 pub(crate) const NO_PICTURE_TO_USE: &str = "There is no picture yet";
 pub(crate) const NO_SURFACE_HERE: &str = "There is no surface at this place";

@@ -384,9 +384,9 @@ pub(crate) const DOUBLE_CLICK: &str = "double click on a tile";
 pub(crate) const DOUBLE_CLICK_DOES: &str = "show that tile alone, and back";
 pub(crate) const REGION_DRAG: &str = "Region, then drag";
 pub(crate) const REGION_DRAG_DOES: &str = "move the nearest face of the box";
-pub(crate) const START_LINE_CLICK: &str = "Region, then double click the green line (4-up)";
+pub(crate) const START_LINE_CLICK: &str = "Region, then double click the green line (3D + planes)";
 pub(crate) const START_LINE_CLICK_DOES: &str = "bend it; add or remove a handle";
-pub(crate) const REGION_DRAG_ON_PLANE: &str = "Region, then drag on a plane (4-up)";
+pub(crate) const REGION_DRAG_ON_PLANE: &str = "Region, then drag on a plane (3D + planes)";
 pub(crate) const REGION_DRAG_ON_PLANE_DOES: &str = "move a side of the box; from within: all of it";
 pub(crate) const LIGHT_BALL_DRAG: &str = "drag on the light ball (beside Lamp)";
 pub(crate) const LIGHT_BALL_DRAG_DOES: &str = "move the lamp";
@@ -478,8 +478,7 @@ pub(crate) const REMOVE_CURVE: &str = "Remove curved plane";
 // The start line.
 pub(crate) const START_LINE: &str = "Start line";
 pub(crate) const CURVED_LINE: &str = "Curved line";
-pub(crate) const CURVED_LINE_HINT: &str =
-    "Bends the line at which rendering starts: drag its green handles on plane A of 4-up. Off: straight. (Shift+G)";
+pub(crate) const CURVED_LINE_HINT: &str = "Bends the line at which rendering starts: drag its green handles on plane A beside the rendering. Off: straight. (Shift+G)";
 pub(crate) fn start_handle(number: impl Display) -> String {
     format!("Handle {number}")
 }
