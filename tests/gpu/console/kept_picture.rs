@@ -53,8 +53,9 @@ fn until_drawing(desk: &mut Desk) {
 fn the_panels_are_about_the_picture_that_is_shown_until_the_next_one_is_there() {
     let device = Device::alone();
     let mut desk = with_panels(&device);
-    let changes: [Command; 10] = [
+    let changes: [Command; 11] = [
         Command::Layout(Layout::Four),
+        Command::Layout(Layout::Beside),
         Command::Mode(Mode::Mip),
         Command::Mode(Mode::Orthogonal),
         Command::Mode(Mode::Plane),

@@ -63,7 +63,7 @@ fn after_a_rest_no_mode_layout_or_preset_compiles_anything() {
         assert_eq!(compiled(&device), count, "{mode:?} is compiled when it is chosen");
     }
     desk.console.execute(&Command::Mode(Mode::Surface), Instant::now());
-    for layout in [Layout::Four, Layout::Pair, Layout::Single] {
+    for layout in [Layout::Four, Layout::Beside, Layout::Pair, Layout::Single] {
         desk.console.execute(&Command::Layout(layout), Instant::now());
         desk.draw_in_use();
         assert_eq!(desk.console.controls().settings().layout, layout);
