@@ -101,7 +101,7 @@ pub fn open_recording(path: &Path, options: OpenOptions) -> Result<Box<dyn Sourc
     Ok(source)
 }
 
-/// Prints on one line which probe file is used.
+/// Prints on one line which probe file is used. Nothing if there is none, or if the line before named the same file.
 pub fn say_probe_file(file: Option<&Path>) {
     let mut said = SAID.lock().unwrap_or_else(|e| e.into_inner());
     if let Some(file) = file.filter(|file| said.as_deref() != Some(*file)) {

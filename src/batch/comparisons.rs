@@ -4,7 +4,7 @@ use super::agreement::{Class, Drawer};
 use super::results::{Record, Status};
 use std::collections::BTreeMap;
 
-/// Counts of the comparisons of one pair of devices.
+/// The outputs of one pair of devices: how many were compared, how many have the same bytes, and which do not agree.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Pair {
     pub compared: usize,

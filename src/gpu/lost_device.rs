@@ -103,7 +103,7 @@ impl LossReporting {
         report
     }
 
-    /// Records that the queue reaches this pass.
+    /// Records a checkpoint at this pass. After the device is lost, [`LossReporting::read`] lists the checkpoints that each queue reached.
     pub fn mark(&self, commands: vk::CommandBuffer, pass: &str) {
         if let Some(checkpoints) = &self.checkpoints {
             // SAFETY: the command buffer is being recorded; the marker is a number and is never read through.

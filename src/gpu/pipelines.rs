@@ -119,10 +119,10 @@ impl Pipelines {
         Ok(made)
     }
 
-    /// Pipelines that are not shared.
+    /// An empty cache of pipelines. No other renderer uses it, unlike that of [`Pipelines::shared`].
     ///
     /// # Errors
-    /// The device fails.
+    /// The device cannot create the sampler.
     pub fn new(
         context: &Arc<Context>,
         shaders: Arc<Shaders>,

@@ -87,7 +87,7 @@ impl SceneCompiler {
     /// True if every pipeline of the scene is compiled. Those that are not are compiled in the background from now on.
     ///
     /// # Errors
-    /// A shader that does not compile, a slot that the device cannot hold, a thread that cannot be started.
+    /// A shader that does not compile, a slot (an image or a buffer) that the device cannot hold, a thread that cannot be started.
     pub fn prepare(&mut self, scene: &Scene) -> Result<bool, GpuError> {
         let (scene, plan) = self.plan(scene.clone());
         formats::check(self.pipelines.context(), &plan, &scene)?;

@@ -166,11 +166,12 @@ impl ProbeFile {
         }
     }
 
-    /// The probe, without [`Advance`], and the volumes of a recording with so many samples a line, lines a frame, and frames.
-    /// [`Volumes::swept`] gives the probe in each volume.
+    /// The probe and the volumes of a recording with so many samples a line, lines a frame, and frames. The probe stands still during a
+    /// frame ([`Advance::None`]); [`Volumes::swept`] adds the motor's motion in a volume.
     ///
     /// # Errors
-    /// Tables of another length, fewer frames than one volume, and numbers that make no valid [`Probe`].
+    /// A table of the probe file with another number of lines or frames, fewer frames than one volume, and numbers that make no valid
+    /// [`Probe`].
     pub fn geometry(&self, samples: usize, lines: usize, frames: usize) -> Result<(Probe, Volumes), InputError> {
         let mut volumes = self.volumes(frames)?;
         let (motion, slices) = self.motion(volumes.frames)?;

@@ -65,7 +65,8 @@ fn absolute(path: &Path) -> PathBuf {
 }
 
 impl Recordings {
-    /// A list of one source, which is shown. `path`: the name under which it can be opened again.
+    /// A list of one source, and that source is on display. `kind`: a pipe cannot be opened again. `path`: the name that opens the others
+    /// again.
     pub fn of(kind: SourceKind, path: &Path) -> Recordings {
         let title = match kind {
             SourceKind::Demo => Some(texts::DEMO_DATA),

@@ -8,7 +8,7 @@
 use super::coordinates::{Line, crossings_of_a_line, quadratic, sorted};
 use glam::DVec3;
 
-/// The fade along a line.
+/// The share of matter that `region.fade` leaves along a line.
 #[derive(Clone, Copy, Debug)]
 pub struct Fade<'a> {
     line: Line<'a>,

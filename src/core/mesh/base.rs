@@ -26,7 +26,7 @@ impl Base {
         }
     }
 
-    /// The deepest row at which a column enters the body. None if no column does.
+    /// The deepest of the rows at which the columns first reach the threshold. None if no column reaches it.
     pub fn deepest(&self) -> Option<usize> {
         self.deepest
     }

@@ -588,7 +588,7 @@ fn cones() -> [DVec3; 7] {
     })
 }
 
-/// The light that leaves each cell, and the orientation of the cell.
+/// Computes the light that leaves each cell, and the cell's orientation: the unit vector towards weaker echoes, times its certainty (0..1).
 pub const SHADE: Pass = Pass {
     name: "light_shade",
     shader: |_, _| "light_volume/shade",

@@ -142,7 +142,8 @@ pub(super) fn is_non_uniform(geometry: &Geometry) -> bool {
     }
 }
 
-/// Red, green, blue and absorption over the sample value.
+/// The transfer function: red, green, blue (0..1) and absorption over [`Scene::reference_length`], at [`Scene::transfer_entries`] equidistant
+/// windowed sample values from 0 to 1.
 pub fn transfer_table(scene: &Scene) -> Vec<f32> {
     floats(transfer_of(scene).into_iter().flatten())
 }

@@ -689,7 +689,7 @@ impl Slot {
         }
     }
 
-    /// Bytes of one copy.
+    /// Size, bytes. Of a slot that each volume image has a copy of, the size of one copy.
     pub fn bytes(self, scene: &Scene) -> u64 {
         self.shape(scene).texels() * self.format(scene).texel_bytes() as u64
     }

@@ -26,7 +26,7 @@ const BEHIND: f64 = 0.2;
 const DARKEST: f64 = 0.02;
 const BRIGHTEST: f64 = 0.003;
 
-/// The levels of the echoes of a volume, 0..1 in the range of its input.
+/// How dark and how bright the echoes of a volume are: sample values as shares 0..1 of the input's range.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EchoLevels {
     /// Median of the darker class of blocks: fluid, or soft tissue next to bone.

@@ -56,8 +56,8 @@ impl<'a> Picker<'a> {
         std::array::from_fn(|a| (at[a] - self.corner[a]) * self.rays_per_pixel)
     }
 
-    /// The column and row of the ray nearest to a position on the picture, and that ray; none beside the rendered part. `rays`: their number
-    /// along each axis.
+    /// The column and row of the ray nearest to a position on the picture, pixels, and the origin and unit direction of that ray. None outside
+    /// of the rendered part. `rays`: number of rays along each axis.
     pub fn nearest_ray(&self, at: [f64; 2], rays: [u32; 2]) -> Option<([usize; 2], (DVec3, DVec3))> {
         let place = self.in_rays(at).map(f64::floor);
         let is_in = (0..2).all(|a| place[a] >= 0.0 && place[a] < f64::from(rays[a]));

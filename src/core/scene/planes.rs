@@ -263,7 +263,7 @@ impl Scene {
         Some((Plane { at, right, down, normal: right.cross(down) }, section, base))
     }
 
-    /// The tiles of this scene.
+    /// The grid of tiles that this scene's picture consists of, and the plane that each tile shows.
     pub fn tiling(&self) -> Tiling {
         let [columns, rows] = self.tile_grid();
         let Area { corner: [left, top], size: [width, height] } = self.tile_area();

@@ -174,7 +174,8 @@ impl Ring {
         !self.batch.as_ref().is_some_and(grows)
     }
 
-    /// Writes a frame into the staging buffer, as the next of the batch. The first of a batch needs [`Ring::wait`] before.
+    /// Appends a frame, which becomes `slice` of volume image `image`, to the batch in the staging buffer. Call [`Ring::wait`] before the
+    /// first frame of a batch.
     pub fn write(&mut self, queues: &mut DeviceQueues, image: u32, slice: u32, bytes: &[u8]) {
         let Staging { bytes: length, write, .. } = self.staging;
         let at = self.batch.as_ref().map_or(0, |batch| batch.count as usize) * length;

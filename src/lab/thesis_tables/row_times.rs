@@ -190,7 +190,7 @@ const ARRAY_RADIUS: f64 = 40.0;
 /// Radius of the wobble, mm.
 const WOBBLE_RADIUS: f64 = 25.0;
 
-/// Radius of the ball, mm: as wide as a fetal head.
+/// Radius of the ball, mm. Its diameter is about that of a fetal head.
 pub const BALL_RADIUS: f64 = 45.0;
 /// Depth of its centre below the face, mm.
 const BALL_DEPTH: f64 = 100.0;

@@ -145,7 +145,7 @@ impl Request {
         Request::new(address, motor, command::REFERENCE_SEARCH, 0, 0)
     }
 
-    /// RFS STOP.
+    /// RFS STOP: ends the search of the reference.
     pub fn search_stop(address: u8, motor: u8) -> Request {
         Request::new(address, motor, command::REFERENCE_SEARCH, 1, 0)
     }

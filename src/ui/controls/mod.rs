@@ -57,7 +57,7 @@ impl Handiwork {
     }
 }
 
-/// The settings of the view and the tool of drags.
+/// What the user changes in the view: the settings and their history, the tool that a drag uses, and the measurement or line in progress.
 #[derive(Clone, Debug)]
 pub struct Controls {
     settings: Settings,

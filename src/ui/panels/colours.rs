@@ -61,9 +61,10 @@ pub const AXES: [(&str, Color32); 3] = [
     ("depth", Color32::from_rgb(120, 205, 120)),
     ("elev.", Color32::from_rgb(110, 160, 245)),
 ];
-/// Frame of the focused control, and the pointer where no windowing system draws one; with their dark edge.
+/// Frame of the focused control, and ring around the pointer by keyboard. Both are drawn over a wider line of `FOCUS_EDGE`.
 pub const FOCUS: Color32 = Color32::WHITE;
 pub(crate) const FOCUS_EDGE: Color32 = Color32::BLACK;
+/// The pointer where no windowing system draws one.
 pub(crate) const POINTER: Color32 = Color32::WHITE;
 
 /// A colour of the scene, 0..=1, on the screen.

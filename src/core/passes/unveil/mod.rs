@@ -116,7 +116,8 @@ pub(super) const SEARCH: Search = Search {
     reference: |scene, volume| reference(scene, volume).0,
 };
 
-/// Finds where rendering starts in a volume. `bytes` are the texels in the format of [`Slot::Volume`], which is stored completely.
+/// Finds where rendering starts in each column of a volume. `bytes`: all texels of the volume in the format of [`Slot::Volume`], not only the
+/// visible ones.
 pub fn find(scene: &Scene, bytes: &[u8]) -> Unveiled {
     let lattice = scene.fluid_lattice();
     let cells = smoothed_cells(&lattice, cells(scene, &lattice, bytes));

@@ -33,8 +33,8 @@ const INSTRUCTIONS: &[&str] = &["Instruction count", "Instructions", "Instructio
 /// Shared memory of a workgroup, bytes.
 const SHARED: &[&str] = &["SLM size", "LDS size", "Workgroup Memory Size", "ldsUsageSizeInBytes", "Shared Memory Size"];
 
-/// Columns that drivers have in common. `None` if this driver does not report the value. With several executables the worst value counts,
-/// because the driver decides which one runs.
+/// The statistics of a pipeline that several drivers report. `None` if this driver does not report the value. Of a pipeline that the driver
+/// compiles to several executables, the worst value counts, because the driver decides which one runs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Columns {
     /// Registers of an invocation. Half registers count as registers.
