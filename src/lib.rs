@@ -10,7 +10,7 @@
 //! # Render a file
 //!
 //! ```
-//! use echolume::{Context, ContextOptions, Input, Layers, Renderer, RendererOptions, Scene};
+//! use echolume::{Context, ContextOptions, Input, Layers, Renderer, RendererOptions, Scene, Source};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let mut recording = echolume::open("tests/data/bone-l14/bone.mha".as_ref(), None)?;
@@ -159,7 +159,7 @@ pub use low_level::probe::{Frame, Geometry, GeometryError, Grid, Probe, SampleTy
 pub use low_level::scene::load::{Layers, LoadError};
 pub use low_level::scene::{Input, Scene, SceneError, Settings};
 pub use low_level::source::live::{Event, Live};
-pub use low_level::source::{Header, Recording, open};
+pub use low_level::source::{Header, Recording, Source, open};
 
 /// The modules of the program, for its own tests, benches and tools. Each of them may change with any version.
 ///

@@ -1,6 +1,7 @@
 //! Reading recordings: all their frames, from files that the system has in memory after the first round.
 
 use criterion::{Criterion, Throughput};
+use echolume::Source;
 use echolume::low_level::probe::file::ProbeFile;
 use echolume::low_level::source::{InputError, Recording};
 use std::path::{Path, PathBuf};

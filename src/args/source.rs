@@ -14,7 +14,7 @@ use crate::source::igtl::{self, Network, NetworkOptions, Poses, SCHEME};
 use crate::source::live::SourceKind;
 use crate::source::live::{Live, Playback, PlaybackSource};
 use crate::source::motor_tracking::FreeRunning;
-use crate::source::phantom::{self, CachedPhantom, Phantom};
+use crate::source::phantom::{self, Phantom, PhantomSource};
 use crate::source::piped::Piped;
 use crate::source::{OpenOptions, Source};
 use crate::terminal::{Failure, failed, input};
@@ -255,7 +255,7 @@ impl SourceArgs {
         let Some(sweep) = sweep else {
             let playback = self.playback(self.rate.or(Some(PHANTOM_RATE)))?;
             let phantom = Phantom::new(options).map_err(input)?;
-            return Ok(Box::new(PlaybackSource::new(Box::new(CachedPhantom::new(phantom)), playback, u32::MAX)));
+            return Ok(Box::new(PlaybackSource::new(Box::new(PhantomSource::cached(phantom)), playback, u32::MAX)));
         };
         if self.rate.is_some() || self.real_time {
             return Err(input(

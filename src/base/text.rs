@@ -44,6 +44,11 @@ pub fn csv_quoted(text: &str) -> String {
     format!("\"{}\"", text.replace('"', "\"\""))
 }
 
+/// A CSV field (RFC 4180), quoted if it contains a comma, quote or line break.
+pub fn csv_field(text: &str) -> String {
+    if text.contains([',', '"', '\n', '\r']) { csv_quoted(text) } else { text.into() }
+}
+
 /// Text without Markdown table markup and terminal control characters.
 pub fn markdown_text(text: &str) -> String {
     text.chars()

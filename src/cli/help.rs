@@ -2,6 +2,7 @@
 
 use crate::scene::load::PRESETS;
 use crate::scene::numbers;
+use crate::source::formats;
 use crate::source::phantom::Body;
 use clap::builder::PossibleValuesParser;
 use clap::{Arg, Command};
@@ -176,8 +177,7 @@ const USUAL: [(&str, &[&str]); 8] = [
 ];
 
 /// What `-h` says of flags whose first sentence is too long for a line.
-const SHORT: [(&str, &str); 16] = [
-    ("input", "Recording: DICOM, MetaImage, NRRD, NIfTI, Kretz, UFF, .frames, a folder of pictures"),
+const SHORT: [(&str, &str); 15] = [
     ("source", "phantom, a recording, - (a pipe) or igtl://HOST[:PORT]"),
     ("files", "Recordings, or workspaces (.toml) that were saved"),
     ("mode", "vr, sr, mixed, mip, minip, xray, mpr, orthogonal, tomography, cube"),
@@ -240,8 +240,12 @@ fn short_command(command: Command, above: &str) -> Command {
 /// An argument with one line of help: the first sentence of what `--help` says.
 fn short_line(arg: Arg) -> Arg {
     let whole = arg.get_help().map(ToString::to_string).unwrap_or_default();
-    let own = SHORT.iter().find(|(id, _)| *id == arg.get_id().as_str() && whole.len() > LINE);
-    let line = own.map_or_else(|| first_part(&whole), |(_, line)| line.to_string());
+    let line = match SHORT.iter().find(|(id, _)| *id == arg.get_id().as_str()) {
+        _ if whole.len() <= LINE => first_part(&whole),
+        _ if arg.get_id() == "input" => format!("Recording: {}, a folder of pictures", formats::names()),
+        Some((_, line)) => line.to_string(),
+        None => first_part(&whole),
+    };
     arg.help(line)
 }
 

@@ -246,7 +246,7 @@ mod tests {
     #[test]
     fn every_barrier_of_a_real_plan_is_needed_and_none_is_missing() {
         use crate::passes::{Frequency, PASSES};
-        use crate::probe::{Geometry, Grid};
+        use crate::scene::test_block::block;
         let settings = "slices.median = true
             slices.sigma = {}
             slices.enhanced_sigma = { growth = true }
@@ -255,10 +255,7 @@ mod tests {
             distance = { median = 3, bilateral = { pixels = 1.0, distance = 1.0, repeat = 3 }, sigma = {} }
             light = { shadow = {}, occlusion = {} }
             post = { sigma = {}, enhanced_sigma = {}, perona_malik = { scheme = 'aos' } }";
-        let grid = Grid { size: [8, 8, 6], spacing: [1.0; 3], origin: [0.0; 3] };
-        let input = crate::scene::Input { stored: crate::probe::StoredType::U8, range: [0.0, 255.0] };
-        let scene =
-            Scene::new(Geometry::Cartesian(grid), input, crate::scene::Settings::from_toml(settings).unwrap()).unwrap();
+        let scene = block(&settings.lines().map(str::trim).collect::<Vec<_>>(), [8, 8, 6]);
         let mut operations: Vec<Operation> = Vec::new();
         let run = |frequency: Frequency, args: DispatchArgs, operations: &mut Vec<Operation>| {
             for pass in PASSES.iter().filter(|p| p.frequency == frequency && p.is_needed(&scene)) {

@@ -1,8 +1,9 @@
 //! The files that hold the samples of a recording, as headers name them: one file, a list, or numbered files. Also samples whose axes are
 //! stored in another order than frames have.
 
+use super::gathered::Gathered;
 use super::layout::Layout;
-use super::packed::{Encoding, Gathered, PixelStream, Pixels};
+use super::packed::{Encoding, PixelStream, Pixels};
 use crate::files::{InputError, quoted};
 use std::fs;
 use std::io::{self, Cursor, Read};
@@ -23,16 +24,9 @@ const MAX_DIGITS: usize = 20;
 pub(super) fn beside(header: &Path, name: &str) -> Result<Pixels, String> {
     let path = below(header, name)?;
     match fs::metadata(&path) {
-        Ok(metadata) if metadata.is_file() => Ok(Pixels {
-            path,
-            offset: 0,
-            length: metadata.len(),
-            encoding: Encoding::Raw,
-            inside: 0,
-            pictures: None,
-            frames: None,
-            gathered: None,
-        }),
+        Ok(metadata) if metadata.is_file() => {
+            Ok(Pixels { path, offset: 0, length: metadata.len(), encoding: Encoding::Raw, inside: 0, gathered: None })
+        }
         Ok(_) => Err(format!("{} is not a regular file", quoted(name))),
         Err(error) => Err(format!("{} cannot be read: {error}", quoted(name))),
     }
@@ -205,13 +199,7 @@ fn joined(header: &Path, mut parts: Vec<Pixels>, part_bytes: u64) -> Result<Pixe
     }
     let length = parts.iter().fold(0, |sum: u64, part| sum.saturating_add(part.length));
     let encoding = parts.first().map_or(Encoding::Raw, |part| part.encoding);
-    let gathered = Parts { parts: parts.into(), part_bytes };
-    Ok(gathered_pixels(header, length, encoding, Arc::new(gathered)))
-}
-
-fn gathered_pixels(path: &Path, length: u64, encoding: Encoding, gathered: Arc<dyn Gathered>) -> Pixels {
-    let gathered = Some(gathered);
-    Pixels { path: path.into(), offset: 0, length, encoding, inside: 0, pictures: None, frames: None, gathered }
+    Ok(Pixels::gathered(header, encoding, length, Parts { parts: parts.into(), part_bytes }))
 }
 
 /// Files with the same number of bytes of samples each.
@@ -291,7 +279,7 @@ pub(super) fn reorder(layout: &mut Layout, header: &Path, field: &str, stored: S
     let inner = layout.pixels.clone();
     let (length, encoding, path) = (inner.length, inner.encoding, inner.path.clone());
     let reordered = Reordered { inner, stored, sample, bytes, all: OnceLock::new() };
-    layout.pixels = gathered_pixels(&path, length, encoding, Arc::new(reordered));
+    layout.pixels = Pixels::gathered(&path, encoding, length, reordered);
     Ok(())
 }
 

@@ -1,7 +1,7 @@
 //! Descriptions of geometry, volumes and times for users, in mm, degrees and seconds.
 
 use crate::files::escaped;
-use crate::probe::{Array, Axis, Firing, Grid, Motion, Probe, Volumes};
+use crate::probe::{Array, Axis, Firing, Geometry, Grid, Motion, Probe, Volumes};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -15,6 +15,44 @@ pub(super) fn number(value: f64) -> String {
     }
     let text = format!("{value:.4}");
     text.trim_end_matches('0').trim_end_matches('.').to_string()
+}
+
+/// Pairs of title and value.
+pub(super) trait Rows {
+    fn add(&mut self, title: &str, value: impl Into<String>);
+    /// What a frame of this size is.
+    fn add_frame(&mut self, is_sweep: bool, size: [usize; 2]);
+    fn add_geometry(&mut self, geometry: &Geometry);
+    /// `how`: what follows the values.
+    fn add_range(&mut self, range: [f64; 2], how: &str);
+}
+
+impl Rows for Vec<(String, String)> {
+    fn add(&mut self, title: &str, value: impl Into<String>) {
+        self.push((title.into(), value.into()));
+    }
+
+    fn add_frame(&mut self, is_sweep: bool, [first, second]: [usize; 2]) {
+        self.add(
+            "frame",
+            match is_sweep {
+                true => format!("{second} lines of {first} samples"),
+                false => format!("{first} x {second} pixels"),
+            },
+        );
+    }
+
+    fn add_geometry(&mut self, geometry: &Geometry) {
+        self.extend(match geometry {
+            Geometry::Sweep(swept) => probe(swept),
+            Geometry::Cartesian(lattice) => grid(lattice),
+        });
+    }
+
+    fn add_range(&mut self, range: [f64; 2], how: &str) {
+        let [low, high] = range.map(number);
+        self.add("value range", format!("{low} .. {high}{how}"));
+    }
 }
 
 pub(super) fn path(path: &Path) -> String {
@@ -55,36 +93,35 @@ pub(super) fn grid(grid: &Grid) -> Vec<(String, String)> {
 }
 
 pub(super) fn probe(probe: &Probe) -> Vec<(String, String)> {
-    let mut rows: Vec<(String, String)> = Vec::new();
-    let mut add = |title: &str, value: String| rows.push((title.into(), value));
+    let mut rows = Vec::new();
     match probe.array {
         Array::Curved { radius } => {
-            add("array", format!("curved, radius {} mm", number(radius)));
-            add("scan lines", axis(&probe.lines, "deg", 180.0 / std::f64::consts::PI));
+            rows.add("array", format!("curved, radius {} mm", number(radius)));
+            rows.add("scan lines", axis(&probe.lines, "deg", 180.0 / std::f64::consts::PI));
         }
         Array::Linear => {
-            add("array", "linear".into());
-            add("scan lines", axis(&probe.lines, "mm", 1.0));
+            rows.add("array", "linear");
+            rows.add("scan lines", axis(&probe.lines, "mm", 1.0));
         }
     }
     let last = probe.start_depth + probe.sample_pitch * (probe.samples.max(1) - 1) as f64;
     let pitch = number(probe.sample_pitch);
-    add("depth", format!("{} .. {} mm, {pitch} mm a sample", number(probe.start_depth), number(last)));
+    rows.add("depth", format!("{} .. {} mm, {pitch} mm a sample", number(probe.start_depth), number(last)));
     match probe.motion {
         Motion::Fan { wobble_radius } => {
-            add("motion", format!("fan about an axis {} mm behind the face", number(wobble_radius)));
-            add("slices", axis(&probe.slices, "deg", 180.0 / std::f64::consts::PI));
+            rows.add("motion", format!("fan about an axis {} mm behind the face", number(wobble_radius)));
+            rows.add("slices", axis(&probe.slices, "deg", 180.0 / std::f64::consts::PI));
         }
         Motion::Translated => {
-            add("motion", "translated".into());
-            add("slices", axis(&probe.slices, "mm", 1.0));
+            rows.add("motion", "translated");
+            rows.add("slices", axis(&probe.slices, "mm", 1.0));
         }
-        Motion::Still { thickness } => add("motion", format!("still, drawn {} mm thick", number(thickness))),
+        Motion::Still { thickness } => rows.add("motion", format!("still, drawn {} mm thick", number(thickness))),
     }
     if let Some(cut) = probe.folded() {
-        add("cut", cut);
+        rows.add("cut", cut);
     }
-    add("speed of sound", format!("{} m/s", number(probe.sound_speed)));
+    rows.add("speed of sound", format!("{} m/s", number(probe.sound_speed)));
     rows
 }
 

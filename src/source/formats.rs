@@ -153,6 +153,13 @@ pub fn described() -> String {
     format!("{}, each also as .{PACKED}, {}", of(true), of(false))
 }
 
+/// The names of the formats whose files have endings, in one line. A format that is named by its ending has the dot of it.
+pub fn names() -> String {
+    let named = FORMATS.iter().filter(|format| !format.endings.is_empty());
+    let dot = |format: &Format| if format.endings.contains(&format.name) { "." } else { "" };
+    named.map(|format| format!("{}{}", dot(format), format.name)).collect::<Vec<_>>().join(", ")
+}
+
 /// True if a recording may have this ending, in lower case and without its dot. Packed files have the ending `gz`.
 pub fn is_ending(ending: &str) -> bool {
     ending == PACKED || FORMATS.iter().any(|format| format.endings.contains(&ending))
@@ -263,6 +270,7 @@ mod tests {
                 assert!(FORMATS[..n].iter().all(|other| !other.endings.contains(ending)), "{ending} has two formats");
             }
         }
+        assert_eq!(names(), "DICOM, MetaImage, NRRD, NIfTI, Kretz, UFF, .frames");
         assert!(is_ending("gz") && !is_ending("png") && !is_ending(""));
         assert_eq!(
             described(),

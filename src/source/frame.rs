@@ -197,6 +197,15 @@ pub trait Source: Send {
     }
 }
 
+/// That a file of `count` volumes has this one.
+pub(super) fn check_volume(path: &Path, volume: usize, count: usize) -> Result<(), InputError> {
+    if volume < count {
+        return Ok(());
+    }
+    let fault = format!("there is no {volume}, the last is {}", count.saturating_sub(1));
+    Err(InputError::new(path, "volume", fault))
+}
+
 /// Bytes of all files of a source.
 pub(super) fn file_bytes(source: &dyn Source) -> u64 {
     let files: BTreeSet<PathBuf> = source.files().into_iter().collect();

@@ -17,6 +17,7 @@ mod drawn;
 pub mod formats;
 mod frame;
 pub mod freehand;
+mod gathered;
 pub mod igtl;
 pub mod keys;
 mod kretz;
@@ -191,7 +192,6 @@ fn stream(path: &Path, options: OpenOptions) -> Result<piped_file::PipedFile, In
     piped_file::PipedFile::open(path, options.probe)
 }
 
-/// What describes a source: pairs of title and value.
 /// The source of a UFF file, and its description.
 fn uff(path: &Path, options: OpenOptions) -> Result<(Box<dyn Source>, Description), InputError> {
     let fault = |flag: &str| Err(InputError::new(path, flag, "is not for UFF, which states its own geometry"));

@@ -3,8 +3,8 @@
 //! A packed file is read through its decompressor from the start, each time anew; nothing is unpacked to a disk.
 
 use super::describe;
-use super::dicom::{Coding, FrameStream, Frames};
-use super::pictures::{PictureStream, Pictures};
+use super::dicom::Coding;
+use super::gathered::Gathered;
 use crate::files::InputError;
 use crate::files::progress::CountedFile;
 use bzip2::bufread::MultiBzDecoder;
@@ -138,7 +138,7 @@ impl<'a> InputFile<'a> {
             true => (0, self.bytes, Encoding::Gzip, at),
             false => (at, there.saturating_sub(offset), Encoding::Raw, 0),
         };
-        Pixels { path, offset, length, encoding, inside, pictures: None, frames: None, gathered: None }
+        Pixels { path, offset, length, encoding, inside, gathered: None }
     }
 }
 
@@ -153,20 +153,8 @@ pub(super) struct Pixels {
     pub encoding: Encoding,
     /// Bytes of the decompressed stream that come before the samples.
     pub inside: u64,
-    /// The pictures of a stack, in place of a file.
-    pub pictures: Option<Pictures>,
-    /// The frames of DICOM files, in place of a file.
-    pub frames: Option<Frames>,
     /// Samples of several files or in another order, in place of a file.
     pub gathered: Option<Arc<dyn Gathered>>,
-}
-
-/// Samples that are not one range of one file.
-pub(super) trait Gathered: std::fmt::Debug + Send + Sync {
-    /// The stream `skip` bytes after its beginning.
-    fn open(&self, skip: u64) -> io::Result<Box<dyn Read + Send>>;
-    /// The files that hold them.
-    fn files(&self) -> Vec<PathBuf>;
 }
 
 /// The samples as a stream.
@@ -176,24 +164,14 @@ pub(super) enum PixelStream {
 }
 
 impl Pixels {
-    /// The samples of a stack. `path`: as the user named it; `length`: of all its files, bytes.
-    pub fn of_pictures(path: &Path, pictures: Pictures, length: u64) -> Pixels {
-        let (path, encoding) = (path.into(), Encoding::Pictures);
-        Pixels { path, offset: 0, length, encoding, inside: 0, pictures: Some(pictures), frames: None, gathered: None }
-    }
-
-    /// The frames of DICOM files. `path`: as the user named it; `length`: of all pixels in the files, bytes.
-    pub fn of_frames(path: &Path, frames: Frames, length: u64) -> Pixels {
-        let (path, encoding) = (path.into(), Encoding::Dicom(frames.coding()));
-        Pixels { path, offset: 0, length, encoding, inside: 0, pictures: None, frames: Some(frames), gathered: None }
+    /// Samples that are not one range of one file. `path`: as the user named it; `length`: in the files, bytes.
+    pub fn gathered(path: &Path, encoding: Encoding, length: u64, from: impl Gathered + 'static) -> Pixels {
+        Pixels { path: path.into(), offset: 0, length, encoding, inside: 0, gathered: Some(Arc::new(from)) }
     }
 
     /// The files that hold the samples: those of a stack, of DICOM, of a list, or one.
     pub(super) fn files(&self) -> Vec<PathBuf> {
-        let pictures = self.pictures.iter().flat_map(|pictures| pictures.files.iter().cloned());
-        let frames = self.frames.iter().flat_map(|frames| frames.files().iter().cloned());
-        let gathered = self.gathered.iter().flat_map(|gathered| gathered.files());
-        [self.path.clone()].into_iter().chain(pictures).chain(frames).chain(gathered).collect()
+        [self.path.clone()].into_iter().chain(self.gathered.iter().flat_map(|gathered| gathered.files())).collect()
     }
 
     /// True if the samples are compressed.
@@ -203,12 +181,6 @@ impl Pixels {
 
     /// Opens the stream `skip` bytes after its beginning. A compressed stream is decompressed up to there.
     pub fn open(&self, skip: u64) -> io::Result<PixelStream> {
-        if let Some(pictures) = &self.pictures {
-            return Ok(PixelStream::Packed(Box::new(PictureStream::new(pictures, skip)?)));
-        }
-        if let Some(frames) = &self.frames {
-            return Ok(PixelStream::Packed(Box::new(FrameStream::new(frames, skip)?)));
-        }
         if let Some(gathered) = &self.gathered {
             return Ok(PixelStream::Packed(gathered.open(skip)?));
         }

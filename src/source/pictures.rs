@@ -1,9 +1,10 @@
 //! Pictures of one size as a stream of samples.
 
+use super::gathered::Decoded;
 use crate::files::escaped;
 use crate::files::progress::CountedFile;
 use image::metadata::Orientation;
-use image::{DynamicImage, ImageDecoder, ImageReader};
+use image::{ImageDecoder, ImageReader};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -100,63 +101,34 @@ fn unreadable(error: image::ImageError) -> String {
     format!("cannot be read: {}", escaped(&error.to_string(), 200))
 }
 
-/// The pixels of a stack as one stream of samples: picture by picture, rows from the top, little-endian.
-pub(super) struct PictureStream {
-    pictures: Pictures,
-    next: usize,
-    pixels: io::Cursor<Vec<u8>>,
-}
-
-impl PictureStream {
-    /// Begins `skip` bytes after the first sample.
-    ///
-    /// # Errors
-    /// A picture that cannot be read.
-    pub fn new(pictures: &Pictures, skip: u64) -> io::Result<PictureStream> {
-        let each = pictures.each.max(1) as u64;
-        let next = usize::try_from(skip / each).unwrap_or(usize::MAX);
-        let mut stream = PictureStream { pictures: pictures.clone(), next, pixels: io::Cursor::default() };
-        if !skip.is_multiple_of(each) {
-            stream.decode()?;
-            stream.pixels.set_position(skip % each);
-        }
-        Ok(stream)
+impl Decoded for Pictures {
+    fn each(&self) -> usize {
+        self.each
     }
 
-    /// Decodes the next picture; after the last there are no pixels.
-    fn decode(&mut self) -> io::Result<()> {
-        self.pixels = io::Cursor::default();
-        let Some(picture) = self.pictures.files.get(self.next) else { return Ok(()) };
+    /// Rows from the top, little-endian.
+    fn decode(&self, number: usize) -> io::Result<Vec<u8>> {
+        let Some(picture) = self.files.get(number) else { return Ok(Vec::new()) };
         let named = |why: String| {
             let name = picture.file_name().unwrap_or_default().to_string_lossy();
             io::Error::other(format!("{}: {why}", escaped(&name, 100)))
         };
         let image = reader(picture).and_then(|reader| reader.decode().map_err(unreadable)).map_err(named)?;
-        let samples = self.samples(image);
-        if samples.len() != self.pictures.each {
-            return Err(named("changed while it was being read".into()));
-        }
-        (self.pixels, self.next) = (io::Cursor::new(samples), self.next + 1);
-        Ok(())
-    }
-
-    fn samples(&self, image: DynamicImage) -> Vec<u8> {
         let is_deep = image.color().bytes_per_pixel() / image.color().channel_count() == 2;
         let words = |words: Vec<u16>| words.into_iter().flat_map(u16::to_le_bytes).collect();
-        match (self.pictures.is_colour, is_deep) {
+        let samples: Vec<u8> = match (self.is_colour, is_deep) {
             (false, false) => image.into_luma8().into_raw(),
             (false, true) => words(image.into_luma16().into_raw()),
             (true, false) => image.into_rgb8().into_raw(),
             (true, true) => words(image.into_rgb16().into_raw()),
+        };
+        match samples.len() == self.each {
+            true => Ok(samples),
+            false => Err(named("changed while it was being read".into())),
         }
     }
-}
 
-impl Read for PictureStream {
-    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
-        if self.pixels.position() >= self.pixels.get_ref().len() as u64 {
-            self.decode()?;
-        }
-        self.pixels.read(out)
+    fn files(&self) -> &[PathBuf] {
+        &self.files
     }
 }

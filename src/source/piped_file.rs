@@ -1,7 +1,7 @@
 //! A stream of raw frames ([`super::piped`]) that was kept in a file: every frame has the same size, so that any can be read.
 
-use super::describe;
-use super::frame::{Header, POSE_BYTES, Source, read_pose};
+use super::describe::{self, Rows};
+use super::frame::{Header, POSE_BYTES, Source, check_volume, read_pose};
 use super::piped::{StreamHeader, first_line};
 use super::piped_record::{self, BEFORE, Stamps};
 use super::samples;
@@ -73,28 +73,18 @@ impl PipedFile {
 
     /// A description for users: pairs of title and value.
     pub fn description(&self) -> Vec<(String, String)> {
-        let mut rows: Vec<(String, String)> = Vec::new();
-        let mut add = |title: &str, value: String| rows.push((title.into(), value));
-        add("format", "stream of frames".into());
-        add("samples", self.stream.sample.to_string());
-        let [first, second] = self.stream.header.forward.frame_size();
-        match self.stream.header.forward {
-            Geometry::Sweep(_) => add("frame", format!("{second} lines of {first} samples")),
-            Geometry::Cartesian(_) => add("frame", format!("{first} x {second} pixels")),
-        }
-        add(
-            "volumes",
-            describe::volumes(&crate::probe::Volumes { count: self.volumes, ..self.stream.volumes.clone() }),
-        );
+        let mut rows = Vec::new();
+        let header = &self.stream.header;
+        rows.add("format", "stream of frames");
+        rows.add("samples", self.stream.sample.to_string());
+        rows.add_frame(matches!(header.forward, Geometry::Sweep(_)), header.forward.frame_size());
+        let volumes = crate::probe::Volumes { count: self.volumes, ..self.stream.volumes.clone() };
+        rows.add("volumes", describe::volumes(&volumes));
         if self.left_over > 0 {
-            add("more data", format!("{} bytes behind the last whole volume; not read", self.left_over));
+            rows.add("more data", format!("{} bytes behind the last whole volume; not read", self.left_over));
         }
-        match &self.stream.header.forward {
-            Geometry::Sweep(probe) => rows.extend(describe::probe(probe)),
-            Geometry::Cartesian(grid) => rows.extend(describe::grid(grid)),
-        }
-        let [low, high] = self.stream.header.range.map(describe::number);
-        rows.push(("value range".into(), format!("{low} .. {high}")));
+        rows.add_geometry(&header.forward);
+        rows.add_range(header.range, "");
         rows
     }
 
@@ -163,10 +153,7 @@ impl Source for PipedFile {
     }
 
     fn skip_to_volume(&mut self, volume: usize) -> Result<(), InputError> {
-        if volume >= self.volumes {
-            let fault = format!("there is no {volume}, the last is {}", self.volumes.saturating_sub(1));
-            return Err(InputError::new(&self.path, "volume", fault));
-        }
+        check_volume(&self.path, volume, self.volumes)?;
         self.next = volume as u64 * self.frames();
         self.stamps = Stamps::default();
         let at = self.start + self.next * frame_bytes(&self.stream);

@@ -19,7 +19,7 @@
 
 pub use super::frame::Header;
 
-use super::describe::{self, number};
+use super::describe::{Rows, number};
 use super::frame::{POSE_BYTES, Source, read_pose, stored_pose};
 use crate::Frame;
 use crate::files::progress::CountedFile;
@@ -551,35 +551,26 @@ impl Reader {
     /// Errors of the operating system.
     pub fn description(mut self) -> Result<Vec<(String, String)>, InputError> {
         let summary = self.summarize()?;
-        let mut rows: Vec<(String, String)> = Vec::new();
-        let mut add = |title: &str, value: String| rows.push((title.into(), value));
+        let mut rows = Vec::new();
         let header = self.header();
-        add("format", "frames as they arrived".into());
-        add("samples", SampleType::from(header.stored).to_string());
-        let ([first, second], each) = (header.forward.frame_size(), header.forward.slices());
-        match header.forward {
-            Geometry::Sweep(_) => add("frame", format!("{second} lines of {first} samples")),
-            Geometry::Cartesian(_) => add("frame", format!("{first} x {second} pixels")),
-        }
-        add("frames", summary.frames.to_string());
+        rows.add("format", "frames as they arrived");
+        rows.add("samples", SampleType::from(header.stored).to_string());
+        let each = header.forward.slices();
+        rows.add_frame(matches!(header.forward, Geometry::Sweep(_)), header.forward.frame_size());
+        rows.add("frames", summary.frames.to_string());
         let backward =
             if summary.backward > 0 { format!(", {} swept backwards", summary.backward) } else { String::new() };
-        add("volumes", format!("{} of {each} frames, {} whole{backward}", summary.volumes, summary.whole));
-        match &header.forward {
-            Geometry::Sweep(probe) => rows.extend(describe::probe(probe)),
-            Geometry::Cartesian(grid) => rows.extend(describe::grid(grid)),
-        }
+        rows.add("volumes", format!("{} of {each} frames, {} whole{backward}", summary.volumes, summary.whole));
+        rows.add_geometry(&header.forward);
         rows.extend(summary.place());
-        let mut add = |title: &str, value: String| rows.push((title.into(), value));
-        let [low, high] = self.header().range.map(number);
-        add("value range", format!("{low} .. {high}"));
+        rows.add_range(header.range, "");
         if let Some([first, last]) = summary.times {
-            add("time stamps", format!("{} .. {} s, {} of them", number(first), number(last), summary.stamped));
+            rows.add("time stamps", format!("{} .. {} s, {} of them", number(first), number(last), summary.stamped));
         }
         if let Some([first, last]) =
             summary.begins.filter(|[first, last]| last > first && summary.begun == summary.volumes)
         {
-            add("volume rate", format!("{} a second", number((summary.volumes - 1) as f64 / (last - first))));
+            rows.add("volume rate", format!("{} a second", number((summary.volumes - 1) as f64 / (last - first))));
         }
         if let Some([first, last]) = summary.arrivals {
             let rate = match last - first {
@@ -589,11 +580,11 @@ impl Reader {
                 }
                 _ => "all at once".into(),
             };
-            add("arrival", format!("{} .. {} s, {rate}", number(first), number(last)));
+            rows.add("arrival", format!("{} .. {} s, {rate}", number(first), number(last)));
         }
-        add("damaged", format!("{} frames", self.damaged()));
-        add("lost", format!("{} bytes at the end", self.lost()));
-        add("index", if self.rebuilt() { "missing or wrong; made anew" } else { "as it was written" }.into());
+        rows.add("damaged", format!("{} frames", self.damaged()));
+        rows.add("lost", format!("{} bytes at the end", self.lost()));
+        rows.add("index", if self.rebuilt() { "missing or wrong; made anew" } else { "as it was written" });
         Ok(rows)
     }
 

@@ -1,15 +1,16 @@
 //! Recorded files (MetaImage, PLUS sequences, Kretz volumes), read one frame at a time in bounded memory.
 
+use super::OpenOptions;
+use super::describe::{self, Rows};
 use super::drawn::Drawn;
 use super::formats::read_layout;
-use super::frame::check_memory;
+use super::frame::{check_memory, check_volume};
 use super::keys::Unused;
 use super::layout::{Layout, LineOrder, StoredGeometry};
-use super::packed::PixelStream;
+use super::packed::{Encoding, PixelStream};
 use super::samples::Replaced;
 use super::transforms::Poses;
 use super::value_range::ValueRange;
-use super::{OpenOptions, describe};
 use crate::files::{InputError, progress};
 use crate::probe::file::geometry_error;
 use crate::probe::{Geometry, Probe, ProbeFile, Volumes, World};
@@ -131,16 +132,6 @@ impl Recording {
         self.layout.format
     }
 
-    /// Type of the samples in the file.
-    pub fn sample_type(&self) -> SampleType {
-        self.layout.pixel.sample()
-    }
-
-    /// Type of the samples in the frames.
-    pub fn stored_type(&self) -> StoredType {
-        self.layout.pixel.sample().stored()
-    }
-
     /// The transforms of tracked frames, by their index in the file.
     pub(super) fn poses(&self) -> &Poses {
         &self.layout.poses
@@ -160,46 +151,6 @@ impl Recording {
         self.layout.frames
     }
 
-    /// The recording, the file with its samples, and its probe file.
-    pub fn files(&self) -> Vec<PathBuf> {
-        let files = [self.path.clone()].into_iter().chain(self.layout.pixels.files());
-        files.chain(self.probe_file.clone()).collect()
-    }
-
-    /// Number of complete volumes.
-    pub fn volumes(&self) -> usize {
-        self.volumes.count
-    }
-
-    pub fn frames_per_volume(&self) -> usize {
-        match &self.placement {
-            Placement::Sweep(_) => self.volumes.frames,
-            Placement::Cartesian(drawn) => drawn.grid.size[2],
-        }
-    }
-
-    /// Where the voxels of a Cartesian volume are; None for a sweep.
-    pub fn world(&self) -> Option<World> {
-        match &self.placement {
-            Placement::Sweep(_) => None,
-            Placement::Cartesian(drawn) => Some(drawn.world),
-        }
-    }
-
-    /// Geometry of a volume, including the motor's travel during each frame.
-    pub fn geometry(&self, volume: usize) -> Geometry {
-        match &self.placement {
-            Placement::Sweep(probe) => Geometry::Sweep(self.volumes.swept(volume, probe)),
-            Placement::Cartesian(drawn) => Geometry::Cartesian(drawn.grid),
-        }
-    }
-
-    /// Stored values that are shown as 0 and 1: those of the probe file, otherwise 0 and 255 for u8, otherwise the smallest and largest
-    /// in the file without far outliers. The second is always above the first.
-    pub fn range(&self) -> [f64; 2] {
-        self.range
-    }
-
     /// Number of samples that were NaN or infinite and were replaced by 0: in the frames read so far, or in all frames if the range was
     /// measured.
     pub fn replaced(&self) -> u64 {
@@ -209,44 +160,6 @@ impl Recording {
     /// Number of denormal f32 samples that were replaced by 0, counted like [`Recording::replaced`].
     pub fn flushed(&self) -> u64 {
         self.replaced.denormal
-    }
-
-    /// The next frame in order of acquisition; None after the last complete volume.
-    ///
-    /// # Errors
-    /// Data that cannot be read, are cut short or are corrupt.
-    pub fn next_frame(&mut self) -> Result<Option<Frame>, InputError> {
-        if self.is_turned() {
-            return self.next_turned();
-        }
-        let index = self.next;
-        if index >= self.frames_to_read() {
-            return Ok(None);
-        }
-        let bytes = match self.read_frame() {
-            Ok(bytes) => bytes,
-            Err(error) => {
-                self.stream = None;
-                return Err(error);
-            }
-        };
-        let (volume, number) = (index / self.volumes.frames, index % self.volumes.frames);
-        let backward = self.volumes.backward(volume);
-        let (bytes, slice) = match &self.placement {
-            Placement::Cartesian(drawn) if !drawn.is_stored() => {
-                drawn.frame(&bytes, number, self.stored_type().bytes())
-            }
-            _ => (bytes, if backward { self.volumes.frames - 1 - number } else { number }),
-        };
-        Ok(Some(Frame {
-            volume: volume as u32,
-            number: number as u32,
-            slice,
-            backward,
-            time: self.layout.times.get(&index).copied(),
-            pose: None,
-            bytes,
-        }))
     }
 
     /// Moves back to the first frame.
@@ -301,49 +214,16 @@ impl Recording {
         }))
     }
 
-    /// Moves to the first frame of a volume. In a compressed file all frames before it are inflated again.
-    ///
-    /// # Errors
-    /// A volume that does not exist, or data that cannot be read.
-    pub fn skip_to_volume(&mut self, volume: usize) -> Result<(), InputError> {
-        if volume >= self.volumes.count {
-            let there = self.volumes.count;
-            return Err(InputError::new(
-                &self.path,
-                "volume",
-                format!("there is no {volume}, the last is {}", there - 1),
-            ));
-        }
-        self.next_drawn = volume * self.frames_per_volume();
-        if self.is_turned() {
-            return Ok(());
-        }
-        let target = volume * self.volumes.frames;
-        if target < self.next {
-            self.stream = None;
-        } else if let Some(mut stream) = self.stream.take() {
-            stream.skip((target - self.next) as u64 * self.layout.frame_bytes()).map_err(|e| self.broken(&e, 0))?;
-            self.stream = Some(stream);
-        }
-        self.next = target;
-        Ok(())
-    }
-
     /// A description of the file for users: pairs of title and value. Never a patient's name or number.
     pub fn description(&self) -> Vec<(String, String)> {
-        let mut rows: Vec<(String, String)> = Vec::new();
-        let mut add = |title: &str, value: String| rows.push((title.into(), value));
-        add("format", self.format().into());
-        add("compression", self.layout.pixels.encoding.name().into());
-        add("samples", self.sample_type().to_string());
-        let [first, second] = self.layout.frame_size;
-        match self.placement {
-            Placement::Sweep(_) => add("frame", format!("{second} lines of {first} samples")),
-            Placement::Cartesian(_) => add("frame", format!("{first} x {second} pixels")),
-        }
-        add("frames", self.layout.frames.to_string());
-        add("volumes", describe::volumes(&self.volumes));
-        add("geometry from", self.probe_file.as_ref().map_or("the file itself".into(), |p| describe::path(p)));
+        let mut rows = Vec::new();
+        rows.add("format", self.format());
+        rows.add("compression", self.layout.pixels.encoding.name());
+        rows.add("samples", self.sample_type().to_string());
+        rows.add_frame(matches!(self.placement, Placement::Sweep(_)), self.layout.frame_size);
+        rows.add("frames", self.layout.frames.to_string());
+        rows.add("volumes", describe::volumes(&self.volumes));
+        rows.add("geometry from", self.probe_file.as_ref().map_or("the file itself".into(), |p| describe::path(p)));
         match &self.placement {
             Placement::Sweep(probe) => rows.extend(describe::probe(probe)),
             Placement::Cartesian(drawn) => {
@@ -351,12 +231,11 @@ impl Recording {
                 rows.extend(drawn.description());
             }
         }
-        let [low, high] = self.range.map(|v| describe::number(v - self.sample_type().shift()));
         let how = if self.measured { " (measured)" } else { "" };
-        rows.push(("value range".into(), format!("{low} .. {high}{how}")));
+        rows.add_range(self.range.map(|v| v - self.sample_type().shift()), how);
         if self.sample_type() == SampleType::F32 {
             let Replaced { not_finite, denormal } = self.replaced;
-            rows.push(("replaced samples".into(), format!("{not_finite} not finite, {denormal} denormal")));
+            rows.add("replaced samples", format!("{not_finite} not finite, {denormal} denormal"));
         }
         rows.extend(describe::times(&self.layout.times));
         rows.extend(self.layout.remarks.iter().cloned());
@@ -447,8 +326,6 @@ impl Recording {
     }
 }
 
-/// The probe file to use. None if there is none, or if the `probe.toml` of the folder does not apply to this recording: it is for those
-/// that do not state their own geometry.
 /// The median time from a frame to the next, s; None if no two that follow each other have time stamps that rise.
 fn interval(times: &BTreeMap<usize, f64>) -> Option<f64> {
     let next = |(index, time): (&usize, &f64)| times.get(&(index + 1)).map(|next| next - time);
@@ -457,14 +334,18 @@ fn interval(times: &BTreeMap<usize, f64>) -> Option<f64> {
     intervals.get(intervals.len() / 2).copied()
 }
 
+/// The probe file to use. None if there is none, or if the `probe.toml` of the folder does not apply to this recording: it is for those
+/// that do not state their own geometry.
 fn choose_probe_file(path: &Path, given: Option<&Path>, layout: &mut Layout) -> Result<Option<ProbeFile>, InputError> {
-    if layout.pixels.pictures.is_some() && layout.states_geometry {
+    let is_stack = layout.pixels.encoding == Encoding::Pictures;
+    if is_stack && layout.states_geometry {
         return Ok(None);
     }
     // "sweep.mha.gz" has the probe file of "sweep.mha", and a stack that of its first picture.
-    let first = layout.pixels.pictures.as_ref().and_then(|pictures| pictures.files.first());
+    let first =
+        layout.pixels.gathered.iter().filter(|_| is_stack).find_map(|pictures| pictures.files().into_iter().next());
     let named = if let Some(first) = first {
-        first.clone()
+        first
     } else if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz")) {
         path.with_extension("")
     } else {
@@ -496,35 +377,87 @@ impl Source for Recording {
     }
 
     fn geometry(&self, volume: usize) -> Geometry {
-        self.geometry(volume)
+        match &self.placement {
+            Placement::Sweep(probe) => Geometry::Sweep(self.volumes.swept(volume, probe)),
+            Placement::Cartesian(drawn) => Geometry::Cartesian(drawn.grid),
+        }
     }
 
     fn stored_type(&self) -> StoredType {
-        self.stored_type()
+        self.layout.pixel.sample().stored()
     }
 
     fn sample_type(&self) -> SampleType {
-        self.sample_type()
+        self.layout.pixel.sample()
     }
 
+    /// Stored values that are shown as 0 and 1: those of the probe file, otherwise 0 and 255 for u8, otherwise the smallest and largest
+    /// in the file without far outliers. The second is always above the first.
     fn range(&self) -> [f64; 2] {
-        self.range()
+        self.range
     }
 
     fn volumes(&self) -> usize {
-        self.volumes()
+        self.volumes.count
     }
 
     fn frames_per_volume(&self) -> usize {
-        self.frames_per_volume()
+        match &self.placement {
+            Placement::Sweep(_) => self.volumes.frames,
+            Placement::Cartesian(drawn) => drawn.grid.size[2],
+        }
     }
 
+    /// In a compressed file all frames before the volume are inflated again.
     fn skip_to_volume(&mut self, volume: usize) -> Result<(), InputError> {
-        self.skip_to_volume(volume)
+        check_volume(&self.path, volume, self.volumes.count)?;
+        self.next_drawn = volume * self.frames_per_volume();
+        if self.is_turned() {
+            return Ok(());
+        }
+        let target = volume * self.volumes.frames;
+        if target < self.next {
+            self.stream = None;
+        } else if let Some(mut stream) = self.stream.take() {
+            stream.skip((target - self.next) as u64 * self.layout.frame_bytes()).map_err(|e| self.broken(&e, 0))?;
+            self.stream = Some(stream);
+        }
+        self.next = target;
+        Ok(())
     }
 
     fn next_frame(&mut self) -> Result<Option<Frame>, InputError> {
-        self.next_frame()
+        if self.is_turned() {
+            return self.next_turned();
+        }
+        let index = self.next;
+        if index >= self.frames_to_read() {
+            return Ok(None);
+        }
+        let bytes = match self.read_frame() {
+            Ok(bytes) => bytes,
+            Err(error) => {
+                self.stream = None;
+                return Err(error);
+            }
+        };
+        let (volume, number) = (index / self.volumes.frames, index % self.volumes.frames);
+        let backward = self.volumes.backward(volume);
+        let (bytes, slice) = match &self.placement {
+            Placement::Cartesian(drawn) if !drawn.is_stored() => {
+                drawn.frame(&bytes, number, self.stored_type().bytes())
+            }
+            _ => (bytes, if backward { self.volumes.frames - 1 - number } else { number }),
+        };
+        Ok(Some(Frame {
+            volume: volume as u32,
+            number: number as u32,
+            slice,
+            backward,
+            time: self.layout.times.get(&index).copied(),
+            pose: None,
+            bytes,
+        }))
     }
 
     fn is_synthetic(&self) -> bool {
@@ -542,12 +475,17 @@ impl Source for Recording {
         first.map(drop)
     }
 
+    /// The recording, the file with its samples, and its probe file.
     fn files(&self) -> Vec<PathBuf> {
-        self.files()
+        let files = [self.path.clone()].into_iter().chain(self.layout.pixels.files());
+        files.chain(self.probe_file.clone()).collect()
     }
 
     fn world(&self) -> Option<World> {
-        self.world()
+        match &self.placement {
+            Placement::Sweep(_) => None,
+            Placement::Cartesian(drawn) => Some(drawn.world),
+        }
     }
 
     fn probe_file(&self) -> Option<&Path> {

@@ -2,7 +2,7 @@
 
 use super::keys::Unused;
 use super::layout::{Cartesian, Layout, LineOrder, StoredGeometry, extent, warned};
-use super::packed::Pixels;
+use super::packed::{Encoding, Pixels};
 use super::pictures::{About, ENDINGS, Pictures, beside_pixels};
 use super::pixel::{Number, PixelFormat};
 use super::transforms::Poses;
@@ -109,7 +109,7 @@ pub(super) fn read(path: &Path, options: &OpenOptions) -> Result<Layout, InputEr
         pixel,
         frame_size,
         frames,
-        pixels: Pixels::of_pictures(path, pictures, length),
+        pixels: Pixels::gathered(path, Encoding::Pictures, length, pictures),
         line_order: LineOrder::InOrder,
         geometry,
         backward: false,

@@ -6,9 +6,10 @@
 //!
 //! Complex data and amplitudes become decibels of their envelope, 0 at the largest of the file. Data of both signs are RF and are refused.
 
-use super::describe;
+use super::describe::{self, Rows};
 use super::keys::{Aspect, Key, Unused, Use, not_used};
 use crate::files::{InputError, progress, quoted};
+use crate::frame::check_volume;
 use crate::probe::file::SLAB;
 use crate::probe::{Advance, Array, Axis, Geometry, Motion, Probe};
 use crate::{Frame, Source};
@@ -187,22 +188,20 @@ impl Beamformed {
 
     /// A description for users: pairs of title and value.
     pub fn description(&self) -> Vec<(String, String)> {
-        let mut rows: Vec<(String, String)> = Vec::new();
-        let mut add = |title: &str, value: String| rows.push((title.into(), value));
-        add("format", format!("UFF of USTB, {}", self.scan));
+        let mut rows = Vec::new();
+        rows.add("format", format!("UFF of USTB, {}", self.scan));
         let kind = match (&self.data, self.scale) {
             (Data::Complex(_), Scale::Amplitude { .. }) => "complex, shown as decibels of their envelope",
             (_, Scale::Amplitude { .. }) => "amplitudes, shown as decibels",
             (_, Scale::Decibels) => "decibels",
             (_, Scale::Grey) => "grey values",
         };
-        add("samples", format!("{}, {kind}", self.sample_type()));
-        add("frame", format!("{} lines of {} samples", self.probe.lines.len(), self.probe.samples));
+        rows.add("samples", format!("{}, {kind}", self.sample_type()));
+        rows.add_frame(true, [self.probe.samples, self.probe.lines.len()]);
         let each = self.probe.slices.len();
-        add("volumes", format!("{} of {each} {}", self.volumes, if each == 1 { "frame" } else { "frames" }));
+        rows.add("volumes", format!("{} of {each} {}", self.volumes, if each == 1 { "frame" } else { "frames" }));
         rows.extend(describe::probe(&self.probe));
-        let [low, high] = self.range().map(describe::number);
-        rows.push(("value range".into(), format!("{low} .. {high}")));
+        rows.add_range(self.range(), "");
         rows.extend(self.remarks.iter().cloned());
         rows
     }
@@ -597,10 +596,7 @@ impl Source for Beamformed {
     }
 
     fn skip_to_volume(&mut self, volume: usize) -> Result<(), InputError> {
-        if volume >= self.volumes {
-            let fault = format!("there is no {volume}, the last is {}", self.volumes.saturating_sub(1));
-            return Err(InputError::new(&self.path, "volume", fault));
-        }
+        check_volume(&self.path, volume, self.volumes)?;
         self.next = volume * self.probe.slices.len();
         Ok(())
     }

@@ -83,13 +83,8 @@ fn constant_medium(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
                 largest = largest.max(error);
                 if error.is_nan() || error > 1.0 {
                     let input = format!("opacity {opacity} a voxel, steps of {step} mm");
-                    findings.faults.push(fault(
-                        input,
-                        "not as opaque as its path",
-                        "picture",
-                        [4, 4, 0],
-                        [share * expected, got],
-                    ));
+                    let both = [share * expected, got];
+                    findings.faults.push(fault(input, "not as opaque as its path", "picture", [4, 4, 0], both));
                     show(&mut findings, "picture", &picture, channel, [([4, 4, 0], share * expected)]);
                 }
             }
@@ -257,13 +252,8 @@ fn levels(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
             } {
                 let at = [i % 16, i / 16, 0];
                 let input = if floats { "a picture of floats, then of 8 bits" } else { "a picture straight of 8 bits" };
-                findings.faults.push(fault(
-                    input.into(),
-                    "another level",
-                    "screen",
-                    at,
-                    [i as f64, f64::from(texel[0])],
-                ));
+                let both = [i as f64, f64::from(texel[0])];
+                findings.faults.push(fault(input.into(), "another level", "screen", at, both));
                 let expected = Picture { rgba: (0..=255).flat_map(|v| [v, v, v, 255]).collect(), ..picture.clone() };
                 let fault = findings.faults.len().checked_sub(1);
                 findings.pictures.push(PictureComparison { fault, ..picture_comparison(input, &expected, &picture) });

@@ -4,6 +4,7 @@
 use crate::common::gpu::*;
 use crate::common::scenes::settings;
 use crate::detector::columns;
+use echolume::Source;
 use echolume::low_level::gpu::{Renderer, RendererOptions};
 use echolume::low_level::passes::{Slot, Texels, is_hit};
 use echolume::low_level::probe::{Geometry, Grid};

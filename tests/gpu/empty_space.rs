@@ -1,6 +1,7 @@
 //! Empty-space skipping: rays that skip bricks make the same picture, bit for bit, as rays that take every sample; and bricks are skipped.
 
 use crate::common::gpu::*;
+use echolume::Source;
 use echolume::low_level::gpu::{Renderer, RendererOptions};
 use echolume::low_level::passes::{Slot, Texels};
 use echolume::low_level::probe::{Advance, Geometry, Probe};

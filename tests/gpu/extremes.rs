@@ -5,6 +5,7 @@
 use crate::common::gpu::*;
 use crate::common::program;
 use crate::shading::{map, plate, run};
+use echolume::Source;
 use echolume::low_level::gpu::{Renderer, RendererOptions};
 use echolume::low_level::passes::{MISS, Slot, Texels, is_hit};
 use echolume::low_level::probe::{Geometry, Grid};

@@ -2,6 +2,7 @@
 
 use crate::common::gpu::*;
 use crate::filters::{by_reference, on_device, plane, texels};
+use echolume::Source;
 use echolume::low_level::gpu::pass_runner::PassRunner;
 use echolume::low_level::gpu::{Renderer, RendererOptions};
 use echolume::low_level::passes::filter::enhanced_sigma::growth_shares;

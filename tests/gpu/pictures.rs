@@ -1,6 +1,7 @@
 //! Pictures of the recordings with their presets: not black, without holes, and objects in their true positions.
 
 use crate::common::gpu::*;
+use echolume::Source;
 use echolume::low_level::gpu::{Renderer, RendererOptions};
 use echolume::low_level::passes::{Slot, Texels, is_hit};
 use echolume::low_level::scene::load::Layers;

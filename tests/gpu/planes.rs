@@ -2,6 +2,7 @@
 
 use crate::common::gpu::*;
 use crate::common::scenes::settings;
+use echolume::Source;
 use echolume::low_level::gpu::{Renderer, RendererOptions};
 use echolume::low_level::passes::{Slot, Texels};
 use echolume::low_level::probe::{Geometry, Grid, Probe};

@@ -2,6 +2,7 @@
 
 use crate::common::gpu::*;
 use crate::common::scenes::settings;
+use echolume::Source;
 use echolume::low_level::gpu::{Renderer, RendererOptions};
 use echolume::low_level::passes::lookup_tables::scan_index;
 use echolume::low_level::passes::{Slot, Texels};

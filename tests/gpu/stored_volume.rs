@@ -3,6 +3,7 @@
 
 use crate::common::gpu::*;
 use crate::visible_bounds::{FILTERS, WINDOWS, geometries, speckle};
+use echolume::Source;
 use echolume::low_level::passes::{Slot, Texels, chain, is_hit};
 use echolume::low_level::picture::Picture;
 use echolume::low_level::plan::Rerun;

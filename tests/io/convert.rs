@@ -3,6 +3,7 @@
 use crate::common::files::{Folder, SWEEP};
 use crate::common::probes::wobbler;
 use crate::common::program;
+use echolume::Source;
 use echolume::low_level::probe::{Advance, Axis, Geometry, Grid, Indices, Probe};
 use echolume::low_level::source::convert::{Target, Volume, lattice};
 use echolume::low_level::source::volume_file::VolumeFile;

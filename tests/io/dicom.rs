@@ -4,6 +4,7 @@
 use crate::common::files::{Folder, data, repository};
 use crate::common::program;
 use crate::formats::{Expected, agrees, expected, voxels};
+use echolume::Source;
 use echolume::low_level::probe::Geometry;
 use echolume::low_level::source::{OpenOptions, Recording};
 use glam::DVec3;

@@ -3,6 +3,7 @@
 
 use crate::common::files::{Folder, data};
 use crate::common::program;
+use echolume::Source;
 use echolume::low_level::probe::Geometry;
 use echolume::low_level::source::{Description, OpenOptions, Recording, description};
 use image::ExtendedColorType;

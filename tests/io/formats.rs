@@ -3,6 +3,7 @@
 
 use crate::common::files::{Folder, data, repository};
 use crate::common::program;
+use echolume::Source;
 use echolume::low_level::probe::{Geometry, World};
 use echolume::low_level::source::convert::{Target, Volume};
 use echolume::low_level::source::{OpenOptions, Recording, SampleType, StoredType};

@@ -1,6 +1,7 @@
 //! Folders and patterns of numbered pictures as volumes.
 
 use crate::common::files::{BONE, Folder};
+use echolume::Source;
 use echolume::low_level::picture::{Grey, Picture};
 use echolume::low_level::probe::Geometry;
 use echolume::low_level::source::{InputError, OpenOptions, Recording, SampleType};

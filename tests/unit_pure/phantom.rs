@@ -2,6 +2,7 @@
 //! the same bytes.
 
 use crate::common::files::Folder;
+use echolume::Source;
 use echolume::low_level::probe::{Advance, Geometry, Indices, Probe};
 use echolume::low_level::source::phantom::{
     Body, DYNAMIC_RANGE, Label, Phantom, PhantomOptions, PointSpread, Sampling, Speckle, Truth, distance_path,

@@ -1,6 +1,7 @@
 //! The phantom's tree of vessels: what its labels hold, measured from outside, follows Murray's law and the closed formulas of cones.
 
 use crate::common::files::Folder;
+use echolume::Source;
 use echolume::low_level::probe::Geometry;
 use echolume::low_level::source::Recording;
 use echolume::low_level::source::phantom::{

@@ -58,8 +58,7 @@ impl Picture {
     /// # Errors
     /// One line naming the file and the fault.
     pub fn save(&self, file: &Path) -> Result<(), String> {
-        let bytes = self.encoded(PictureFormat::of(file)?);
-        replace(file, &bytes.map_err(|e| format!("{}: cannot be written: {e}", file.display()))?)
+        save(file, |format| self.encoded(format))
     }
 
     /// Reads a PNG.
@@ -167,9 +166,13 @@ impl Grey {
     /// # Errors
     /// One line naming the file and the fault.
     pub fn save(&self, file: &Path) -> Result<(), String> {
-        let bytes = self.encoded(PictureFormat::of(file)?);
-        replace(file, &bytes.map_err(|e| format!("{}: cannot be written: {e}", file.display()))?)
+        save(file, |format| self.encoded(format))
     }
+}
+
+fn save(file: &Path, encoded: impl Fn(PictureFormat) -> Result<Vec<u8>, String>) -> Result<(), String> {
+    let bytes = encoded(PictureFormat::of(file)?);
+    replace(file, &bytes.map_err(|e| format!("{}: cannot be written: {e}", file.display()))?)
 }
 
 fn brightness<T: Copy + Into<f64>>(rgb: &[T]) -> Vec<u16> {

@@ -15,16 +15,11 @@ pub const MEASURES: &[Pass] = &[FILTERED, EIGHT_FETCHES, ONE_FETCH, COPY];
 /// Samples through the device's trilinear filter.
 pub const FILTERED: Pass = Pass {
     name: "measure_filtered",
-    stage: Stage::Raycast,
-    frequency: Frequency::Picture,
-    link: Link::None,
     shader: |_, _| "measure/sampling",
     needed: |_| Err("measures the device, not a scene"),
     reads: |_, _| vec![Bind { filtered: true, ..whole("volume", Slot::Volume) }],
     writes: |_, _| vec![whole("picture", Slot::Picture)],
     extent: picture_extent,
-    repeat: once,
-    params: |_, _| Params::default(),
     constants: |_, _| vec![("SAMPLING", 0), ("SAMPLES", SAMPLES as i32)],
     tolerance: Tolerance {
         absolute: 2e-3,
@@ -35,6 +30,7 @@ pub const FILTERED: Pass = Pass {
     reference: |_, _, reads, writes| {
         mean(reads, writes, |volume, at| volume.trilinear(at));
     },
+    ..Pass::OF_RAYS
 };
 
 /// Trilinear interpolation in the shader: eight texels, fetched or loaded in the way that is fastest on the device.

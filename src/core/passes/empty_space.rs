@@ -164,9 +164,6 @@ pub(crate) const BRICK_RANGES: Pass = Pass {
 /// reads no voxel.
 pub(crate) const CLASSIFY_SURFACE: Pass = Pass {
     name: "classify_bricks_surface",
-    stage: Stage::Raycast,
-    frequency: Frequency::Picture,
-    link: Link::None,
     shader: |_, _| "empty_space/classify",
     needed: |s| match (s.detects_surface(), need(s)) {
         (true, Ok(_)) => Ok("where no sample exceeds the threshold the detector cannot fire"),
@@ -176,7 +173,6 @@ pub(crate) const CLASSIFY_SURFACE: Pass = Pass {
     reads: |_, _| ranges(),
     writes: |_, _| vec![whole("kinds", Slot::BrickKinds)],
     extent: |s, _| s.bricks().count,
-    repeat: once,
     params: |s, _| window(s, s.surface_view()).f32("quiet_level", quiet_level(s)),
     constants: |_, _| constants(0, false),
     tolerance: Tolerance {
@@ -193,6 +189,7 @@ pub(crate) const CLASSIFY_SURFACE: Pass = Pass {
             _ => ACTIVE,
         });
     },
+    ..Pass::OF_RAYS
 };
 
 /// The kind of each brick to the mode that composites, or takes the mean.
@@ -296,19 +293,16 @@ fn classify_reference(
 /// axis per dispatch, by d(p) = min over the line through p of max(|q - p|, d(q)).
 pub(crate) const DISTANCE_SURFACE: Pass = Pass {
     name: "brick_distance_surface",
-    stage: Stage::Raycast,
-    frequency: Frequency::Picture,
-    link: Link::None,
     shader: |_, _| "empty_space/distance",
     needed: CLASSIFY_SURFACE.needed,
     reads: |_, t| vec![whole("source", link(Slot::SurfaceBrickDistances, t).0)],
     writes: |_, t| vec![whole("target", link(Slot::SurfaceBrickDistances, t).1)],
     extent: |s, _| s.bricks().count,
     repeat: |_| 3,
-    params: |_, _| Params::default(),
     constants: |s, t| distance_constants(beyond_surface(s), t),
     tolerance: Tolerance { absolute: 0.0, relative: 0.0, outliers: 0.0, why: "whole numbers" },
     reference: |s, t, reads, writes| distance_reference(beyond_surface(s), t, reads, writes),
+    ..Pass::OF_RAYS
 };
 
 /// The pass [`DISTANCE_SURFACE`] for modes that composite or take the mean.

@@ -11,7 +11,6 @@ const MARGIN: f64 = 1.0 / 255.0;
 
 pub const DROP: Pass = Pass {
     name: "drop_floating",
-    stage: Stage::Preprocess,
     frequency: Frequency::Volume,
     link: Link::AfterSlices,
     shader: |_, _| "preprocess/drop_floating",
@@ -25,10 +24,7 @@ pub const DROP: Pass = Pass {
         vec![all, whole("floating", Slot::Floating)]
     },
     writes: |_, _| vec![Bind { part: Part::Around(0), ..whole("target", Slot::Volume) }],
-    extent: slice_extent,
-    repeat: once,
     params: |s, t| Params::default().f32("most", lowered(s)).i32("slice", t.slice),
-    constants: no_constants,
     tolerance: Tolerance {
         absolute: 5e-4,
         relative: 0.0,
@@ -46,6 +42,7 @@ pub const DROP: Pass = Pass {
             }
         }
     },
+    ..Pass::OF_SLICES
 };
 
 pub(super) const SEARCH: Search = Search {

@@ -282,6 +282,46 @@ pub struct Pass {
     pub reference: fn(&Scene, &Dispatch, &Arrays, &mut Arrays),
 }
 
+impl Pass {
+    /// What most passes of the rays have in common: one invocation and one dispatch a picture, without parameters and constants. What is
+    /// left empty here is different in every pass, and no pass without it passes its tests.
+    pub(super) const OF_RAYS: Pass = Pass {
+        name: "",
+        stage: Stage::Raycast,
+        frequency: Frequency::Picture,
+        link: Link::None,
+        shader: |_, _| "",
+        needed: |_| Err(""),
+        reads: |_, _| Vec::new(),
+        writes: |_, _| Vec::new(),
+        extent: ray_extent,
+        repeat: once,
+        params: |_, _| Params::default(),
+        constants: no_constants,
+        tolerance: Tolerance { absolute: 0.0, relative: 0.0, outliers: 0.0, why: "" },
+        reference: |_, _, _, _| {},
+    };
+
+    /// The same of passes that make slices of frames.
+    pub(super) const OF_SLICES: Pass = Pass {
+        stage: Stage::Preprocess,
+        frequency: Frequency::Frame,
+        extent: slice_extent,
+        ..Pass::filter(Chain::Slices)
+    };
+
+    /// The same of filters of the distance map.
+    pub(super) const OF_DISTANCES: Pass = Pass { stage: Stage::Shade, ..Pass::filter(Chain::Distances) };
+
+    /// The same of filters of the picture.
+    pub(super) const OF_PICTURES: Pass =
+        Pass { stage: Stage::Postprocess, extent: picture_extent, ..Pass::filter(Chain::Pictures) };
+
+    const fn filter(chain: Chain) -> Pass {
+        Pass { link: Link::Filter(Filter::of(chain)), reads: reads_source, writes: writes_target, ..Pass::OF_RAYS }
+    }
+}
+
 pub fn once(_: &Scene) -> u32 {
     1
 }

@@ -10,9 +10,6 @@ use crate::scene::{Conditioning, Scene, VolumeFormat, gaussian_radius};
 /// Scan conversion of each polar frame into a slice, through the look-up table (thesis 4.3, Fig. 31).
 pub(crate) const SCAN_CONVERT: Pass = Pass {
     name: "scan_convert",
-    stage: Stage::Preprocess,
-    frequency: Frequency::Frame,
-    link: Link::Filter(Filter::of(Chain::Slices)),
     shader: |_, _| "preprocess/scan_convert",
     needed: |s| match s.probe() {
         Some(_) => Ok("frames are polar"),
@@ -22,14 +19,10 @@ pub(crate) const SCAN_CONVERT: Pass = Pass {
         let frames = if s.conditions() { slices("frames", Slot::Conditioned) } else { layers("frames", Slot::Frames) };
         vec![frames, whole("scan_lut", Slot::ScanLut)]
     },
-    writes: writes_target,
-    extent: slice_extent,
-    repeat: once,
     params: |s, t| {
         let (gain, offset) = scale(s);
         Params::default().f32("gain", gain).f32("offset", offset).i32("slice", t.slice)
     },
-    constants: no_constants,
     tolerance: Tolerance {
         absolute: 1e-3,
         relative: 0.0,
@@ -59,6 +52,7 @@ pub(crate) const SCAN_CONVERT: Pass = Pass {
             }
         }
     },
+    ..Pass::OF_SLICES
 };
 
 /// Scan conversion for the section volume, made again because a filter may have overwritten the first one.
@@ -188,8 +182,6 @@ fn compressed(c: &Conditioning, value: f64) -> f64 {
 /// Slices of a Cartesian volume, scaled to 0..1.
 pub(crate) const LOAD_SLICE: Pass = Pass {
     name: "load_slice",
-    stage: Stage::Preprocess,
-    frequency: Frequency::Frame,
     link: Link::Filter(Filter { copies: stores_without_loss, is_identity: is_unscaled, ..Filter::of(Chain::Slices) }),
     shader: |_, _| "preprocess/load_slice",
     needed: |s| match s.probe() {
@@ -197,11 +189,7 @@ pub(crate) const LOAD_SLICE: Pass = Pass {
         Some(_) => Err("frames are polar"),
     },
     reads: |_, _| vec![layers("frames", Slot::Frames)],
-    writes: writes_target,
-    extent: slice_extent,
-    repeat: once,
     params: load_params,
-    constants: no_constants,
     tolerance: Tolerance {
         absolute: 5e-4,
         relative: 0.0,
@@ -220,6 +208,7 @@ pub(crate) const LOAD_SLICE: Pass = Pass {
             }
         }
     },
+    ..Pass::OF_SLICES
 };
 
 /// True if the volume's format holds every value that frames may hold, unscaled. On their way to the device integers become those of a wider

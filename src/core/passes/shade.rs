@@ -9,8 +9,6 @@ use glam::DVec3;
 /// Blinn-Phong (thesis 4-4..4-7) with a directional or point light, with shadow, occlusion and the look of skin where requested.
 pub const LIGHT: Pass = Pass {
     name: "light",
-    stage: Stage::Shade,
-    frequency: Frequency::Picture,
     link: Link::Observer(Chain::Distances),
     shader: |_, _| "shade/light",
     needed: |s| match (s.has_distance(), s.lights_volume()) {
@@ -28,8 +26,6 @@ pub const LIGHT: Pass = Pass {
         reads
     },
     writes: |s, _| vec![whole("picture", rendered(s))],
-    extent: ray_extent,
-    repeat: once,
     params: |s, _| {
         let light = &s.settings.light;
         let [ambient, diffuse] = coefficients(s);
@@ -90,6 +86,7 @@ pub const LIGHT: Pass = Pass {
             }
         }
     },
+    ..Pass::OF_DISTANCES
 };
 
 #[derive(PartialEq)]
@@ -264,8 +261,6 @@ fn stride(scene: &Scene, distance: f64, to_light: DVec3, along: DVec3) -> f64 {
 /// `thickness` deep, and a place on the way to the light that lies in it is where the light is blocked.
 pub const SHADOW: Pass = Pass {
     name: "shadow",
-    stage: Stage::Shade,
-    frequency: Frequency::Picture,
     link: Link::Observer(Chain::Distances),
     shader: |_, _| "shade/shadow",
     needed: |s| match (s.has_distance(), s.settings.light.shadow) {
@@ -276,8 +271,6 @@ pub const SHADOW: Pass = Pass {
     },
     reads: |_, t| vec![whole("distance_map", t.source())],
     writes: |_, _| vec![whole("shadow", Slot::Shadow)],
-    extent: ray_extent,
-    repeat: once,
     params: |s, _| {
         let shadow = s.settings.light.shadow.unwrap_or_default();
         camera_params(s)
@@ -317,6 +310,7 @@ pub const SHADOW: Pass = Pass {
             }
         }
     },
+    ..Pass::OF_DISTANCES
 };
 
 /// True if the light casts a shadow in this scene.
@@ -393,8 +387,6 @@ const ROUGHNESS: f64 = 0.1;
 /// Bavoil and Sainz 2008.)
 pub(crate) const OCCLUSION: Pass = Pass {
     name: "occlusion",
-    stage: Stage::Shade,
-    frequency: Frequency::Picture,
     link: Link::Observer(Chain::Distances),
     shader: |_, _| "shade/occlusion",
     needed: |s| match (s.has_distance(), s.settings.light.occlusion) {
@@ -405,13 +397,10 @@ pub(crate) const OCCLUSION: Pass = Pass {
     },
     reads: |_, t| vec![whole("distance_map", t.source())],
     writes: |_, _| vec![whole("occlusion", Slot::Occlusion)],
-    extent: ray_extent,
-    repeat: once,
     params: |s, _| {
         let occlusion = s.settings.light.occlusion.unwrap_or_default();
         camera_params(s).f32("radius", occlusion.radius).f32("strength", occlusion.strength)
     },
-    constants: |_, _| vec![],
     tolerance: Tolerance {
         absolute: 4e-3,
         relative: 0.0,
@@ -428,6 +417,7 @@ pub(crate) const OCCLUSION: Pass = Pass {
             }
         }
     },
+    ..Pass::OF_DISTANCES
 };
 
 /// The direction of a sample, x and y: the constants of the shader, which takes no sine itself. The precision of a device's sine is

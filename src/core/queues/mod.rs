@@ -145,7 +145,6 @@ mod tests {
     use super::*;
     use crate::barriers::PipelineStage;
     use crate::passes::{DispatchArgs, Frequency, PASSES, Slot};
-    use crate::scene::Scene;
     use proptest::prelude::*;
 
     /// A submission: its queue, its timeline value, its accesses, and its waits.
@@ -228,12 +227,9 @@ mod tests {
     /// `rolling` into the one that is shown.
     #[test]
     fn a_live_stream_is_ordered_on_one_two_and_three_queues() {
-        use crate::probe::{Geometry, Grid};
+        use crate::scene::test_block::block;
         let settings = "slices = { median = true, smooth = { elevation = 1.0 } }\nlight = { shadow = {} }";
-        let grid = Grid { size: [8, 8, 6], spacing: [1.0; 3], origin: [0.0; 3] };
-        let input = crate::scene::Input { stored: crate::probe::StoredType::U8, range: [0.0, 255.0] };
-        let scene =
-            Scene::new(Geometry::Cartesian(grid), input, crate::scene::Settings::from_toml(settings).unwrap()).unwrap();
+        let scene = block(&settings.lines().map(str::trim).collect::<Vec<_>>(), [8, 8, 6]);
         let of = |frequency: Frequency, args: DispatchArgs| -> Vec<Access> {
             let passes = PASSES.iter().filter(|p| p.frequency == frequency && p.is_needed(&scene));
             passes.flat_map(|pass| crate::barriers::accesses(&scene, pass, &args)).collect()

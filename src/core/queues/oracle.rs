@@ -184,14 +184,7 @@ fn must_order(a: &Access, b: &Access, is_volume: &impl Fn(Slot) -> bool) -> bool
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::probe::StoredType;
-    use crate::probe::{Geometry, Grid};
-
-    fn scene() -> Scene {
-        let grid = Grid { size: [8, 8, 6], spacing: [1.0; 3], origin: [0.0; 3] };
-        let input = crate::scene::Input { stored: StoredType::U8, range: [0.0, 255.0] };
-        Scene::new(Geometry::Cartesian(grid), input, crate::scene::Settings::from_toml("mode = 'sr'").unwrap()).unwrap()
-    }
+    use crate::scene::test_block::block;
 
     fn touch(slot: Slot, part: u32, write: bool) -> Event {
         Event::Operation(vec![Access::of_slot(slot, 0, part..part + 1, write, PipelineStage::Compute)])
@@ -206,7 +199,7 @@ mod tests {
     }
 
     fn finds(submissions: Vec<Submission>) -> Option<Hazard> {
-        SubmissionLog { submissions, ..SubmissionLog::default() }.find_hazard(&scene())
+        SubmissionLog { submissions, ..SubmissionLog::default() }.find_hazard(&block(&["mode=sr"], [8, 8, 6]))
     }
 
     #[test]
@@ -260,9 +253,11 @@ mod tests {
             submitted(0, 1, &[wait(1, 1)], read()),
         ];
         let log = SubmissionLog { submissions: chain, ..SubmissionLog::default() };
-        assert_eq!(log.find_hazard(&scene()), None);
+        assert_eq!(log.find_hazard(&block(&["mode=sr"], [8, 8, 6])), None);
         assert_eq!(log.waits(), [(1, 0), (2, 0)]);
-        assert!(log.waits().into_iter().all(|w| log.without_wait(w).find_hazard(&scene()).is_some()));
+        assert!(
+            log.waits().into_iter().all(|w| log.without_wait(w).find_hazard(&block(&["mode=sr"], [8, 8, 6])).is_some())
+        );
     }
 
     #[test]
@@ -275,6 +270,6 @@ mod tests {
         log.record(0, None, &access);
         log.submit(0, &[], 1);
         assert_eq!(log.submissions.len(), 1);
-        assert_eq!(log.find_hazard(&scene()), None);
+        assert_eq!(log.find_hazard(&block(&["mode=sr"], [8, 8, 6])), None);
     }
 }

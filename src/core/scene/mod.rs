@@ -30,7 +30,7 @@ mod slice_index;
 pub mod start_curve;
 mod still;
 #[cfg(test)]
-mod test_block;
+pub(crate) mod test_block;
 pub mod transfer;
 mod turntable;
 pub mod unveil;

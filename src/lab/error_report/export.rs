@@ -2,6 +2,7 @@
 
 use super::metrics::SurfaceError;
 use super::{Errors, Measure, Reference, Report, Time, Times, choose};
+use crate::text::csv_field;
 use std::fmt::Write as _;
 
 /// The report as CSV (RFC 4180): a header, then one line for each point. Fields that do not apply are empty. Times are in ms. `on_front` is
@@ -47,18 +48,11 @@ pub fn csv(report: &Report) -> String {
             });
             row.extend([&report.device, &report.driver, &report.date].map(String::clone));
             row.push(report.repeats.to_string());
-            text.push_str(&row.iter().map(|field| quoted(field)).collect::<Vec<_>>().join(","));
+            text.push_str(&row.iter().map(|field| csv_field(field)).collect::<Vec<_>>().join(","));
             text.push_str("\r\n");
         }
     }
     text
-}
-
-fn quoted(field: &str) -> String {
-    match field.contains([',', '"', '\n', '\r']) {
-        true => format!("\"{}\"", field.replace('"', "\"\"")),
-        false => field.to_string(),
-    }
 }
 
 fn in_mm([coarse, middle, fine]: &[f64; 3]) -> String {

@@ -5,6 +5,7 @@ use super::compare::{Comparison, Kind, Line, Verdict};
 use super::statistics::{Interval, Sample, drift};
 use super::{Ceiling, LEVEL, PassProfile, Profile};
 use crate::passes::times::acquisition_floor;
+use crate::text::csv_field;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 
@@ -22,7 +23,7 @@ pub fn csv(profile: &Profile) -> String {
             let roof = profile.ceilings.as_ref().and_then(|c| span.roof(c));
             let share = sample.as_ref().filter(|_| kind == "pass" && sum > 0.0).map(|s| s.median() / sum);
             let mut fields =
-                vec![kind.into(), quoted(&span.stage), quoted(&span.name), span.runs_per_picture.to_string()];
+                vec![kind.into(), csv_field(&span.stage), csv_field(&span.name), span.runs_per_picture.to_string()];
             fields.push(span.samples_ns.len().to_string());
             fields.extend(time_fields(sample.as_ref()));
             fields.extend([span.bytes_read, span.bytes_written].map(|n| n.to_string()));
@@ -54,7 +55,7 @@ pub fn csv_samples(profile: &Profile) -> String {
     let totals = totals(profile).map(|(name, list)| (name, "", name, list));
     for (kind, stage, name, samples) in spans.chain(totals) {
         for (repeat, ns) in samples.iter().enumerate() {
-            let _ = writeln!(text, "{kind},{},{},{repeat},{ns}", quoted(stage), quoted(name));
+            let _ = writeln!(text, "{kind},{},{},{repeat},{ns}", csv_field(stage), csv_field(name));
         }
     }
     text
@@ -82,14 +83,6 @@ fn time_fields(sample: Option<&Sample>) -> Vec<String> {
 
 fn optional(value: Option<f64>) -> String {
     value.map_or_else(String::new, |v| v.to_string())
-}
-
-/// A CSV field (RFC 4180), quoted if it contains a comma, quote or line break.
-fn quoted(field: &str) -> String {
-    match field.contains([',', '"', '\n', '\r']) {
-        true => format!("\"{}\"", field.replace('"', "\"\"")),
-        false => field.into(),
-    }
 }
 
 /// Ratio of the medians of the halves of a run above which a pass is reported as not steady.

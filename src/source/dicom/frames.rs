@@ -1,9 +1,10 @@
 //! The frames of DICOM files as one stream of samples: native, RLE (PS3.5 annex G) or one of the JPEGs, in any order, cut to a part of the picture.
 
+use super::super::gathered::Decoded;
 use super::jpeg::{self, Expected};
 use super::palette::Palette;
 use crate::files::progress::CountedFile;
-use std::io::{self, Cursor, Read, Seek, SeekFrom};
+use std::io::{self, Read, Seek, SeekFrom};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -48,7 +49,7 @@ pub(super) struct Place {
 
 /// The frames of one or more files, in the order in which they are read.
 #[derive(Clone, Debug)]
-pub(in super::super) struct Frames {
+pub(super) struct Frames {
     pub(super) files: Arc<[PathBuf]>,
     pub(super) places: Arc<[Place]>,
     /// Offset and length of each fragment, or of each native frame.
@@ -68,19 +69,6 @@ pub(in super::super) struct Frames {
 }
 
 impl Frames {
-    pub fn files(&self) -> &[PathBuf] {
-        &self.files
-    }
-
-    pub(crate) fn coding(&self) -> Coding {
-        self.coding
-    }
-
-    /// Bytes of a frame that is read.
-    fn each(&self) -> usize {
-        self.part[2] * self.part[3] * self.width * self.channels
-    }
-
     /// Numbers of a pixel as they are stored.
     fn stored_channels(&self) -> usize {
         match self.arrangement {
@@ -102,44 +90,6 @@ impl Frames {
     /// Bytes of a frame in the file, if it is native.
     fn stored_bytes(&self) -> u64 {
         (self.stored[0] * self.stored[1] * self.stored_width() * self.stored_channels()) as u64
-    }
-
-    fn frame(&self, number: usize) -> io::Result<Vec<u8>> {
-        let Some(place) = self.places.get(number) else { return Ok(Vec::new()) };
-        let (Some(path), Some(parts)) =
-            (self.files.get(place.file), self.parts.get(place.first..place.first + place.count))
-        else {
-            return Ok(Vec::new());
-        };
-        let mut file = CountedFile::open(path)?;
-        let mut bytes = Vec::new();
-        for (offset, length) in parts {
-            // Whole words.
-            let before = u64::from(self.swapped && place.odd);
-            let length = if self.swapped { (length + before).next_multiple_of(2) } else { *length };
-            file.seek(SeekFrom::Start(offset.saturating_sub(before)))?;
-            (&mut file).take(length).read_to_end(&mut bytes)?;
-        }
-        if self.swapped {
-            bytes.as_chunks_mut::<2>().0.iter_mut().for_each(|word| word.swap(0, 1));
-            bytes.drain(..usize::from(place.odd).min(bytes.len()));
-            bytes.truncate(self.stored_bytes() as usize);
-        }
-        let wrong = |why: &str| io::Error::new(io::ErrorKind::InvalidData, format!("frame {number} {why}"));
-        let numbers = match self.coding {
-            Coding::Native => bytes,
-            Coding::Rle => {
-                let pixels = self.stored[0] * self.stored[1];
-                unpacked(&bytes, pixels, self.stored_width(), self.stored_channels()).map_err(|why| wrong(&why))?
-            }
-            Coding::Jpeg => jpeg::baseline(&bytes, self.expected()).map_err(|why| wrong(&why))?,
-            Coding::JpegLossless => jpeg::lossless(&bytes, self.expected()).map_err(|why| wrong(&why))?,
-            Coding::Jpeg2000 => jpeg::jpeg_2000(&bytes, self.expected()).map_err(|why| wrong(&why))?,
-        };
-        if numbers.len() as u64 != self.stored_bytes() {
-            return Err(io::ErrorKind::UnexpectedEof.into());
-        }
-        Ok(self.cut(&self.arranged(numbers)))
     }
 
     fn expected(&self) -> Expected {
@@ -177,6 +127,54 @@ impl Frames {
         let line = self.stored[0] * width;
         let lines = pixels.chunks_exact(line.max(1)).skip(y).take(rows);
         lines.flat_map(|line| line.get(x * width..(x + columns) * width).unwrap_or_default()).copied().collect()
+    }
+}
+
+impl Decoded for Frames {
+    fn each(&self) -> usize {
+        self.part[2] * self.part[3] * self.width * self.channels
+    }
+
+    fn decode(&self, number: usize) -> io::Result<Vec<u8>> {
+        let Some(place) = self.places.get(number) else { return Ok(Vec::new()) };
+        let (Some(path), Some(parts)) =
+            (self.files.get(place.file), self.parts.get(place.first..place.first + place.count))
+        else {
+            return Ok(Vec::new());
+        };
+        let mut file = CountedFile::open(path)?;
+        let mut bytes = Vec::new();
+        for (offset, length) in parts {
+            // Whole words.
+            let before = u64::from(self.swapped && place.odd);
+            let length = if self.swapped { (length + before).next_multiple_of(2) } else { *length };
+            file.seek(SeekFrom::Start(offset.saturating_sub(before)))?;
+            (&mut file).take(length).read_to_end(&mut bytes)?;
+        }
+        if self.swapped {
+            bytes.as_chunks_mut::<2>().0.iter_mut().for_each(|word| word.swap(0, 1));
+            bytes.drain(..usize::from(place.odd).min(bytes.len()));
+            bytes.truncate(self.stored_bytes() as usize);
+        }
+        let wrong = |why: &str| io::Error::new(io::ErrorKind::InvalidData, format!("frame {number} {why}"));
+        let numbers = match self.coding {
+            Coding::Native => bytes,
+            Coding::Rle => {
+                let pixels = self.stored[0] * self.stored[1];
+                unpacked(&bytes, pixels, self.stored_width(), self.stored_channels()).map_err(|why| wrong(&why))?
+            }
+            Coding::Jpeg => jpeg::baseline(&bytes, self.expected()).map_err(|why| wrong(&why))?,
+            Coding::JpegLossless => jpeg::lossless(&bytes, self.expected()).map_err(|why| wrong(&why))?,
+            Coding::Jpeg2000 => jpeg::jpeg_2000(&bytes, self.expected()).map_err(|why| wrong(&why))?,
+        };
+        if numbers.len() as u64 != self.stored_bytes() {
+            return Err(io::ErrorKind::UnexpectedEof.into());
+        }
+        Ok(self.cut(&self.arranged(numbers)))
+    }
+
+    fn files(&self) -> &[PathBuf] {
+        &self.files
     }
 }
 
@@ -237,46 +235,6 @@ impl Iterator for PackBits<'_> {
             self.bytes = rest;
             Some(*value)
         })
-    }
-}
-
-/// The frames as one stream.
-pub(in super::super) struct FrameStream {
-    frames: Frames,
-    next: usize,
-    pixels: Cursor<Vec<u8>>,
-}
-
-impl FrameStream {
-    /// Begins `skip` bytes after the first sample.
-    ///
-    /// # Errors
-    /// A frame that cannot be read.
-    pub fn new(frames: &Frames, skip: u64) -> io::Result<FrameStream> {
-        let each = frames.each().max(1) as u64;
-        let next = usize::try_from(skip / each).unwrap_or(usize::MAX);
-        let mut stream = FrameStream { frames: frames.clone(), next, pixels: Cursor::default() };
-        if !skip.is_multiple_of(each) {
-            stream.decode()?;
-            stream.pixels.set_position(skip % each);
-        }
-        Ok(stream)
-    }
-
-    /// Decodes the next frame; after the last there are no samples.
-    fn decode(&mut self) -> io::Result<()> {
-        self.pixels = Cursor::new(self.frames.frame(self.next)?);
-        self.next = self.next.saturating_add(1);
-        Ok(())
-    }
-}
-
-impl Read for FrameStream {
-    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
-        if self.pixels.position() >= self.pixels.get_ref().len() as u64 {
-            self.decode()?;
-        }
-        self.pixels.read(out)
     }
 }
 

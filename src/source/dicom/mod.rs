@@ -23,7 +23,7 @@ mod write;
 
 pub(super) use elements::is_one;
 pub(super) use file::read;
-pub(super) use frames::{Coding, FrameStream, Frames};
+pub(super) use frames::Coding;
 pub(super) use series::{is_dicom, is_series, read_series};
 pub(super) use tags::rows;
 pub(super) use write::{DicomWriter, Form, MOST_BYTES};

@@ -3,7 +3,7 @@
 use super::super::describe;
 use super::super::keys::Unused;
 use super::super::layout::{Layout, LineOrder, StoredGeometry};
-use super::super::packed::Pixels;
+use super::super::packed::{Encoding, Pixels};
 use super::super::transforms::Poses;
 use super::frames::Frames;
 use super::image::Image;
@@ -61,7 +61,7 @@ pub(super) fn layout(
         pixel: image.pixel,
         frame_size: [columns, rows],
         frames: order.len(),
-        pixels: Pixels::of_frames(&path, frames, length),
+        pixels: Pixels::gathered(&path, Encoding::Dicom(frames.coding), length, frames),
         line_order: LineOrder::InOrder,
         geometry,
         backward: false,

@@ -2,9 +2,9 @@
 
 use super::{Compounder, CompoundingOptions, Lattice, Pose, TrackedFrame};
 use crate::Frame;
-use crate::describe;
+use crate::describe::{self, Rows};
 use crate::files::{InputError, progress};
-use crate::frame::{Source, file_bytes};
+use crate::frame::{Source, check_volume, file_bytes};
 use crate::probe::{Geometry, World};
 use crate::{SampleType, StoredType};
 use std::path::{Path, PathBuf};
@@ -88,15 +88,14 @@ impl<P: PlacedPictures> FreehandFile<P> {
     /// are.
     pub fn describe(&self, format: &str, placed: Vec<(String, String)>, space: &str) -> Vec<(String, String)> {
         let [all, valid] = self.counts;
-        let mut rows: Vec<(String, String)> = Vec::new();
-        let mut add = |title: &str, value: String| rows.push((title.into(), value));
-        add("format", format!("{format}, freehand"));
-        add("samples", self.sample_type().to_string());
-        add("pictures", format!("{all}, {valid} with a valid pose"));
+        let mut rows = Vec::new();
+        rows.add("format", format!("{format}, freehand"));
+        rows.add("samples", self.sample_type().to_string());
+        rows.add("pictures", format!("{all}, {valid} with a valid pose"));
         rows.extend(placed);
         rows.extend(describe::grid(&self.lattice.grid));
         let [u, v, w] = self.world.origin().to_array().map(describe::number);
-        rows.push(("position".into(), format!("the first voxel is at {u}, {v}, {w} mm in {space}")));
+        rows.add("position", format!("the first voxel is at {u}, {v}, {w} mm in {space}"));
         rows
     }
 
@@ -145,9 +144,7 @@ impl<P: PlacedPictures> Source for FreehandFile<P> {
     }
 
     fn skip_to_volume(&mut self, volume: usize) -> Result<(), InputError> {
-        if volume > 0 {
-            return Err(InputError::new(&self.path, "volume", format!("there is no {volume}, the last is 0")));
-        }
+        check_volume(&self.path, volume, 1)?;
         self.next = 0;
         Ok(())
     }

@@ -1,6 +1,7 @@
 //! Growth of a freehand volume around pictures that leave it.
 
-use super::{Compounder, Lattice, MAX_EDGE, Pose, Sticks, Voxels};
+use super::lattice::MAX_EDGE;
+use super::{Compounder, Lattice, Pose, Sticks, Voxels};
 use crate::probe::Grid;
 use glam::DVec3;
 
@@ -56,7 +57,7 @@ impl Compounder {
             return Some(Grid { size: count.map(|n| n as usize), spacing, origin: begin });
         }
         let end = DVec3::from_array([0, 1, 2].map(|a| begin[a] + (count[a] - 1.0) * spacing[a]));
-        let coarse = super::grid(begin.into(), end, DVec3::from(spacing) * COARSER, most).ok()?;
+        let coarse = super::lattice::grid(begin.into(), end, DVec3::from(spacing) * COARSER, most).ok()?;
         (coarse.spacing[0] <= self.first_spacing * MAX_COARSENING).then_some(coarse)
     }
 

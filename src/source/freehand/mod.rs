@@ -10,15 +10,17 @@
 mod file;
 mod given;
 mod growth;
+mod lattice;
 mod sweep;
 
 pub(super) use file::{FreehandFile, PlacedPicture, PlacedPictures};
 pub use given::FreehandArguments;
+pub use lattice::Lattice;
 pub use sweep::{Refusal, Schedule, Sweep};
 
+use crate::probe::Grid;
 use crate::probe::StoredType;
-use crate::probe::{Grid, World};
-use glam::{DAffine3, DMat3, DVec3};
+use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
 
 /// Why pictures are not in a volume, for users.
@@ -340,130 +342,6 @@ impl TrackedFrame<'_> {
             StoredType::F32 => of(4)?.first_chunk().map(|v| f32::from_le_bytes(*v)),
         }
     }
-}
-
-/// Most voxels along an edge: the limit of 3D textures on most devices.
-const MAX_EDGE: f64 = 2048.0;
-/// Most steps of making the spacing coarser. Each step removes most of the excess.
-const COARSENING_STEPS: usize = 64;
-
-/// The grid of a volume, and its position in the space of the tracker.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Lattice {
-    pub grid: Grid,
-    /// From the space of the tracker to that of the volume, mm: a rotation and a translation.
-    pub to_volume: DAffine3,
-}
-
-impl Lattice {
-    /// Where the voxels are in the space of the tracker.
-    ///
-    /// # Errors
-    /// One line: a lattice that has no place.
-    pub fn world(&self) -> Result<World, String> {
-        let back = self.to_volume.inverse();
-        let (spacing, origin) = (self.grid.spacing, self.grid.origin.into());
-        let axes =
-            [back.matrix3.x_axis * spacing[0], back.matrix3.y_axis * spacing[1], back.matrix3.z_axis * spacing[2]];
-        World::new(axes, back.transform_point3(origin))
-    }
-
-    /// A lattice along the axes of the tracker.
-    pub fn straight(grid: Grid) -> Lattice {
-        Lattice { grid, to_volume: DAffine3::IDENTITY }
-    }
-
-    /// The lattice that contains the frames, with a margin of `options.margin`.
-    ///
-    /// Its axes are the mean of theirs: lateral along the rows, depth along the columns and perpendicular to lateral, elevation along the
-    /// normal (lateral x depth). It is as long as `options.extent` at least. The origin is the mean of the centres of their first rows, as if that were the face of the probe. Only the
-    /// clipped part of the frames is used. The spacing is that of the options, otherwise that of the pixels along rows and columns, and the
-    /// larger of both along the normal. It is made coarser until there are at most `options.max_voxels`, and at most 2048 along an edge.
-    /// Poses that are not valid are left out.
-    ///
-    /// # Errors
-    /// One line: no valid pose, an option out of its range, or no spacing that is coarse enough.
-    pub fn around(poses: &[Pose], options: &CompoundingOptions) -> Result<Lattice, String> {
-        let length = |what, mm: f64, least: f64| match (least..=1e6).contains(&mm) {
-            true => Ok(()),
-            false => Err(format!("{what} {mm} mm: must be a length of at most 1e6 mm")),
-        };
-        length("margin", options.margin, 0.0)?;
-        options.spacing.map_or(Ok(()), |mm| length("spacing", mm, 1e-6))?;
-        options.extent.map_or(Ok(()), |mm| length("extent", mm, 0.0))?;
-        let placed: Vec<_> = poses
-            .iter()
-            .filter(|pose| pose.check().is_ok())
-            .filter_map(|pose| pose.clipped(options.clip).ok().map(|clip| (pose, clip)))
-            .collect();
-        let Some((first, _)) = placed.first() else {
-            let why = |pose: &Pose| pose.check().err().or_else(|| pose.clipped(options.clip).err());
-            let why = poses.first().and_then(why).map_or(String::new(), |why| format!(", the first: {why}"));
-            return Err(format!("none of {} poses places a frame{why}", poses.len()));
-        };
-        let mean = |of: &dyn Fn(&Pose, PixelRange) -> DVec3| {
-            placed.iter().map(|(pose, clip)| of(pose, *clip)).sum::<DVec3>() / placed.len() as f64
-        };
-        let [right, down] = [|pose: &Pose| pose.to_space.matrix3.x_axis, |pose: &Pose| pose.to_space.matrix3.y_axis];
-        let rotation = axes(mean(&|p, _| right(p).normalize()), mean(&|p, _| down(p).normalize()))
-            .or_else(|| axes(right(first).normalize(), down(first).normalize()))
-            .unwrap_or(DMat3::IDENTITY);
-        let origin = mean(&|pose, [columns, rows]| pose.place((columns.0 + columns.1 - 1) as f64 / 2.0, rows.0 as f64));
-        let to_volume = DAffine3::from_mat3(rotation.transpose()) * DAffine3::from_translation(-origin);
-        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        for (pose, [columns, rows]) in &placed {
-            for (column, row) in
-                [(columns.0, rows.0), (columns.1 - 1, rows.0), (columns.0, rows.1 - 1), (columns.1 - 1, rows.1 - 1)]
-            {
-                let corner = to_volume.transform_point3(pose.place(column as f64, row as f64));
-                (low, high) = (low.min(corner), high.max(corner));
-            }
-        }
-        if let Some(beyond) = options.extent.map(|extent| extent - (high.z - low.z)).filter(|beyond| *beyond > 0.0) {
-            let height = |(pose, _): &(&Pose, PixelRange)| to_volume.transform_point3(pose.place(0.0, 0.0)).z;
-            // Pictures that do not move do not say whereto they will: to either side.
-            match placed.first().map(height).zip(placed.last().map(height)).map_or(0.0, |(from, to)| to - from) {
-                0.0 => (low.z, high.z) = (low.z - beyond / 2.0, high.z + beyond / 2.0),
-                up if up > 0.0 => high.z += beyond,
-                _ => low.z -= beyond,
-            }
-        }
-        let pitch = [mean(&|p, _| DVec3::splat(right(p).length())).x, mean(&|p, _| DVec3::splat(down(p).length())).x];
-        let spacing = match options.spacing {
-            Some(mm) => DVec3::splat(mm),
-            None => DVec3::new(pitch[0], pitch[1], pitch[0].max(pitch[1])),
-        };
-        let grid = grid(low - options.margin, high + options.margin, spacing, options.max_voxels)?;
-        grid.check().map_err(|e| format!("{} {}", e.field, e.fault))?;
-        Ok(Lattice { grid, to_volume })
-    }
-}
-
-/// Orthogonal axes, as columns: the first one is kept, the second is as near to `down` as possible. None if a vector is almost zero, as the
-/// mean of frames that point in all directions.
-fn axes(right: DVec3, down: DVec3) -> Option<DMat3> {
-    const LEAST: f64 = 5e-4;
-    let x = right.try_normalize().filter(|_| right.length() > LEAST)?;
-    let y = down - x * down.dot(x);
-    let y = y.try_normalize().filter(|_| y.length() > LEAST)?;
-    Some(DMat3::from_cols(x, y, x.cross(y)))
-}
-
-/// The grid from `low` to `high`, with the finest spacing of at most `most` voxels.
-fn grid(low: DVec3, high: DVec3, mut spacing: DVec3, most: usize) -> Result<Grid, String> {
-    let most = most.max(1) as f64;
-    for _ in 0..COARSENING_STEPS {
-        // The outermost voxels are within a quarter of the spacing of the ends.
-        let count = ((high - low) / spacing).round() + 1.0;
-        let (all, along) = (count.element_product(), count.max_element());
-        if all <= most && along <= MAX_EDGE {
-            let size = count.to_array().map(|n| n as usize);
-            let origin = (low + high - (count - 1.0) * spacing) / 2.0;
-            return Ok(Grid { size, spacing: spacing.to_array(), origin: origin.to_array() });
-        }
-        spacing *= (all / most).cbrt().max(along / MAX_EDGE).max(1.001);
-    }
-    Err(format!("no spacing makes {most} voxels or fewer of {:.1} mm", high - low))
 }
 
 /// Weighted sums of the pixels of each voxel: lateral fastest, then depth, then elevation.

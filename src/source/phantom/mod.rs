@@ -22,7 +22,7 @@ mod vessels;
 pub use body::{Body, HeartTruth, RampTruth, Truth, Wire};
 pub use labels::Label;
 pub use sampling::{PointSpread, Sampling};
-pub use source::{CachedPhantom, PhantomSource};
+pub use source::PhantomSource;
 pub use speckle::DYNAMIC_RANGE;
 pub use truth::distance_path;
 pub use vessels::{Vessel, VesselTree};

@@ -5,39 +5,32 @@ use crate::files::InputError;
 use crate::frame::{Frame, Source};
 use crate::probe::Geometry;
 use crate::probe::StoredType;
-use std::collections::VecDeque;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 
-/// A source that computes the phantom one volume at a time.
+/// A source of the volumes of a phantom.
 pub struct PhantomSource {
-    phantom: Phantom,
-    /// The volume that is computed next.
-    next: usize,
-    waiting: VecDeque<Frame>,
-}
-
-impl PhantomSource {
-    pub fn new(phantom: Phantom) -> PhantomSource {
-        PhantomSource { phantom, next: 0, waiting: VecDeque::new() }
-    }
-}
-
-/// A source of phantom volumes that are computed once, each on a thread before it is asked for: only the first ones are waited for.
-pub struct CachedPhantom {
     phantom: Arc<Phantom>,
-    arriving: Receiver<Vec<Frame>>,
-    /// By volume, in order of acquisition: those that were asked for.
-    volumes: Vec<Vec<Frame>>,
+    /// The volumes in their order, if a thread computes them in advance.
+    arriving: Option<Receiver<Vec<Frame>>>,
+    /// Frames by volume, in order of acquisition: of the volumes of the thread that were asked for, or of the last one.
+    volumes: BTreeMap<usize, Vec<Frame>>,
     next: (usize, usize),
 }
 
-impl CachedPhantom {
-    /// Begins to compute the volumes of the phantom. They take one byte a sample.
-    pub fn new(phantom: Phantom) -> CachedPhantom {
-        let phantom = Arc::new(phantom);
+impl PhantomSource {
+    /// Computes a volume when it is asked for, and keeps one.
+    pub fn new(phantom: Phantom) -> PhantomSource {
+        PhantomSource { phantom: Arc::new(phantom), arriving: None, volumes: BTreeMap::new(), next: (0, 0) }
+    }
+
+    /// Begins to compute the volumes of the phantom, each once and before it is asked for: only the first ones are waited for. They take one
+    /// byte a sample.
+    pub fn cached(phantom: Phantom) -> PhantomSource {
+        let mut source = PhantomSource::new(phantom);
         let (send, arriving) = channel();
-        let computed = phantom.clone();
+        let computed = source.phantom.clone();
         let compute = move || {
             // Until nobody asks any more.
             let _ = (0..computed.volumes()).try_for_each(|volume| send.send(computed.volume(volume)));
@@ -45,21 +38,29 @@ impl CachedPhantom {
         if let Err(fault) = std::thread::Builder::new().name("phantom".into()).spawn(compute) {
             tracing::debug!("the phantom is computed as it is asked for: {fault}");
         }
-        CachedPhantom { phantom, arriving, volumes: Vec::new(), next: (0, 0) }
+        source.arriving = Some(arriving);
+        source
     }
 
     /// The frames of a volume; none beyond the last one.
     fn frames(&mut self, volume: usize) -> Option<&[Frame]> {
-        while self.volumes.len() <= volume.min(self.phantom.volumes() - 1) {
-            let computed = self.arriving.recv();
-            // Without the thread.
-            self.volumes.push(computed.unwrap_or_else(|_| self.phantom.volume(self.volumes.len())));
+        if volume >= self.phantom.volumes() {
+            return None;
         }
-        self.volumes.get(volume).map(Vec::as_slice)
+        if let Some(arriving) = &self.arriving {
+            while self.volumes.len() <= volume {
+                let (number, computed) = (self.volumes.len(), arriving.recv());
+                // Without the thread.
+                self.volumes.insert(number, computed.unwrap_or_else(|_| self.phantom.volume(number)));
+            }
+        } else if !self.volumes.contains_key(&volume) {
+            self.volumes = BTreeMap::from([(volume, self.phantom.volume(volume))]);
+        }
+        self.volumes.get(&volume).map(Vec::as_slice)
     }
 }
 
-impl Source for CachedPhantom {
+impl Source for PhantomSource {
     fn geometry(&self, volume: usize) -> Geometry {
         Geometry::Sweep(self.phantom.probe(volume))
     }
@@ -98,46 +99,6 @@ impl Source for CachedPhantom {
     }
 }
 
-impl Source for PhantomSource {
-    fn geometry(&self, volume: usize) -> Geometry {
-        Geometry::Sweep(self.phantom.probe(volume))
-    }
-
-    fn stored_type(&self) -> StoredType {
-        StoredType::U8
-    }
-
-    fn range(&self) -> [f64; 2] {
-        [0.0, 255.0]
-    }
-
-    fn volumes(&self) -> usize {
-        self.phantom.volumes()
-    }
-
-    fn frames_per_volume(&self) -> usize {
-        self.phantom.options().frames
-    }
-
-    fn is_synthetic(&self) -> bool {
-        true
-    }
-
-    fn skip_to_volume(&mut self, volume: usize) -> Result<(), InputError> {
-        self.waiting.clear();
-        self.next = volume;
-        Ok(())
-    }
-
-    fn next_frame(&mut self) -> Result<Option<Frame>, InputError> {
-        if self.waiting.is_empty() && self.next < self.volumes() {
-            self.waiting = self.phantom.volume(self.next).into();
-            self.next += 1;
-        }
-        Ok(self.waiting.pop_front())
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -150,7 +111,7 @@ mod tests {
         std::iter::from_fn(|| source.next_frame().expect("frames")).collect()
     }
 
-    /// Computed in advance or not: the same frames and geometry, also from a later volume on, and again.
+    /// Computed in advance or not: the same frames, also from a later volume on, and again.
     #[test]
     fn what_is_computed_in_advance_is_what_is_computed_when_it_is_asked_for() {
         let options = PhantomOptions {
@@ -162,12 +123,7 @@ mod tests {
             ..PhantomOptions::default()
         };
         let phantom = || Phantom::new(options.clone()).expect("phantom");
-        let (mut plain, mut cached) = (PhantomSource::new(phantom()), CachedPhantom::new(phantom()));
-        for volume in 0..4 {
-            assert_eq!(cached.geometry(volume), plain.geometry(volume));
-        }
-        let header = (plain.header(), cached.header());
-        assert_eq!((header.0.forward, header.0.backward), (header.1.forward, header.1.backward));
+        let (mut plain, mut cached) = (PhantomSource::new(phantom()), PhantomSource::cached(phantom()));
         cached.skip_to_volume(2).expect("there");
         plain.skip_to_volume(2).expect("there");
         assert!(all(&mut cached) == all(&mut plain) && cached.next_frame().expect("no fault").is_none());

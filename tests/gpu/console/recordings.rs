@@ -5,7 +5,7 @@ use crate::common::wait;
 use echolume::low_level::files::progress::{self, Progress};
 use echolume::low_level::scene::{MeasureKind, Mode};
 use echolume::low_level::source::live::{Playback, PlaybackSource};
-use echolume::low_level::source::phantom::{CachedPhantom, Phantom, PhantomOptions, Speckle};
+use echolume::low_level::source::phantom::{Phantom, PhantomOptions, PhantomSource, Speckle};
 use echolume::low_level::ui::panels::accesskit::{Node, Role};
 use echolume::low_level::ui::recordings::{OpenRecordings, Recordings};
 use echolume::low_level::workspace::{Origin, Workspace};
@@ -42,7 +42,7 @@ fn four_volumes() -> Phantom {
 }
 
 fn phantom_source() -> Result<Box<dyn Live>, String> {
-    Ok(Box::new(PlaybackSource::new(Box::new(CachedPhantom::new(four_volumes())), Playback::Fast, 1)))
+    Ok(Box::new(PlaybackSource::new(Box::new(PhantomSource::cached(four_volumes())), Playback::Fast, 1)))
 }
 
 impl Window {

@@ -1,6 +1,7 @@
 //! Sweeps in both directions, and which geometry has precedence.
 
 use super::recordings::*;
+use echolume::Source;
 const TABLE: &str = "[array]\nkind = 'linear'\n[lines]\nwidth_mm = 20\n[depth]\nend_mm = 3\n[motion]\nkind = 'translated'\n\
                      frame_positions_mm = [0, 1, 3]\nframes_per_volume = 3\nboth_ways = true\nspeed_ratio = 0.5\n";
 

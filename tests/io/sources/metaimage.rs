@@ -1,6 +1,7 @@
 //! MetaImage as other programs write it: four dimensions, spacings of frames, and where the samples are.
 
 use super::recordings::*;
+use echolume::Source;
 use flate2::write::GzEncoder;
 
 /// Header and samples. `file`: what `ElementDataFile` says.

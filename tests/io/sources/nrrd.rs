@@ -1,6 +1,7 @@
 //! NRRD as other programs write it: axes of time and lists, units, detached headers, keys of PLUS.
 
 use super::recordings::*;
+use echolume::Source;
 use flate2::write::GzEncoder;
 use std::collections::BTreeMap;
 

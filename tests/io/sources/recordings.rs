@@ -1,6 +1,7 @@
 //! Recordings built by the tests.
 
 pub use crate::common::files::{Folder, SWEEP, data as stored};
+use echolume::Source;
 pub use echolume::low_level::probe::{Advance, Array, Axis, Geometry, Motion, Probe};
 pub use echolume::low_level::source::{Frame, InputError, Recording, SampleType, StoredType};
 pub use flate2::{Compression, write::ZlibEncoder};

@@ -1,6 +1,7 @@
 //! Frames hold the values of the file, whatever its type, byte order and compression.
 
 use super::recordings::*;
+use echolume::Source;
 #[test]
 fn both_forms_of_the_wobbler_sweep_are_one_sweep() {
     let folder = Folder::new("both-forms");

@@ -6,7 +6,7 @@ use echolume_core::scene::load::Layers;
 use echolume_session::live::{self, Feed, Step, StreamOptions};
 use echolume_source::igtl::{self, Network, NetworkOptions, Poses};
 use echolume_source::live::{Live, Playback, PlaybackSource};
-use echolume_source::phantom::{CachedPhantom, Phantom, PhantomOptions};
+use echolume_source::phantom::{Phantom, PhantomOptions, PhantomSource};
 use echolume_source::piped::Piped;
 use echolume_source::{self as source, OpenOptions};
 use pyo3::prelude::*;
@@ -44,7 +44,7 @@ impl Origin {
         Ok(match self.kind.as_str() {
             "phantom" => {
                 let options = PhantomOptions { volumes: PHANTOM_VOLUMES, both_ways: true, ..PhantomOptions::default() };
-                let phantom = CachedPhantom::new(Phantom::new(options).map_err(invalid)?);
+                let phantom = PhantomSource::cached(Phantom::new(options).map_err(invalid)?);
                 Box::new(PlaybackSource::new(Box::new(phantom), playback, u32::MAX))
             }
             "igtl" => Box::new(self.network()?),

@@ -5,17 +5,12 @@ use crate::scene::{Bilateral, Scene};
 
 pub(crate) const DISTANCE: Pass = Pass {
     name: "bilateral_distance",
-    stage: Stage::Shade,
-    frequency: Frequency::Picture,
-    link: Link::Filter(Filter::of(Chain::Distances)),
     shader: |_, _| "filter/bilateral.distance",
     needed: |s| match (s.has_distance(), s.distance.bilateral) {
         (false, _) => Err("no distance map in this mode"),
         (true, None) => Err("not asked for"),
         _ => Ok("asked for"),
     },
-    reads: reads_source,
-    writes: writes_target,
     extent: |s, t| in_runs(ray_extent(s, t), 1),
     repeat: |s| settings(s).repeat,
     params: |s, t| {
@@ -62,6 +57,7 @@ pub(crate) const DISTANCE: Pass = Pass {
             }
         }
     },
+    ..Pass::OF_DISTANCES
 };
 
 fn settings(scene: &Scene) -> Bilateral {

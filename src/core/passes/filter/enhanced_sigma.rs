@@ -11,15 +11,9 @@ const WHY: &str = "a mean of at most 63^2 values in f32; a pixel within rounding
 
 pub const SLICE: Pass = Pass {
     name: "enhanced_sigma_slice",
-    stage: Stage::Preprocess,
-    frequency: Frequency::Frame,
     link: Link::Filter(Filter::of_slices(|s| Some([reach(s, s.slice_filters.enhanced_sigma); 2]))),
     shader: |_, _| "filter/enhanced_sigma.slice",
     needed: |s| need(s.slice_filters.enhanced_sigma),
-    reads: reads_source,
-    writes: writes_target,
-    extent: slice_extent,
-    repeat: once,
     params: |s, t| params(s.slice_filters.enhanced_sigma, [LEAST, TIE], t),
     constants: |s, _| constants(s, s.slice_filters.enhanced_sigma, false),
     tolerance: Tolerance { absolute: 6e-4, relative: 0.0, outliers: 2e-3, why: WHY },
@@ -27,22 +21,16 @@ pub const SLICE: Pass = Pass {
         let enhanced = Enhanced::new(s, s.slice_filters.enhanced_sigma, [LEAST, TIE], |_| true);
         enhanced.filter(t, reads, writes, |found| found.mean);
     },
+    ..Pass::OF_SLICES
 };
 
 pub(crate) const DISTANCE: Pass = Pass {
     name: "enhanced_sigma_distance",
-    stage: Stage::Shade,
-    frequency: Frequency::Picture,
-    link: Link::Filter(Filter::of(Chain::Distances)),
     shader: |_, _| "filter/enhanced_sigma.distance",
     needed: |s| match s.has_distance() {
         true => need(s.distance.enhanced_sigma),
         false => Err("no distance map in this mode"),
     },
-    reads: reads_source,
-    writes: writes_target,
-    extent: ray_extent,
-    repeat: once,
     params: |s, t| params(s.distance.enhanced_sigma, [least_distance(s), 0.0], t),
     constants: |s, _| constants(s, s.distance.enhanced_sigma, false),
     // A pixel in mm differs by 4e-6 between f32 and f64, a hundred times as much as one in 0..1.
@@ -51,19 +39,13 @@ pub(crate) const DISTANCE: Pass = Pass {
         let enhanced = Enhanced::new(s, s.distance.enhanced_sigma, [least_distance(s), 0.0], is_hit);
         enhanced.filter(t, reads, writes, |found| found.mean);
     },
+    ..Pass::OF_DISTANCES
 };
 
 pub const PICTURE: Pass = Pass {
     name: "enhanced_sigma_picture",
-    stage: Stage::Postprocess,
-    frequency: Frequency::Picture,
-    link: Link::Filter(Filter::of(Chain::Pictures)),
     shader: |_, _| "filter/enhanced_sigma.picture",
     needed: |s| need(s.settings.post.enhanced_sigma),
-    reads: reads_source,
-    writes: writes_target,
-    extent: picture_extent,
-    repeat: once,
     params: |s, t| params(s.settings.post.enhanced_sigma, [LEAST, TIE], t),
     constants: |s, _| constants(s, s.settings.post.enhanced_sigma, false),
     tolerance: Tolerance { absolute: 1e-3, relative: 1e-3, outliers: 1e-2, why: WHY },
@@ -71,14 +53,13 @@ pub const PICTURE: Pass = Pass {
         let enhanced = Enhanced::new(s, s.settings.post.enhanced_sigma, [LEAST, TIE], |_| true);
         enhanced.filter(t, reads, writes, |found| found.mean);
     },
+    ..Pass::OF_PICTURES
 };
 
 /// How far the window grew at each pixel of a slice, which Tables 7-9 of the thesis count. It reads the same slice as the filter, which
 /// runs next.
 pub const GROWTH: Pass = Pass {
     name: "growth_slice",
-    stage: Stage::Preprocess,
-    frequency: Frequency::Frame,
     link: Link::Observer(Chain::Slices),
     shader: |_, _| "filter/enhanced_sigma.slice",
     needed: |s| match s.slice_filters.enhanced_sigma {
@@ -86,10 +67,7 @@ pub const GROWTH: Pass = Pass {
         Some(e) if e.growth => Err("a sigma of 0 grows no window"),
         _ => Err("not asked for"),
     },
-    reads: reads_source,
     writes: |_, _| vec![slices("target", Slot::Growth)],
-    extent: slice_extent,
-    repeat: once,
     params: |s, t| params(s.slice_filters.enhanced_sigma, [LEAST, TIE], t),
     constants: |s, _| constants(s, s.slice_filters.enhanced_sigma, true),
     tolerance: Tolerance {
@@ -102,6 +80,7 @@ pub const GROWTH: Pass = Pass {
         let enhanced = Enhanced::new(s, s.slice_filters.enhanced_sigma, [LEAST, TIE], |_| true);
         enhanced.filter(t, reads, writes, |found| vec![f64::from(found.rings)]);
     },
+    ..Pass::OF_SLICES
 };
 
 /// A sigma of 0 keeps every pixel: no pass.

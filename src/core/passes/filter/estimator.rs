@@ -6,15 +6,9 @@ use crate::scene::{Estimator, Scene};
 
 pub const SLICE: Pass = Pass {
     name: "estimator_slice",
-    stage: Stage::Preprocess,
-    frequency: Frequency::Frame,
     link: Link::Filter(Filter::of_slices(|s| Some([s.settings.slices.estimator.map_or(0, reach); 2]))),
     shader: |_, _| "filter/estimator",
     needed: |s| s.settings.slices.estimator.map_or(Err("not asked for"), |_| Ok("asked for")),
-    reads: reads_source,
-    writes: writes_target,
-    extent: slice_extent,
-    repeat: once,
     params: |s, t| params(Params::default(), s.settings.slices.estimator_edge, LEAST).i32("slice", t.slice),
     constants: |s, _| vec![("ESTIMATOR", constant(s.settings.slices.estimator.unwrap_or_default()))],
     tolerance: Tolerance {
@@ -36,6 +30,7 @@ pub const SLICE: Pass = Pass {
             }
         }
     },
+    ..Pass::OF_SLICES
 };
 
 /// Smallest difference that counts as a gradient: half a level of 255, as Wang, Vagnucci and Li do on integer levels.

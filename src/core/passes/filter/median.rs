@@ -5,15 +5,10 @@ use crate::scene::Scene;
 
 pub const SLICE: Pass = Pass {
     name: "median_slice",
-    stage: Stage::Preprocess,
-    frequency: Frequency::Frame,
     link: Link::Filter(Filter::of_slices(|_| Some([1; 2]))),
     shader: |_, _| "filter/median.slice",
     needed: |s| if s.settings.slices.median { Ok("asked for") } else { Err("not asked for") },
-    reads: reads_source,
-    writes: writes_target,
     extent: |s, t| in_runs_of(columns(s), in_runs(slice_extent(s, t), 1), 0),
-    repeat: once,
     params: |_, t| Params::default().i32("slice", t.slice),
     constants: |s, _| vec![("COLUMNS", columns(s) as i32)],
     tolerance: Tolerance {
@@ -23,6 +18,7 @@ pub const SLICE: Pass = Pass {
         why: "a value that is there, chosen exactly; only storing in R16F rounds",
     },
     reference: |_, args, reads, writes| reference(1, args, reads, writes, |_| true),
+    ..Pass::OF_SLICES
 };
 
 /// Adjacent columns that an invocation makes: one or RUN, which is the filter's run along both axes. A CPU then loads 36 texels for 16
@@ -33,23 +29,18 @@ fn columns(scene: &Scene) -> u32 {
 
 pub(crate) const DISTANCE: Pass = Pass {
     name: "median_distance",
-    stage: Stage::Shade,
-    frequency: Frequency::Picture,
-    link: Link::Filter(Filter::of(Chain::Distances)),
     shader: |_, _| "filter/median.distance",
     needed: |s| match (s.has_distance(), s.distance.median) {
         (false, _) => Err("no distance map in this mode"),
         (true, 0) => Err("not asked for"),
         _ => Ok("asked for"),
     },
-    reads: reads_source,
-    writes: writes_target,
     extent: |s, t| in_runs(ray_extent(s, t), 1),
-    repeat: once,
     params: |_, t| Params::default().i32("slice", t.slice),
     constants: |s, _| vec![("RADIUS", (s.distance.median / 2) as i32)],
     tolerance: Tolerance { absolute: 0.0, relative: 0.0, outliers: 0.0, why: "a value that is there, chosen exactly" },
     reference: |s, args, reads, writes| reference(s.distance.median / 2, args, reads, writes, is_hit),
+    ..Pass::OF_DISTANCES
 };
 
 /// The middle of the sorted window; of an even number, the lower. Hits and misses vote first: a tie is a miss.

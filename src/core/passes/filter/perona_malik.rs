@@ -9,56 +9,42 @@ const WHY: &str = "five values in f32, exp to 3 ulp of an exponent of at most 87
 
 pub const SLICE: Pass = Pass {
     name: "perona_malik_slice",
-    stage: Stage::Preprocess,
-    frequency: Frequency::Frame,
     link: Link::Filter(Filter::of_slices(|_| Some([1; 2]))),
     shader: |_, _| "filter/perona_malik.slice",
     needed: |s| need(s.slice_filters.perona_malik, Scheme::Explicit),
-    reads: reads_source,
-    writes: writes_target,
-    extent: slice_extent,
     repeat: |s| repeat(s.slice_filters.perona_malik),
     params: |s, t| params(s.slice_filters.perona_malik, t),
     constants: |s, _| vec![constant(s.slice_filters.perona_malik)],
     tolerance: Tolerance { absolute: 1e-6, relative: 0.0, outliers: 0.0, why: WHY },
     reference: |s, t, reads, writes| reference(s.slice_filters.perona_malik, t, reads, writes, |_| true),
+    ..Pass::OF_SLICES
 };
 
 pub(crate) const DISTANCE: Pass = Pass {
     name: "perona_malik_distance",
-    stage: Stage::Shade,
-    frequency: Frequency::Picture,
-    link: Link::Filter(Filter::of(Chain::Distances)),
     shader: |_, _| "filter/perona_malik.distance",
     needed: |s| match s.has_distance() {
         true => need(s.distance.perona_malik, Scheme::Explicit),
         false => Err("no distance map in this mode"),
     },
-    reads: reads_source,
-    writes: writes_target,
-    extent: ray_extent,
     repeat: |s| repeat(s.distance.perona_malik),
     params: |s, t| params(s.distance.perona_malik, t),
     constants: |s, _| vec![constant(s.distance.perona_malik)],
     tolerance: Tolerance { absolute: 1e-5, relative: 1e-6, outliers: 0.0, why: WHY },
     reference: |s, t, reads, writes| reference(s.distance.perona_malik, t, reads, writes, is_hit),
+    ..Pass::OF_DISTANCES
 };
 
 pub const PICTURE: Pass = Pass {
     name: "perona_malik_picture",
-    stage: Stage::Postprocess,
-    frequency: Frequency::Picture,
-    link: Link::Filter(Filter::of(Chain::Pictures)),
     shader: |_, _| "filter/perona_malik.picture",
     needed: |s| need(s.settings.post.perona_malik, Scheme::Explicit),
-    reads: reads_source,
-    writes: writes_target,
-    extent: picture_extent,
     repeat: |s| repeat(s.settings.post.perona_malik),
     params: |s, t| params(s.settings.post.perona_malik, t),
     constants: |s, _| vec![constant(s.settings.post.perona_malik)],
     tolerance: Tolerance { absolute: 1e-6, relative: 1e-6, outliers: 0.0, why: WHY },
     reference: |s, t, reads, writes| reference(s.settings.post.perona_malik, t, reads, writes, |_| true),
+    ..Pass::OF_PICTURES
 };
 
 /// An edge of 0 keeps every pixel: no pass.

@@ -14,13 +14,9 @@ pub(super) const TIE: f64 = 1e-6;
 
 pub const SLICE: Pass = Pass {
     name: "sigma_slice",
-    stage: Stage::Preprocess,
-    frequency: Frequency::Frame,
     link: Link::Filter(Filter::of_slices(|s| Some([radius(s.slice_filters.sigma); 2]))),
     shader: |_, _| "filter/sigma.slice",
     needed: |s| need(s.slice_filters.sigma),
-    reads: reads_source,
-    writes: writes_target,
     extent: |s, t| in_runs(slice_extent(s, t), 1),
     repeat: |s| s.slice_filters.sigma.unwrap_or_default().repeat,
     params: |s, t| params(s.slice_filters.sigma, TIE, t),
@@ -31,40 +27,33 @@ pub const SLICE: Pass = Pass {
     },
     tolerance: Tolerance { absolute: 6e-4, relative: 0.0, outliers: 1e-3, why: WHY },
     reference: |s, t, reads, writes| reference(s.slice_filters.sigma, TIE, t, reads, writes, |_| true),
+    ..Pass::OF_SLICES
 };
 
 pub(crate) const DISTANCE: Pass = Pass {
     name: "sigma_distance",
-    stage: Stage::Shade,
-    frequency: Frequency::Picture,
-    link: Link::Filter(Filter::of(Chain::Distances)),
     shader: |_, _| "filter/sigma.distance",
     needed: |s| if s.has_distance() { need(s.distance.sigma) } else { Err("no distance map in this mode") },
-    reads: reads_source,
-    writes: writes_target,
     extent: |s, t| in_runs(ray_extent(s, t), 1),
     repeat: |s| s.distance.sigma.unwrap_or_default().repeat,
     params: |s, t| params(s.distance.sigma, 0.0, t),
     constants: |s, _| constants(s.distance.sigma),
     tolerance: Tolerance { absolute: 1e-5, relative: 1e-6, outliers: 1e-3, why: WHY },
     reference: |s, t, reads, writes| reference(s.distance.sigma, 0.0, t, reads, writes, is_hit),
+    ..Pass::OF_DISTANCES
 };
 
 pub const PICTURE: Pass = Pass {
     name: "sigma_picture",
-    stage: Stage::Postprocess,
-    frequency: Frequency::Picture,
-    link: Link::Filter(Filter::of(Chain::Pictures)),
     shader: |_, _| "filter/sigma.picture",
     needed: |s| need(s.settings.post.sigma),
-    reads: reads_source,
-    writes: writes_target,
     extent: |s, t| in_runs_of(PICTURE_RUN, picture_extent(s, t), 1),
     repeat: |s| s.settings.post.sigma.unwrap_or_default().repeat,
     params: |s, t| params(s.settings.post.sigma, TIE, t),
     constants: |s, _| constants(s.settings.post.sigma),
     tolerance: Tolerance { absolute: 6e-4, relative: 1e-3, outliers: 1e-3, why: WHY },
     reference: |s, t, reads, writes| reference(s.settings.post.sigma, TIE, t, reads, writes, |_| true),
+    ..Pass::OF_PICTURES
 };
 
 /// Pixels that one invocation makes of a picture: RUN of the shader's variant.

@@ -15,9 +15,6 @@ use std::f64::consts::FRAC_PI_6;
 
 pub(crate) const PASS: Pass = Pass {
     name: "raycast_cap",
-    stage: Stage::Raycast,
-    frequency: Frequency::Picture,
-    link: Link::None,
     shader: |_, _| "raycast/cap",
     needed: |s| match (s.settings.clip.is_empty(), s.has_caps()) {
         (true, _) => Err("no clip plane cuts"),
@@ -26,8 +23,6 @@ pub(crate) const PASS: Pass = Pass {
     },
     reads: |s, _| ray::reads(s),
     writes: |_, _| vec![whole("cap", Slot::Cap)],
-    extent: ray_extent,
-    repeat: once,
     params: |s, _| {
         ray::params(s, s.cap_view(), s.step)
             // Beyond every mean where nothing is capped.
@@ -56,6 +51,7 @@ pub(crate) const PASS: Pass = Pass {
             cap.set([x, y, 0], &reference_pixel(scene, volume, x, y).unwrap_or([0.0; 2]));
         }
     },
+    ..Pass::OF_RAYS
 };
 
 /// What passes that end rays at cut faces read.

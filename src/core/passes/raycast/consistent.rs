@@ -42,15 +42,10 @@ fn needed(scene: &Scene) -> Need {
 
 pub(crate) const CANDIDATES: Pass = Pass {
     name: "raycast_candidates",
-    stage: Stage::Raycast,
-    frequency: Frequency::Picture,
-    link: Link::None,
     shader: |_, _| "raycast/candidates",
     needed,
     reads: |s, _| ray::marching_reads(s, surface_skipping(s)),
     writes: |_, _| vec![whole("candidates", Slot::Candidates)],
-    extent: ray_extent,
-    repeat: once,
     params: |s, _| {
         let threshold = s.settings.surface.threshold;
         surface::params(s)
@@ -81,6 +76,7 @@ pub(crate) const CANDIDATES: Pass = Pass {
             candidates.set([x, y, 0], &[first, second, weight, other]);
         }
     },
+    ..Pass::OF_RAYS
 };
 
 pub(crate) const PATHS: Pass = Pass {

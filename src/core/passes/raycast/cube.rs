@@ -14,9 +14,6 @@ const EDGE_WIDTH: f64 = 1.5;
 
 pub(crate) const PASS: Pass = Pass {
     name: "raycast_cube",
-    stage: Stage::Raycast,
-    frequency: Frequency::Picture,
-    link: Link::None,
     shader: |_, _| "raycast/cube",
     needed: |s| match s.settings.mode {
         Mode::Cube => Ok("the volume is a solid block"),
@@ -28,8 +25,6 @@ pub(crate) const PASS: Pass = Pass {
         reads
     },
     writes: |s, _| vec![whole("picture", rendered(s))],
-    extent: ray_extent,
-    repeat: once,
     params: |s, _| {
         ray::params(s, s.whole_view(s.settings.cube.window), s.step)
             .f32("stride", stride(s))
@@ -62,6 +57,7 @@ pub(crate) const PASS: Pass = Pass {
             }
         }
     },
+    ..Pass::OF_RAYS
 };
 
 /// Longest step of the search for the sector's border: half a slice pixel, mm.

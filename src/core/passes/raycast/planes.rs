@@ -10,9 +10,6 @@ use glam::DVec3;
 
 pub(crate) const PASS: Pass = Pass {
     name: "raycast_planes",
-    stage: Stage::Raycast,
-    frequency: Frequency::Picture,
-    link: Link::None,
     shader: |_, _| "raycast/planes.plain",
     needed: |s| match (s.is_flat(), s.cuts_planes()) {
         (true, _) if s.tones_planes() => Err("planes are cut straight to 8 bits"),
@@ -23,7 +20,6 @@ pub(crate) const PASS: Pass = Pass {
     reads: |s, _| reads(s),
     writes: |s, _| vec![whole("picture", if s.is_flat() { Slot::Picture } else { Slot::Planes })],
     extent,
-    repeat: once,
     params: |s, _| params(s),
     constants: |s, _| constants(s),
     tolerance: Tolerance {
@@ -44,6 +40,7 @@ pub(crate) const PASS: Pass = Pass {
             picture.set([x, y, 0], &rgba);
         }
     },
+    ..Pass::OF_RAYS
 };
 
 /// The pass [`PASS`] that also tones and stores 8 bits.

@@ -8,9 +8,6 @@ use crate::scene::{Mode, Scene};
 
 pub(crate) const PASS: Pass = Pass {
     name: "raycast_projection",
-    stage: Stage::Raycast,
-    frequency: Frequency::Picture,
-    link: Link::None,
     shader: |_, _| "raycast/projection",
     needed: |s| match s.settings.mode {
         Mode::Mip | Mode::MinIp | Mode::Mean => Ok("the mode keeps one value of each ray"),
@@ -18,8 +15,6 @@ pub(crate) const PASS: Pass = Pass {
     },
     reads: |s, _| ray::marching_reads(s, empty_space::volume_skipping(s)),
     writes: |s, _| vec![whole("picture", rendered(s))],
-    extent: ray_extent,
-    repeat: once,
     params: |s, _| ray::params(s, s.projection_view(), s.step),
     constants: |s, _| {
         let mut constants = ray::marching_constants(s, empty_space::volume_skipping(s));
@@ -44,6 +39,7 @@ pub(crate) const PASS: Pass = Pass {
             }
         }
     },
+    ..Pass::OF_RAYS
 };
 
 fn kept(scene: &Scene) -> i32 {

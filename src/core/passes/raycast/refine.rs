@@ -13,9 +13,6 @@ const THRESHOLD: f64 = 2.0 / 255.0;
 /// Which pixels have all rays.
 pub(crate) const MARK_EDGES: Pass = Pass {
     name: "mark_edges",
-    stage: Stage::Raycast,
-    frequency: Frequency::Picture,
-    link: Link::None,
     shader: |_, _| "raycast/mark_edges",
     needed: |s| match s.adapts_rays() {
         true => Ok("only pixels at edges have several rays"),
@@ -24,7 +21,6 @@ pub(crate) const MARK_EDGES: Pass = Pass {
     reads: |_, _| vec![whole("picture", Slot::PixelRays)],
     writes: |_, _| vec![whole("marks", Slot::EdgeMarks)],
     extent: rendering_extent,
-    repeat: once,
     params: |s, _| tone_params(s, Params::default()).f32("threshold", THRESHOLD),
     constants: |s, _| tone_constants(s).into_iter().filter(|(name, _)| *name != "CROSSING").collect(),
     tolerance: Tolerance {
@@ -51,4 +47,5 @@ pub(crate) const MARK_EDGES: Pass = Pass {
             marks.set([x, y, 0], &[f64::from(u8::from(is_marked))]);
         }
     },
+    ..Pass::OF_RAYS
 };

@@ -9,9 +9,6 @@ use crate::scene::{Detector, Place, Scene};
 
 pub(crate) const PASS: Pass = Pass {
     name: "raycast_surface",
-    stage: Stage::Raycast,
-    frequency: Frequency::Picture,
-    link: Link::None,
     shader: |_, _| "raycast/surface",
     needed: |s| match (s.detects_surface(), s.marches_once()) {
         (false, _) => Err("no surface in this mode"),
@@ -25,8 +22,6 @@ pub(crate) const PASS: Pass = Pass {
         reads
     },
     writes: |s, _| writes(s),
-    extent: ray_extent,
-    repeat: once,
     params: |s, _| params(s),
     constants: |s, _| constants(s),
     tolerance: Tolerance {
@@ -42,6 +37,7 @@ pub(crate) const PASS: Pass = Pass {
             reference_ray(scene, reads, writes, x, y);
         }
     },
+    ..Pass::OF_RAYS
 };
 
 /// What the detector writes.

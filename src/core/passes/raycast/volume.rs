@@ -11,9 +11,6 @@ use glam::DVec3;
 
 pub(crate) const PASS: Pass = Pass {
     name: "raycast_volume",
-    stage: Stage::Raycast,
-    frequency: Frequency::Picture,
-    link: Link::None,
     shader: |_, _| "raycast/volume",
     needed: |s| match (s.composites(), s.marches_once()) {
         _ if s.still().is_some() => Err("a still is drawn in its place"),
@@ -45,7 +42,6 @@ pub(crate) const PASS: Pass = Pass {
         true => rendering_extent(s, args),
         false => ray_extent(s, args),
     },
-    repeat: once,
     params: |s, _| {
         let params = ray::params(s, s.volume_view(), s.step);
         compositing_params(s, params, s.step)
@@ -78,6 +74,7 @@ pub(crate) const PASS: Pass = Pass {
         let middle_of = if scene.adapts_rays() { f64::from(scene.settings.ray.rays) } else { 1.0 };
         reference_rays(scene, reads, writes, |x, y| Some(ray::middle_of(x, y).map(|n| n * middle_of)));
     },
+    ..Pass::OF_RAYS
 };
 
 /// With adaptive supersampling, the rays of the pixels that are marked.

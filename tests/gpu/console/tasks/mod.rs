@@ -18,7 +18,7 @@ use echolume::low_level::scene::load::Layers;
 use echolume::low_level::scene::picker::Picker;
 use echolume::low_level::scene::{Mode, PlaneName, Scene};
 use echolume::low_level::source::live::{Playback, PlaybackSource};
-use echolume::low_level::source::phantom::{Body, CachedPhantom, Label, Phantom, PhantomOptions, Speckle, Truth};
+use echolume::low_level::source::phantom::{Body, Label, Phantom, PhantomOptions, PhantomSource, Speckle, Truth};
 use echolume::low_level::ui::command::InspectorTab;
 use echolume::low_level::ui::panels::accesskit::{Node, Role};
 use echolume::low_level::ui::panels::picture_area;
@@ -130,7 +130,7 @@ fn ball() -> Phantom {
 
 fn source(phantom: fn() -> Phantom) -> OpenSource {
     Arc::new(move || {
-        let phantom = Box::new(CachedPhantom::new(phantom()));
+        let phantom = Box::new(PhantomSource::cached(phantom()));
         Ok(Box::new(PlaybackSource::new(phantom, Playback::Fast, 1)) as Box<dyn Live>)
     })
 }

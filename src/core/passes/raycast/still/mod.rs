@@ -43,9 +43,6 @@ pub fn final_sums(scene: &Scene) -> [Slot; 2] {
 /// The majorant of each brick: the largest extinction of any value that samples in it may have.
 pub(crate) const MAJORANTS: Pass = Pass {
     name: "still_majorants",
-    stage: Stage::Raycast,
-    frequency: Frequency::Picture,
-    link: Link::None,
     shader: |_, _| "raycast/still_majorants",
     needed: |s| match (need(s), s.skips()) {
         (Ok(_), true) => Ok("paths go through bricks, each with its largest extinction"),
@@ -59,7 +56,6 @@ pub(crate) const MAJORANTS: Pass = Pass {
     },
     writes: |_, _| vec![whole("majorants", Slot::StillMajorants)],
     extent: |s, _| s.bricks().count,
-    repeat: once,
     params: |s, _| empty_space::window(s, s.volume_view()),
     constants: |s, _| vec![("ENTRIES", s.transfer_entries() as i32)],
     tolerance: Tolerance {
@@ -83,6 +79,7 @@ pub(crate) const MAJORANTS: Pass = Pass {
             target.values[n] = entries.map(|n| medium.values[4 * n + 3]).fold(0.0, f64::max);
         }
     },
+    ..Pass::OF_RAYS
 };
 
 /// Clears the sums before the first path.

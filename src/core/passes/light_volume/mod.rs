@@ -2,26 +2,24 @@
 //! scattered (half angle slicing, Kniss et al. 2003; extinction pyramids, Schlegel, Makhinya and Pajarola 2011). It does not depend on the
 //! view unless the light follows the camera. Volume rendering takes the light of each sample from it.
 
+mod beam;
+mod lit;
+
+pub(crate) use beam::{PROPAGATE, PROPAGATE_BACK};
+pub use lit::bare_ground;
+pub(super) use lit::{Lit, constants, developed, fade_density, on_film, params, reads};
+
 use super::raycast::ray;
 use crate::passes::lookup_tables::transfer_of;
 use crate::passes::pass::*;
 use crate::passes::shade::wrap;
-use crate::passes::slots::Shape;
-use crate::scene::{Ground, LightLattice, LightVolume, Mode, Propagation, Scene};
+use crate::scene::{LightVolume, Scene};
 use glam::DVec3;
 
 /// Density that fluid counts as where light is scattered: FLUID of diffuse.comp.
 const FLUID: f64 = 0.0015;
-/// Most cells between two of that kernel.
-const MAX_STRIDE: u32 = 16;
 /// Largest standard deviation of scattered light, cells.
 const MAX_SCATTER: f64 = 48.0;
-/// Smallest and largest variance of the kernel of propagate.comp, cells^2, for which no weight is negative; the largest by the square of its stride.
-const VARIANCES: [f64; 2] = [0.25, 0.75];
-/// Layers of a dispatch of propagate_layers.comp, and the shared memory that it takes, bytes: a float for each of three colours, in
-/// 32 x 32 cells of two layers.
-const LAYERS: u32 = 8;
-const LAYERS_MEMORY: u32 = 2 * 3 * 4 * 32 * 32;
 /// Places along a cone of ambient light, and the length that each stands for, for a reach of 20: REACH and LENGTH of ambient.comp.
 const REACH: [f64; 4] = [2.5, 5.0, 10.0, 20.0];
 const LENGTH: [f64; 4] = [2.5, 3.5, 7.0, 12.0];
@@ -31,14 +29,6 @@ fn need(scene: &Scene) -> Need {
         (Some(_), _) => Ok("light goes through the composited volume"),
         (None, true) => Err("no light volume is asked for"),
         (None, false) => Err("nothing is composited in this mode"),
-    }
-}
-
-fn need_back(scene: &Scene) -> Need {
-    match scene.lit_by_volume() {
-        Some(light) if light.back > 0.0 => Ok("a light shines from behind"),
-        Some(_) => Err("the back light has no strength"),
-        None => need(scene),
     }
 }
 
@@ -59,9 +49,6 @@ fn cells(scene: &Scene) -> [u32; 3] {
 /// The density and the echo of each cell; beyond the box, those at its faces. Matter does not fade towards the faces of the region here: what it cuts lies in the shade of what is beyond.
 pub(crate) const MATTER: Pass = Pass {
     name: "light_matter",
-    stage: Stage::Raycast,
-    frequency: Frequency::Picture,
-    link: Link::None,
     shader: |_, _| "light_volume/matter",
     needed: need,
     reads: |s, _| {
@@ -71,7 +58,6 @@ pub(crate) const MATTER: Pass = Pass {
     },
     writes: |_, _| vec![whole("matter", Slot::LightMatter)],
     extent: |s, _| cells(s),
-    repeat: once,
     params: |s, _| {
         let lattice = s.light_lattice();
         ray::unmoved_params(s, s.volume_view())
@@ -118,6 +104,7 @@ pub(crate) const MATTER: Pass = Pass {
             target.set(at, &[(density * dense / parts).min(1.0), echo / parts]);
         });
     },
+    ..Pass::OF_RAYS
 };
 
 /// The levels of the pyramid, one after the other.
@@ -175,239 +162,8 @@ fn level(n: u32) -> Slot {
 pub fn least_cell(scene: &Scene) -> f64 {
     let light = light_of(scene);
     let scattered = light.scatter_deviations().into_iter().fold(0.0, f64::max) / MAX_SCATTER;
-    let beam = |beam: &Beam| {
-        let most = VARIANCES[1] * f64::from(MAX_STRIDE.pow(2));
-        light.widening.powi(2) * beam.propagation(scene).path / most
-    };
-    beam(&KEY).max(scattered).max(scene.least_cell_of_cones())
+    beam::least_cell(scene).max(scattered).max(scene.least_cell_of_cones())
 }
-
-/// One of the lights that are propagated.
-struct Beam {
-    matter: Slot,
-    fronts: [Slot; 2],
-    arriving: Slot,
-    is_back: bool,
-}
-
-const KEY: Beam = Beam {
-    matter: Slot::LightMatter,
-    fronts: [Slot::LightFrontA, Slot::LightFrontB],
-    arriving: Slot::LightArriving,
-    is_back: false,
-};
-const BACK: Beam = Beam {
-    matter: Slot::LightPyramid1,
-    fronts: [Slot::BackFrontA, Slot::BackFrontB],
-    arriving: Slot::BackLight,
-    is_back: true,
-};
-
-impl Beam {
-    fn propagation(&self, scene: &Scene) -> Propagation {
-        let direction = if self.is_back { light_of(scene).back_direction } else { scene.settings.light.direction };
-        Propagation::new(scene.light_direction(direction))
-    }
-
-    fn cells(&self, scene: &Scene) -> [u32; 3] {
-        cells(scene).map(|n| if self.is_back { n / 2 } else { n })
-    }
-
-    fn cell(&self, scene: &Scene) -> f64 {
-        scene.light_lattice().cell * if self.is_back { 2.0 } else { 1.0 }
-    }
-
-    fn layers(&self, scene: &Scene) -> u32 {
-        self.cells(scene)[self.propagation(scene).axis]
-    }
-
-    /// Several layers a dispatch where workgroups have memory of their own: on a GPU. A stride would need a wider border of each.
-    fn layers_at_once(&self, scene: &Scene) -> u32 {
-        if LAYERS_MEMORY <= scene.shared_memory && self.stride(scene) == 1 { LAYERS } else { 1 }
-    }
-
-    fn shader(&self, scene: &Scene) -> &'static str {
-        if self.layers_at_once(scene) > 1 { "light_volume/propagate_layers" } else { "light_volume/propagate" }
-    }
-
-    fn dispatches(&self, scene: &Scene) -> u32 {
-        self.layers(scene).div_ceil(self.layers_at_once(scene))
-    }
-
-    /// The layers that a dispatch lights, in order: the light's end of the axis comes first.
-    fn lit_layers(&self, scene: &Scene, args: &DispatchArgs) -> Vec<u32> {
-        let (all, each) = (self.layers(scene), self.layers_at_once(scene));
-        let first = args.iteration * each;
-        let from_high = self.propagation(scene).from_high;
-        (first..(first + each).min(all)).map(|n| if from_high { all - 1 - n } else { n }).collect()
-    }
-
-    fn reads(&self, args: &DispatchArgs) -> Vec<Bind> {
-        let mut reads = vec![whole("matter", self.matter)];
-        reads.extend((args.iteration > 0).then(|| whole("front", self.fronts[(args.iteration as usize + 1) % 2])));
-        reads
-    }
-
-    fn writes(&self, args: &DispatchArgs) -> Vec<Bind> {
-        vec![whole("next_front", self.fronts[args.iteration as usize % 2]), whole("arriving", self.arriving)]
-    }
-
-    fn extent(&self, scene: &Scene) -> [u32; 3] {
-        let Shape::Two([width, height]) = self.fronts[0].shape(scene) else { return [1; 3] };
-        [width, height, 1]
-    }
-
-    /// Of the kernel, cells^2.
-    fn variance(&self, scene: &Scene) -> f64 {
-        let [low, high] = VARIANCES;
-        self.widening(scene).clamp(low, high * f64::from(self.stride(scene).pow(2)))
-    }
-
-    /// Variance that a layer adds, cells^2.
-    fn widening(&self, scene: &Scene) -> f64 {
-        light_of(scene).widening.powi(2) * self.propagation(scene).path / self.cell(scene)
-    }
-
-    /// Cells between two of the kernel: the fewest that its variance needs. Small cells need more than one.
-    fn stride(&self, scene: &Scene) -> u32 {
-        // The slack is that of rounding.
-        ((self.widening(scene) / VARIANCES[1]).sqrt() - 1e-9).ceil().clamp(1.0, f64::from(MAX_STRIDE)) as u32
-    }
-
-    /// The share of the outermost layers that is within the box: what is beyond it absorbs nothing on the way in.
-    fn outer_share(&self, scene: &Scene) -> f64 {
-        let axis = self.propagation(scene).axis;
-        scene.light_lattice().outer_share(axis, self.layers(scene), self.cell(scene))
-    }
-
-    /// The share of a layer that absorbs.
-    fn share(&self, scene: &Scene, layer: u32) -> f64 {
-        let is_outer = layer == 0 || layer + 1 == self.layers(scene);
-        if is_outer { self.outer_share(scene) } else { 1.0 }
-    }
-
-    /// Absorption of red, green and blue over the path through one layer of density 1.
-    fn absorption(&self, scene: &Scene) -> [f64; 3] {
-        let light = light_of(scene);
-        let extinction = if self.is_back { light.back_extinction() } else { light.extinction() };
-        extinction.map(|e| e * self.propagation(scene).path * self.cell(scene))
-    }
-
-    fn constants(&self, scene: &Scene, args: &DispatchArgs) -> Vec<(&'static str, i32)> {
-        vec![
-            ("AXIS", self.propagation(scene).axis as i32),
-            ("FIRST", i32::from(args.iteration == 0)),
-            ("STRIDE", self.stride(scene) as i32),
-        ]
-    }
-
-    fn params(&self, scene: &Scene, args: &DispatchArgs) -> Params {
-        let (found, layers) = (self.propagation(scene), self.lit_layers(scene, args));
-        let first = layers.first().copied().unwrap_or(0);
-        let mut params = Params::default().i32("layer", first);
-        let share = match self.layers_at_once(scene) > 1 {
-            true => {
-                params = params
-                    .i32("from_high", found.from_high.into())
-                    .i32("count", layers.len() as u32)
-                    .i32("last_layer", self.layers(scene) - 1)
-                    .f32("outer_share", self.outer_share(scene));
-                1.0
-            }
-            false => self.share(scene, first),
-        };
-        params
-            .vec2("shift", found.shift)
-            .f32("variance", self.variance(scene))
-            .vec3("absorption", self.absorption(scene).map(|a| a * share))
-    }
-
-    fn reference(&self, scene: &Scene, args: &DispatchArgs, reads: &Arrays, writes: &mut Arrays) {
-        let found = self.propagation(scene);
-        let [width, height, _] = self.extent(scene).map(|n| n as usize);
-        let (absorption, variance, stride) = (self.absorption(scene), self.variance(scene), self.stride(scene));
-        // The share of each of three cells, with the mean and the variance asked for.
-        let shares = |shift: f64| {
-            let (spread, off) = ((variance + shift * shift) / f64::from(stride.pow(2)), shift / f64::from(stride));
-            [(spread - off) / 2.0, 1.0 - spread, (spread + off) / 2.0]
-        };
-        let whole = found.shift.map(|shift| (shift + 0.5).floor());
-        let [across, down] = [0, 1].map(|a| shares(found.shift[a] - whole[a]));
-        let mut front = (args.iteration > 0).then(|| reads.get("front").clone());
-        for layer in self.lit_layers(scene, args) {
-            let mut next = Texels::untouched([width, height, 1], 4);
-            let share = self.share(scene, layer);
-            for (u, v) in (0..height).flat_map(|v| (0..width).map(move |u| (u, v))) {
-                let layer = layer as usize;
-                let cell = match found.axis {
-                    0 => [layer, u, v],
-                    1 => [u, layer, v],
-                    _ => [u, v, layer],
-                };
-                let mut light = [1.0; 3];
-                if let Some(front) = &front {
-                    light = [0.0; 3];
-                    for (i, j) in (0..3).flat_map(|j| (0..3).map(move |i| (i, j))) {
-                        let tap = |at: usize, whole: f64, n: usize, size: usize| {
-                            (at as i64 + whole as i64 + i64::from(stride) * (n as i64 - 1)).clamp(0, size as i64 - 1)
-                                as usize
-                        };
-                        let from = front.get([tap(u, whole[0], i, width), tap(v, whole[1], j, height), 0]);
-                        light.iter_mut().zip(from).for_each(|(light, from)| *light += across[i] * down[j] * from);
-                    }
-                }
-                let dense = reads.get("matter").get(cell)[0];
-                let half: [f64; 3] = absorption.map(|a| (-0.5 * a * share * dense).exp());
-                let there: [f64; 3] = std::array::from_fn(|c| light[c] * half[c]);
-                let on: [f64; 3] = std::array::from_fn(|c| there[c] * half[c]);
-                writes.get_mut("arriving").set(cell, &[there[0], there[1], there[2], dense]);
-                next.set([u, v, 0], &[on[0], on[1], on[2], 1.0]);
-            }
-            front = Some(next);
-        }
-        if let Some(front) = front {
-            let target = writes.get_mut("next_front");
-            for (u, v) in (0..height).flat_map(|v| (0..width).map(move |u| (u, v))) {
-                target.set([u, v, 0], front.get([u, v, 0]));
-            }
-        }
-    }
-}
-
-/// The light that `light.direction` names, layer by layer, or several layers at once.
-pub(crate) const PROPAGATE: Pass = Pass {
-    name: "light_propagate",
-    shader: |s, _| KEY.shader(s),
-    reads: |_, t| KEY.reads(t),
-    writes: |_, t| KEY.writes(t),
-    extent: |s, _| KEY.extent(s),
-    repeat: |s| KEY.dispatches(s),
-    params: |s, t| KEY.params(s, t),
-    constants: |s, t| KEY.constants(s, t),
-    tolerance: Tolerance {
-        absolute: 1e-6,
-        relative: 6e-4,
-        outliers: 0.0,
-        why: "nine terms in f32 a layer, none negative; then RGBA16F",
-    },
-    reference: |s, t, reads, writes| KEY.reference(s, t, reads, writes),
-    ..MATTER
-};
-
-/// The back light, in larger cells.
-pub(crate) const PROPAGATE_BACK: Pass = Pass {
-    name: "light_propagate_back",
-    needed: need_back,
-    reads: |_, t| BACK.reads(t),
-    writes: |_, t| BACK.writes(t),
-    extent: |s, _| BACK.extent(s),
-    shader: |s, _| BACK.shader(s),
-    repeat: |s| BACK.dispatches(s),
-    params: |s, t| BACK.params(s, t),
-    constants: |s, t| BACK.constants(s, t),
-    reference: |s, t, reads, writes| BACK.reference(s, t, reads, writes),
-    ..PROPAGATE
-};
 
 /// Light that tissue scatters, along one axis a dispatch.
 pub(crate) const DIFFUSE: Pass = Pass {
@@ -490,7 +246,7 @@ pub(crate) const AMBIENT: Pass = Pass {
         let cones = s.ambient_cones();
         let mut reads: Vec<Bind> = (0..).zip(PYRAMID).map(|(n, name)| whole(name, level(1 + cones.level(n)))).collect();
         reads.push(whole("around", Slot::LightPyramid2));
-        reads.extend(need_back(s).is_ok().then_some(whole("back_light", Slot::BackLight)));
+        reads.extend(beam::need_back(s).is_ok().then_some(whole("back_light", Slot::BackLight)));
         reads
     },
     writes: |_, _| vec![whole("ambient_light", Slot::LightAmbient)],
@@ -510,7 +266,7 @@ pub(crate) const AMBIENT: Pass = Pass {
     constants: |s, _| {
         let cones = s.ambient_cones();
         vec![
-            ("BACK", need_back(s).is_ok() as i32),
+            ("BACK", beam::need_back(s).is_ok() as i32),
             ("NARROWEST", cones.narrowest),
             ("BETWEEN", (cones.wider > 0.0) as i32),
         ]
@@ -559,7 +315,7 @@ pub(crate) const AMBIENT: Pass = Pass {
             let mut rgba = [0.0, 0.0, 0.0, ambient * open];
             for c in 0..3 {
                 rgba[c] = ambient * open.max(1e-6).powf(powers[c]);
-                if need_back(scene).is_ok() {
+                if beam::need_back(scene).is_ok() {
                     rgba[c] += light.back * light.back_colour[c] * reads.get("back_light").get(at)[c];
                 }
             }
@@ -688,150 +444,5 @@ fn for_cells(count: [u32; 3], mut of: impl FnMut([usize; 3])) {
         for y in 0..height {
             (0..width).for_each(|x| of([x, y, z]));
         }
-    }
-}
-
-/// Reciprocal of the length over which matter fades towards the faces of the region; 0 if it does not.
-pub(super) fn fade_density(scene: &Scene) -> f64 {
-    scene.region_fade().map_or(0.0, |fade| 1.0 / fade)
-}
-
-/// What a pass that composites reads of the light volume.
-pub(super) fn reads(scene: &Scene) -> Vec<Bind> {
-    let filtered = scene.filters_in_hardware();
-    match scene.lit_by_volume() {
-        Some(_) => [("light_shade", Slot::LightShade), ("light_normals", Slot::LightNormals)]
-            .map(|(name, slot)| Bind { filtered, ..whole(name, slot) })
-            .to_vec(),
-        None => Vec::new(),
-    }
-}
-
-/// Adds the numbers of the light volume to those of a pass that composites.
-pub(super) fn params(scene: &Scene, params: Params) -> Params {
-    let light = &scene.settings.light;
-    let volume = light_of(scene);
-    let ground = volume.ground.unwrap_or_default();
-    let (low, density) = match scene.lit_by_volume() {
-        Some(_) => (scene.light_lattice().low, 1.0 / scene.light_lattice().cell),
-        None => (scene.local_origin(), 0.0),
-    };
-    params
-        .f32("fade_density", fade_density(scene))
-        .vec3("light_low", scene.to_local(low))
-        .f32("light_density", density)
-        .vec3("light_towards", scene.light_direction(light.direction))
-        .vec3("light_colour", light.colour)
-        .f32("specular", light.specular)
-        .f32("shininess", light.shininess)
-        .f32("exposure", volume.exposure)
-        .vec3("ground_middle", ground.middle)
-        .vec3("ground_edge", ground.edge)
-}
-
-/// Constants of a pass that composites; `is_alone`: what it makes fills the picture.
-pub(super) fn constants(scene: &Scene, is_alone: bool) -> [(&'static str, i32); 4] {
-    [
-        ("FADE", scene.region_fade().is_some() as i32),
-        ("LIT", scene.lit_by_volume().is_some() as i32),
-        ("LIT_STEPS", scene.lit_steps() as i32),
-        ("GROUND", ground_of(scene, is_alone).is_some() as i32),
-    ]
-}
-
-fn ground_of(scene: &Scene, is_alone: bool) -> Option<Ground> {
-    scene.lit_by_volume().filter(|_| is_alone)?.ground
-}
-
-/// The light of a ray through a place of the picture, rays from its corner, as it is shown: through the response curve, premultiplied.
-pub(super) fn developed(scene: &Scene, is_alone: bool, rgba: [f64; 4], at: [f64; 2]) -> [f64; 4] {
-    match scene.lit_by_volume() {
-        Some(volume) => on_film(scene, volume.exposure, ground_of(scene, is_alone), rgba, at),
-        None => rgba,
-    }
-}
-
-/// Colour of a ray that meets no matter, through a position of the picture in rays from its corner. None without a ground.
-pub fn bare_ground(scene: &Scene, at: [f64; 2]) -> Option<[f64; 3]> {
-    let is_alone = scene.settings.mode == Mode::Volume && !scene.lights_volume() && scene.still().is_none();
-    ground_of(scene, is_alone)?;
-    let [r, g, b, _] = developed(scene, true, [0.0; 4], at);
-    Some([r, g, b])
-}
-
-/// Linear light of a ray through a place of the picture, rays from its corner, premultiplied: through the response curve and over the ground.
-pub(super) fn on_film(scene: &Scene, exposure: f64, ground: Option<Ground>, rgba: [f64; 4], at: [f64; 2]) -> [f64; 4] {
-    let film = |light: f64| {
-        let c = light * exposure;
-        (c * (2.51 * c + 0.03) / (c * (2.43 * c + 0.59) + 0.14)).clamp(0.0, 1.0).powf(1.0 / 2.2)
-    };
-    let opacity = rgba[3];
-    let Some(ground) = ground else {
-        let shown = |c: usize| if opacity > 0.0 { opacity * film(rgba[c] / opacity) } else { 0.0 };
-        return [shown(0), shown(1), shown(2), opacity];
-    };
-    let size = scene.ray_size().map(f64::from);
-    let edge = size[0].min(size[1]);
-    let [right, down] = [0, 1].map(|a| (at[a] - size[a] / 2.0) / edge + if a == 1 { 0.05 } else { 0.0 });
-    let share = (1.0 - 2.6 * (right * right + down * down)).clamp(0.0, 1.0);
-    let shown =
-        |c: usize| film(rgba[c] + (1.0 - opacity) * (ground.edge[c] + (ground.middle[c] - ground.edge[c]) * share));
-    [shown(0), shown(1), shown(2), 1.0]
-}
-
-/// The light volume as the reference of a pass that composites sees it.
-pub(super) struct Lit<'a> {
-    shade: &'a Texels,
-    normals: &'a Texels,
-    lattice: LightLattice,
-    towards: DVec3,
-}
-
-/// Share of the ambient light that a grazing view adds: SHEEN of lit.glsl.
-const SHEEN: f64 = 0.3;
-
-impl<'a> Lit<'a> {
-    pub fn new(scene: &Scene, reads: &'a Arrays) -> Option<Lit<'a>> {
-        scene.lit_by_volume()?;
-        Some(Lit {
-            shade: reads.get("light_shade"),
-            normals: reads.get("light_normals"),
-            lattice: scene.light_lattice(),
-            towards: scene.light_direction(scene.settings.light.direction),
-        })
-    }
-
-    /// Light that white matter at a position scatters along a unit direction, without a highlight.
-    pub fn scattered(&self, place: DVec3, along: DVec3) -> [f64; 3] {
-        let cells = (place - self.lattice.low) / self.lattice.cell - 0.5;
-        let at = clamped(cells.to_array(), self.shade);
-        let (shade, oriented) = (self.shade.interpolated(at), self.normals.interpolated(at));
-        let direction = DVec3::new(oriented[0], oriented[1], oriented[2]);
-        let grazing = match direction.length() {
-            certain if certain < 1e-4 => 0.0,
-            certain => 1.0 - (-direction.dot(along) / certain).max(0.0),
-        };
-        std::array::from_fn(|c| shade[c] + shade[3] * SHEEN * grazing.powi(3))
-    }
-
-    /// Light of matter of this colour at a position in space, seen along a unit direction.
-    pub fn light(&self, scene: &Scene, albedo: [f64; 3], place: DVec3, along: DVec3) -> [f64; 3] {
-        let cells = (place - self.lattice.low) / self.lattice.cell - 0.5;
-        let at = clamped(cells.to_array(), self.shade);
-        let (shade, oriented) = (self.shade.interpolated(at), self.normals.interpolated(at));
-        let direction = DVec3::new(oriented[0], oriented[1], oriented[2]);
-        let certain = direction.length();
-        if certain < 1e-4 {
-            return std::array::from_fn(|c| albedo[c] * shade[c]);
-        }
-        let normal = direction / certain;
-        let halfway = (self.towards - along).try_normalize().unwrap_or(DVec3::ZERO);
-        let gloss = if normal.dot(self.towards) > 0.0 { normal.dot(halfway).max(0.0) } else { 0.0 };
-        let light = &scene.settings.light;
-        let grazing = 1.0 - (-normal.dot(along)).max(0.0);
-        let highlight = light.specular * gloss.powf(light.shininess) * certain * oriented[3];
-        std::array::from_fn(|c| {
-            albedo[c] * (shade[c] + shade[3] * SHEEN * grazing.powi(3)) + highlight * light.colour[c]
-        })
     }
 }

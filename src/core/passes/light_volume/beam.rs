@@ -1,0 +1,256 @@
+//! Light that is propagated through the light volume, layer by layer: that of the key light, and of one behind.
+
+use super::{MATTER, cells, light_of, need};
+use crate::passes::pass::*;
+use crate::passes::slots::Shape;
+use crate::scene::{Propagation, Scene};
+
+/// Most cells between two of the kernel.
+const MAX_STRIDE: u32 = 16;
+/// Smallest and largest variance of the kernel of propagate.comp, cells^2, for which no weight is negative; the largest by the square of its stride.
+const VARIANCES: [f64; 2] = [0.25, 0.75];
+/// Layers of a dispatch of propagate_layers.comp, and the shared memory that it takes, bytes: a float for each of three colours, in
+/// 32 x 32 cells of two layers.
+const LAYERS: u32 = 8;
+const LAYERS_MEMORY: u32 = 2 * 3 * 4 * 32 * 32;
+
+pub(super) fn need_back(scene: &Scene) -> Need {
+    match scene.lit_by_volume() {
+        Some(light) if light.back > 0.0 => Ok("a light shines from behind"),
+        Some(_) => Err("the back light has no strength"),
+        None => need(scene),
+    }
+}
+
+/// Smallest edge of a cell, mm, that the kernel of the key light can be stretched to.
+pub(super) fn least_cell(scene: &Scene) -> f64 {
+    let most = VARIANCES[1] * f64::from(MAX_STRIDE.pow(2));
+    light_of(scene).widening.powi(2) * KEY.propagation(scene).path / most
+}
+
+/// One of the lights that are propagated.
+struct Beam {
+    matter: Slot,
+    fronts: [Slot; 2],
+    arriving: Slot,
+    is_back: bool,
+}
+
+const KEY: Beam = Beam {
+    matter: Slot::LightMatter,
+    fronts: [Slot::LightFrontA, Slot::LightFrontB],
+    arriving: Slot::LightArriving,
+    is_back: false,
+};
+const BACK: Beam = Beam {
+    matter: Slot::LightPyramid1,
+    fronts: [Slot::BackFrontA, Slot::BackFrontB],
+    arriving: Slot::BackLight,
+    is_back: true,
+};
+
+impl Beam {
+    fn propagation(&self, scene: &Scene) -> Propagation {
+        let direction = if self.is_back { light_of(scene).back_direction } else { scene.settings.light.direction };
+        Propagation::new(scene.light_direction(direction))
+    }
+
+    fn cells(&self, scene: &Scene) -> [u32; 3] {
+        cells(scene).map(|n| if self.is_back { n / 2 } else { n })
+    }
+
+    fn cell(&self, scene: &Scene) -> f64 {
+        scene.light_lattice().cell * if self.is_back { 2.0 } else { 1.0 }
+    }
+
+    fn layers(&self, scene: &Scene) -> u32 {
+        self.cells(scene)[self.propagation(scene).axis]
+    }
+
+    /// Several layers a dispatch where workgroups have memory of their own: on a GPU. A stride would need a wider border of each.
+    fn layers_at_once(&self, scene: &Scene) -> u32 {
+        if LAYERS_MEMORY <= scene.shared_memory && self.stride(scene) == 1 { LAYERS } else { 1 }
+    }
+
+    fn shader(&self, scene: &Scene) -> &'static str {
+        if self.layers_at_once(scene) > 1 { "light_volume/propagate_layers" } else { "light_volume/propagate" }
+    }
+
+    fn dispatches(&self, scene: &Scene) -> u32 {
+        self.layers(scene).div_ceil(self.layers_at_once(scene))
+    }
+
+    /// The layers that a dispatch lights, in order: the light's end of the axis comes first.
+    fn lit_layers(&self, scene: &Scene, args: &DispatchArgs) -> Vec<u32> {
+        let (all, each) = (self.layers(scene), self.layers_at_once(scene));
+        let first = args.iteration * each;
+        let from_high = self.propagation(scene).from_high;
+        (first..(first + each).min(all)).map(|n| if from_high { all - 1 - n } else { n }).collect()
+    }
+
+    fn reads(&self, args: &DispatchArgs) -> Vec<Bind> {
+        let mut reads = vec![whole("matter", self.matter)];
+        reads.extend((args.iteration > 0).then(|| whole("front", self.fronts[(args.iteration as usize + 1) % 2])));
+        reads
+    }
+
+    fn writes(&self, args: &DispatchArgs) -> Vec<Bind> {
+        vec![whole("next_front", self.fronts[args.iteration as usize % 2]), whole("arriving", self.arriving)]
+    }
+
+    fn extent(&self, scene: &Scene) -> [u32; 3] {
+        let Shape::Two([width, height]) = self.fronts[0].shape(scene) else { return [1; 3] };
+        [width, height, 1]
+    }
+
+    /// Of the kernel, cells^2.
+    fn variance(&self, scene: &Scene) -> f64 {
+        let [low, high] = VARIANCES;
+        self.widening(scene).clamp(low, high * f64::from(self.stride(scene).pow(2)))
+    }
+
+    /// Variance that a layer adds, cells^2.
+    fn widening(&self, scene: &Scene) -> f64 {
+        light_of(scene).widening.powi(2) * self.propagation(scene).path / self.cell(scene)
+    }
+
+    /// Cells between two of the kernel: the fewest that its variance needs. Small cells need more than one.
+    fn stride(&self, scene: &Scene) -> u32 {
+        // The slack is that of rounding.
+        ((self.widening(scene) / VARIANCES[1]).sqrt() - 1e-9).ceil().clamp(1.0, f64::from(MAX_STRIDE)) as u32
+    }
+
+    /// The share of the outermost layers that is within the box: what is beyond it absorbs nothing on the way in.
+    fn outer_share(&self, scene: &Scene) -> f64 {
+        let axis = self.propagation(scene).axis;
+        scene.light_lattice().outer_share(axis, self.layers(scene), self.cell(scene))
+    }
+
+    /// The share of a layer that absorbs.
+    fn share(&self, scene: &Scene, layer: u32) -> f64 {
+        let is_outer = layer == 0 || layer + 1 == self.layers(scene);
+        if is_outer { self.outer_share(scene) } else { 1.0 }
+    }
+
+    /// Absorption of red, green and blue over the path through one layer of density 1.
+    fn absorption(&self, scene: &Scene) -> [f64; 3] {
+        let light = light_of(scene);
+        let extinction = if self.is_back { light.back_extinction() } else { light.extinction() };
+        extinction.map(|e| e * self.propagation(scene).path * self.cell(scene))
+    }
+
+    fn constants(&self, scene: &Scene, args: &DispatchArgs) -> Vec<(&'static str, i32)> {
+        vec![
+            ("AXIS", self.propagation(scene).axis as i32),
+            ("FIRST", i32::from(args.iteration == 0)),
+            ("STRIDE", self.stride(scene) as i32),
+        ]
+    }
+
+    fn params(&self, scene: &Scene, args: &DispatchArgs) -> Params {
+        let (found, layers) = (self.propagation(scene), self.lit_layers(scene, args));
+        let first = layers.first().copied().unwrap_or(0);
+        let mut params = Params::default().i32("layer", first);
+        let share = match self.layers_at_once(scene) > 1 {
+            true => {
+                params = params
+                    .i32("from_high", found.from_high.into())
+                    .i32("count", layers.len() as u32)
+                    .i32("last_layer", self.layers(scene) - 1)
+                    .f32("outer_share", self.outer_share(scene));
+                1.0
+            }
+            false => self.share(scene, first),
+        };
+        params
+            .vec2("shift", found.shift)
+            .f32("variance", self.variance(scene))
+            .vec3("absorption", self.absorption(scene).map(|a| a * share))
+    }
+
+    fn reference(&self, scene: &Scene, args: &DispatchArgs, reads: &Arrays, writes: &mut Arrays) {
+        let found = self.propagation(scene);
+        let [width, height, _] = self.extent(scene).map(|n| n as usize);
+        let (absorption, variance, stride) = (self.absorption(scene), self.variance(scene), self.stride(scene));
+        // The share of each of three cells, with the mean and the variance asked for.
+        let shares = |shift: f64| {
+            let (spread, off) = ((variance + shift * shift) / f64::from(stride.pow(2)), shift / f64::from(stride));
+            [(spread - off) / 2.0, 1.0 - spread, (spread + off) / 2.0]
+        };
+        let whole = found.shift.map(|shift| (shift + 0.5).floor());
+        let [across, down] = [0, 1].map(|a| shares(found.shift[a] - whole[a]));
+        let mut front = (args.iteration > 0).then(|| reads.get("front").clone());
+        for layer in self.lit_layers(scene, args) {
+            let mut next = Texels::untouched([width, height, 1], 4);
+            let share = self.share(scene, layer);
+            for (u, v) in (0..height).flat_map(|v| (0..width).map(move |u| (u, v))) {
+                let layer = layer as usize;
+                let cell = match found.axis {
+                    0 => [layer, u, v],
+                    1 => [u, layer, v],
+                    _ => [u, v, layer],
+                };
+                let mut light = [1.0; 3];
+                if let Some(front) = &front {
+                    light = [0.0; 3];
+                    for (i, j) in (0..3).flat_map(|j| (0..3).map(move |i| (i, j))) {
+                        let tap = |at: usize, whole: f64, n: usize, size: usize| {
+                            (at as i64 + whole as i64 + i64::from(stride) * (n as i64 - 1)).clamp(0, size as i64 - 1)
+                                as usize
+                        };
+                        let from = front.get([tap(u, whole[0], i, width), tap(v, whole[1], j, height), 0]);
+                        light.iter_mut().zip(from).for_each(|(light, from)| *light += across[i] * down[j] * from);
+                    }
+                }
+                let dense = reads.get("matter").get(cell)[0];
+                let half: [f64; 3] = absorption.map(|a| (-0.5 * a * share * dense).exp());
+                let there: [f64; 3] = std::array::from_fn(|c| light[c] * half[c]);
+                let on: [f64; 3] = std::array::from_fn(|c| there[c] * half[c]);
+                writes.get_mut("arriving").set(cell, &[there[0], there[1], there[2], dense]);
+                next.set([u, v, 0], &[on[0], on[1], on[2], 1.0]);
+            }
+            front = Some(next);
+        }
+        if let Some(front) = front {
+            let target = writes.get_mut("next_front");
+            for (u, v) in (0..height).flat_map(|v| (0..width).map(move |u| (u, v))) {
+                target.set([u, v, 0], front.get([u, v, 0]));
+            }
+        }
+    }
+}
+
+/// The light that `light.direction` names, layer by layer, or several layers at once.
+pub(crate) const PROPAGATE: Pass = Pass {
+    name: "light_propagate",
+    shader: |s, _| KEY.shader(s),
+    reads: |_, t| KEY.reads(t),
+    writes: |_, t| KEY.writes(t),
+    extent: |s, _| KEY.extent(s),
+    repeat: |s| KEY.dispatches(s),
+    params: |s, t| KEY.params(s, t),
+    constants: |s, t| KEY.constants(s, t),
+    tolerance: Tolerance {
+        absolute: 1e-6,
+        relative: 6e-4,
+        outliers: 0.0,
+        why: "nine terms in f32 a layer, none negative; then RGBA16F",
+    },
+    reference: |s, t, reads, writes| KEY.reference(s, t, reads, writes),
+    ..MATTER
+};
+
+/// The back light, in larger cells.
+pub(crate) const PROPAGATE_BACK: Pass = Pass {
+    name: "light_propagate_back",
+    needed: need_back,
+    reads: |_, t| BACK.reads(t),
+    writes: |_, t| BACK.writes(t),
+    extent: |s, _| BACK.extent(s),
+    shader: |s, _| BACK.shader(s),
+    repeat: |s| BACK.dispatches(s),
+    params: |s, t| BACK.params(s, t),
+    constants: |s, t| BACK.constants(s, t),
+    reference: |s, t, reads, writes| BACK.reference(s, t, reads, writes),
+    ..PROPAGATE
+};

@@ -1,0 +1,157 @@
+//! The light volume as the passes see it that take the light of samples from it, and the film that the light falls on.
+
+use super::{clamped, light_of};
+use crate::passes::pass::*;
+use crate::scene::{Ground, LightLattice, Mode, Scene};
+use glam::DVec3;
+
+/// Reciprocal of the length over which matter fades towards the faces of the region; 0 if it does not.
+pub(in crate::passes) fn fade_density(scene: &Scene) -> f64 {
+    scene.region_fade().map_or(0.0, |fade| 1.0 / fade)
+}
+
+/// What a pass that composites reads of the light volume.
+pub(in crate::passes) fn reads(scene: &Scene) -> Vec<Bind> {
+    let filtered = scene.filters_in_hardware();
+    match scene.lit_by_volume() {
+        Some(_) => [("light_shade", Slot::LightShade), ("light_normals", Slot::LightNormals)]
+            .map(|(name, slot)| Bind { filtered, ..whole(name, slot) })
+            .to_vec(),
+        None => Vec::new(),
+    }
+}
+
+/// Adds the numbers of the light volume to those of a pass that composites.
+pub(in crate::passes) fn params(scene: &Scene, params: Params) -> Params {
+    let light = &scene.settings.light;
+    let volume = light_of(scene);
+    let ground = volume.ground.unwrap_or_default();
+    let (low, density) = match scene.lit_by_volume() {
+        Some(_) => (scene.light_lattice().low, 1.0 / scene.light_lattice().cell),
+        None => (scene.local_origin(), 0.0),
+    };
+    params
+        .f32("fade_density", fade_density(scene))
+        .vec3("light_low", scene.to_local(low))
+        .f32("light_density", density)
+        .vec3("light_towards", scene.light_direction(light.direction))
+        .vec3("light_colour", light.colour)
+        .f32("specular", light.specular)
+        .f32("shininess", light.shininess)
+        .f32("exposure", volume.exposure)
+        .vec3("ground_middle", ground.middle)
+        .vec3("ground_edge", ground.edge)
+}
+
+/// Constants of a pass that composites; `is_alone`: what it makes fills the picture.
+pub(in crate::passes) fn constants(scene: &Scene, is_alone: bool) -> [(&'static str, i32); 4] {
+    [
+        ("FADE", scene.region_fade().is_some() as i32),
+        ("LIT", scene.lit_by_volume().is_some() as i32),
+        ("LIT_STEPS", scene.lit_steps() as i32),
+        ("GROUND", ground_of(scene, is_alone).is_some() as i32),
+    ]
+}
+
+fn ground_of(scene: &Scene, is_alone: bool) -> Option<Ground> {
+    scene.lit_by_volume().filter(|_| is_alone)?.ground
+}
+
+/// The light of a ray through a place of the picture, rays from its corner, as it is shown: through the response curve, premultiplied.
+pub(in crate::passes) fn developed(scene: &Scene, is_alone: bool, rgba: [f64; 4], at: [f64; 2]) -> [f64; 4] {
+    match scene.lit_by_volume() {
+        Some(volume) => on_film(scene, volume.exposure, ground_of(scene, is_alone), rgba, at),
+        None => rgba,
+    }
+}
+
+/// Colour of a ray that meets no matter, through a position of the picture in rays from its corner. None without a ground.
+pub fn bare_ground(scene: &Scene, at: [f64; 2]) -> Option<[f64; 3]> {
+    let is_alone = scene.settings.mode == Mode::Volume && !scene.lights_volume() && scene.still().is_none();
+    ground_of(scene, is_alone)?;
+    let [r, g, b, _] = developed(scene, true, [0.0; 4], at);
+    Some([r, g, b])
+}
+
+/// Linear light of a ray through a place of the picture, rays from its corner, premultiplied: through the response curve and over the ground.
+pub(in crate::passes) fn on_film(
+    scene: &Scene,
+    exposure: f64,
+    ground: Option<Ground>,
+    rgba: [f64; 4],
+    at: [f64; 2],
+) -> [f64; 4] {
+    let film = |light: f64| {
+        let c = light * exposure;
+        (c * (2.51 * c + 0.03) / (c * (2.43 * c + 0.59) + 0.14)).clamp(0.0, 1.0).powf(1.0 / 2.2)
+    };
+    let opacity = rgba[3];
+    let Some(ground) = ground else {
+        let shown = |c: usize| if opacity > 0.0 { opacity * film(rgba[c] / opacity) } else { 0.0 };
+        return [shown(0), shown(1), shown(2), opacity];
+    };
+    let size = scene.ray_size().map(f64::from);
+    let edge = size[0].min(size[1]);
+    let [right, down] = [0, 1].map(|a| (at[a] - size[a] / 2.0) / edge + if a == 1 { 0.05 } else { 0.0 });
+    let share = (1.0 - 2.6 * (right * right + down * down)).clamp(0.0, 1.0);
+    let shown =
+        |c: usize| film(rgba[c] + (1.0 - opacity) * (ground.edge[c] + (ground.middle[c] - ground.edge[c]) * share));
+    [shown(0), shown(1), shown(2), 1.0]
+}
+
+/// The light volume as the reference of a pass that composites sees it.
+pub(in crate::passes) struct Lit<'a> {
+    shade: &'a Texels,
+    normals: &'a Texels,
+    lattice: LightLattice,
+    towards: DVec3,
+}
+
+/// Share of the ambient light that a grazing view adds: SHEEN of lit.glsl.
+const SHEEN: f64 = 0.3;
+
+impl<'a> Lit<'a> {
+    pub fn new(scene: &Scene, reads: &'a Arrays) -> Option<Lit<'a>> {
+        scene.lit_by_volume()?;
+        Some(Lit {
+            shade: reads.get("light_shade"),
+            normals: reads.get("light_normals"),
+            lattice: scene.light_lattice(),
+            towards: scene.light_direction(scene.settings.light.direction),
+        })
+    }
+
+    /// Light that white matter at a position scatters along a unit direction, without a highlight.
+    pub fn scattered(&self, place: DVec3, along: DVec3) -> [f64; 3] {
+        let cells = (place - self.lattice.low) / self.lattice.cell - 0.5;
+        let at = clamped(cells.to_array(), self.shade);
+        let (shade, oriented) = (self.shade.interpolated(at), self.normals.interpolated(at));
+        let direction = DVec3::new(oriented[0], oriented[1], oriented[2]);
+        let grazing = match direction.length() {
+            certain if certain < 1e-4 => 0.0,
+            certain => 1.0 - (-direction.dot(along) / certain).max(0.0),
+        };
+        std::array::from_fn(|c| shade[c] + shade[3] * SHEEN * grazing.powi(3))
+    }
+
+    /// Light of matter of this colour at a position in space, seen along a unit direction.
+    pub fn light(&self, scene: &Scene, albedo: [f64; 3], place: DVec3, along: DVec3) -> [f64; 3] {
+        let cells = (place - self.lattice.low) / self.lattice.cell - 0.5;
+        let at = clamped(cells.to_array(), self.shade);
+        let (shade, oriented) = (self.shade.interpolated(at), self.normals.interpolated(at));
+        let direction = DVec3::new(oriented[0], oriented[1], oriented[2]);
+        let certain = direction.length();
+        if certain < 1e-4 {
+            return std::array::from_fn(|c| albedo[c] * shade[c]);
+        }
+        let normal = direction / certain;
+        let halfway = (self.towards - along).try_normalize().unwrap_or(DVec3::ZERO);
+        let gloss = if normal.dot(self.towards) > 0.0 { normal.dot(halfway).max(0.0) } else { 0.0 };
+        let light = &scene.settings.light;
+        let grazing = 1.0 - (-normal.dot(along)).max(0.0);
+        let highlight = light.specular * gloss.powf(light.shininess) * certain * oriented[3];
+        std::array::from_fn(|c| {
+            albedo[c] * (shade[c] + shade[3] * SHEEN * grazing.powi(3)) + highlight * light.colour[c]
+        })
+    }
+}

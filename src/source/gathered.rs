@@ -1,0 +1,61 @@
+//! Samples that are not one range of one file, as a stream of bytes.
+
+use std::io::{self, Cursor, Read};
+use std::path::PathBuf;
+
+/// Samples that are not one range of one file.
+pub(super) trait Gathered: std::fmt::Debug + Send + Sync {
+    /// The stream `skip` bytes after its beginning.
+    fn open(&self, skip: u64) -> io::Result<Box<dyn Read + Send>>;
+    /// The files that hold them.
+    fn files(&self) -> Vec<PathBuf>;
+}
+
+/// Pictures or frames with the same number of bytes of samples each, which are decoded one by one.
+pub(super) trait Decoded: Clone + std::fmt::Debug + Send + Sync + 'static {
+    /// Bytes of the samples of one.
+    fn each(&self) -> usize;
+    /// The samples of one; none behind the last.
+    fn decode(&self, number: usize) -> io::Result<Vec<u8>>;
+    fn files(&self) -> &[PathBuf];
+}
+
+impl<D: Decoded> Gathered for D {
+    fn open(&self, skip: u64) -> io::Result<Box<dyn Read + Send>> {
+        let each = self.each().max(1) as u64;
+        let next = usize::try_from(skip / each).unwrap_or(usize::MAX);
+        let mut stream = DecodedStream { from: self.clone(), next, samples: Cursor::default() };
+        if !skip.is_multiple_of(each) {
+            stream.decode()?;
+            stream.samples.set_position(skip % each);
+        }
+        Ok(Box::new(stream))
+    }
+
+    fn files(&self) -> Vec<PathBuf> {
+        Decoded::files(self).to_vec()
+    }
+}
+
+struct DecodedStream<D> {
+    from: D,
+    next: usize,
+    samples: Cursor<Vec<u8>>,
+}
+
+impl<D: Decoded> DecodedStream<D> {
+    fn decode(&mut self) -> io::Result<()> {
+        self.samples = Cursor::new(self.from.decode(self.next)?);
+        self.next = self.next.saturating_add(1);
+        Ok(())
+    }
+}
+
+impl<D: Decoded> Read for DecodedStream<D> {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        if self.samples.position() >= self.samples.get_ref().len() as u64 {
+            self.decode()?;
+        }
+        self.samples.read(out)
+    }
+}
