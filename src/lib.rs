@@ -184,6 +184,7 @@ pub mod low_level {
     pub use echolume_gpu::{self as gpu, machine, shader_source, shader_tools};
     #[cfg(feature = "lab")]
     pub use echolume_lab::{bounds, error_report, filter_report, profile, thesis_tables};
+    pub use echolume_segment as segment;
     pub use echolume_session::{kiosk, live, marked, measure, user_presets, workspace};
     #[cfg(feature = "view")]
     pub use echolume_ui as ui;

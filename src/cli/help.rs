@@ -108,7 +108,7 @@ const GROUPED: [(&str, &[(&str, &str)]); 3] = [
 ];
 
 /// The flags of `-h`, of commands with many.
-const USUAL: [(&str, &[&str]); 8] = [
+const USUAL: [(&str, &[&str]); 9] = [
     (
         "render",
         &[
@@ -171,6 +171,7 @@ const USUAL: [(&str, &[&str]); 8] = [
     ),
     ("convert", &["spacing", "volume", "probe", "outside", "mask", "sequence", "secondary_capture"]),
     ("mesh", &["threshold", "spacing", "smooth", "simplify", "base", "open", "volume", "probe"]),
+    ("segment", &["output", "threshold", "dark", "seed", "smooth", "box", "least", "csv", "stl", "volume", "probe"]),
     ("phantom", &["output", "body", "volumes", "seed", "sampling", "frames", "lines", "truth"]),
     ("verify", &["device", "full", "only", "list", "baseline", "json", "junit", "html", "self_test", "against"]),
     ("profile", &["mode", "preset", "set", "size", "device", "runs", "json", "compare", "against", "html"]),

@@ -64,6 +64,7 @@ mod recordings;
 mod render;
 #[cfg(feature = "lab")]
 mod report;
+mod segment;
 mod series;
 mod serve;
 mod stic;
@@ -187,6 +188,8 @@ enum Command {
     Stic(stic::Stic),
     /// Write the surface of a recording as a mesh (.stl, .ply, .glb)
     Mesh(mesh::MakeMesh),
+    /// Find bodies, label their voxels, and measure their volumes (.seg.nrrd)
+    Segment(segment::Segment),
     /// Describe a recording, without patient fields
     Info(recordings::Info),
     /// Render, convert, measure or verify many recordings: one shard of a manifest, to be run on many machines
@@ -234,6 +237,7 @@ pub fn run() -> ExitCode {
         Command::Convert(convert) => convert.run(),
         Command::Stic(stic) => stic.run(),
         Command::Mesh(mesh) => mesh.run(),
+        Command::Segment(segment) => segment.run(),
         Command::Info(info) => info.run(arguments.verbose > 0),
         Command::Batch(batch) => batch.run(),
         Command::Probe(probe) => probe.run(),

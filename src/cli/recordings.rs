@@ -21,7 +21,7 @@ pub(super) const OUTPUT: &str = "output";
 
 /// Reads one volume of a recording, and its geometry. `each` is called with every frame before it is kept. The number of frames that are
 /// there comes last.
-fn read_volume(
+pub(super) fn read_volume(
     recording: &mut dyn Source,
     file: &Path,
     number: usize,

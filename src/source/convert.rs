@@ -138,6 +138,11 @@ impl Volume {
         &self.geometry
     }
 
+    /// The type of its samples.
+    pub fn stored(&self) -> StoredType {
+        self.stored
+    }
+
     /// The bytes of each slice, in geometric order; none of a missing frame, which is zero.
     pub fn frames(&self) -> &[Vec<u8>] {
         &self.frames
@@ -233,7 +238,7 @@ impl Volume {
     /// As [`Volume::write`].
     pub fn write_mask(&self, target: &Target, path: &Path) -> Result<(), InputError> {
         if segmentation::is_one(path) {
-            let segment = Segment { label: 1, name: "insonified", colour: [0.4, 0.6, 0.8] };
+            let segment = Segment { label: 1, name: "insonified".into(), colour: [0.4, 0.6, 0.8] };
             let label = |voxel| u8::from(self.value(target, voxel).is_some());
             return segmentation::write(path, &target.grid, &target.world, &[segment], label, || ());
         }
@@ -255,7 +260,7 @@ impl Volume {
         path: &Path,
         each: impl Fn(),
     ) -> Result<(), InputError> {
-        let segment = Segment { label: 1, name: "tissue", colour: [0.88, 0.67, 0.55] };
+        let segment = Segment { label: 1, name: "tissue".into(), colour: [0.88, 0.67, 0.55] };
         let label = |voxel| u8::from(self.value(target, voxel).is_some_and(|value| value >= threshold));
         segmentation::write(path, &target.grid, &target.world, &[segment], label, each)
     }

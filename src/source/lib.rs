@@ -54,7 +54,7 @@ mod value_range;
 pub mod volume_file;
 pub mod volume_sequence;
 
-use echolume_base::{files, memory, tree};
+use echolume_base::{files, memory, text, tree};
 use echolume_probe as probe;
 
 pub use crate::files::InputError;

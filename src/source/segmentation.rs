@@ -1,12 +1,15 @@
 //! Label volumes with the names of their labels: NRRD segmentations (`.seg.nrrd`) in the form of 3D Slicer, one layer of bytes packed by
 //! gzip. A file is complete or absent.
 
+use super::nrrd;
 use super::volume_file::{self, nrrd_axes, three};
 use crate::files::{InputError, Unfinished};
 use crate::probe::{Grid, World};
+use crate::text::single_line;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use rayon::prelude::*;
+use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::io::{self, Write};
 use std::path::Path;
@@ -15,10 +18,10 @@ use std::path::Path;
 const ENDING: &str = ".seg.nrrd";
 
 /// A label of a volume, its name, and the colour that it is shown in: red, green, blue, 0..=1.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Segment {
     pub label: u8,
-    pub name: &'static str,
+    pub name: Cow<'static, str>,
     pub colour: [f64; 3],
 }
 
@@ -32,11 +35,20 @@ pub fn stem(path: &Path) -> Option<String> {
     volume_file::stem(path, ENDING)
 }
 
+/// The segments that the header of such a file states, in their order; none of another NRRD. The labels of the voxels are its samples.
+///
+/// # Errors
+/// A file that cannot be read, or states a label that is no number of 8 bits.
+pub fn segments(path: &Path) -> Result<Vec<Segment>, InputError> {
+    let segment = |(label, name, colour): (u8, String, [f64; 3])| Segment { label, name: name.into(), colour };
+    Ok(nrrd::segments(path)?.into_iter().map(segment).collect())
+}
+
 /// Writes the label of each voxel of a lattice. Label 0 is no segment. `each` is called after every slice.
 ///
 /// # Errors
 /// A full disk, a folder that cannot be written.
-pub(super) fn write(
+pub fn write(
     path: &Path,
     grid: &Grid,
     world: &World,
@@ -68,7 +80,7 @@ fn header(size: [usize; 3], world: &World, segments: &[Segment]) -> String {
     let axes = nrrd_axes(size, world, None);
     let mut text = format!("NRRD0004\ntype: uint8\ndimension: 3\n{axes}encoding: gzip\n");
     for (n, Segment { label, name, colour }) in segments.iter().enumerate() {
-        let colour = three((*colour).into(), " ");
+        let (colour, name) = (three((*colour).into(), " "), single_line(name));
         // Writing to a string cannot fail.
         let _ = write!(
             text,
@@ -99,13 +111,14 @@ mod tests {
         let path = std::env::temp_dir().join(format!("echolume-{}.seg.nrrd", std::process::id()));
         let grid = Grid { size: [4, 3, 2], spacing: [0.5, 1.0, 2.0], origin: [-3.0, 7.0, 0.0] };
         let segments = [
-            Segment { label: 2, name: "two", colour: [1.0, 0.5, 0.0] },
-            Segment { label: 7, name: "choroid plexus", colour: [0.0; 3] },
+            Segment { label: 2, name: "two".into(), colour: [1.0, 0.5, 0.0] },
+            Segment { label: 7, name: "choroid plexus".into(), colour: [0.0; 3] },
         ];
         let label = |[x, y, z]: [usize; 3]| if x == y { 2 + 5 * z as u8 } else { 0 };
         write(&path, &grid, &World::of(&grid), &segments, label, || ()).expect("written");
-        let bytes = std::fs::read(&path);
+        let (bytes, read) = (std::fs::read(&path), super::segments(&path));
         let _ = std::fs::remove_file(&path);
+        assert_eq!(read, Ok(segments.to_vec()));
         let bytes = bytes.expect("read");
         let end = bytes.windows(2).position(|w| w == b"\n\n").expect("an end of the header") + 2;
         let text = String::from_utf8(bytes[..end].to_vec()).expect("text");

@@ -24,6 +24,7 @@ mod outputs;
 mod pipelines;
 mod presets;
 mod privacy;
+mod segment;
 mod series;
 mod service;
 mod shaders;

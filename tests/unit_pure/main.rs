@@ -32,6 +32,7 @@ mod references;
 mod richardson;
 mod rules;
 mod sampling;
+mod segment;
 mod sizes_in_mm;
 mod soak;
 mod start_curve;

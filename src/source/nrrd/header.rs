@@ -73,8 +73,8 @@ const SPELLINGS: [(&str, &str); 10] = [
 pub(super) const ORIENTATION: &str = "ultrasound image orientation";
 pub(super) const IMAGE_TYPE: &str = "ultrasound image type";
 
-/// The start of the keys of a segmentation's first segment.
-const SEGMENT: &str = "segment0_";
+/// The start of the keys of a segment, before its number.
+const SEGMENT: &str = "segment";
 
 /// A vector of numbers that are written in brackets.
 pub(super) type Vector = Vec<f64>;
@@ -85,7 +85,8 @@ pub(super) struct Header<'a> {
     /// Keys with values that are read: those of PLUS for a whole sequence, and `axis N index ...`.
     values: HashMap<String, String>,
     /// It has keys of segments.
-    has_segments: bool,
+    /// Keys of segments, in lower case, with their values.
+    segments: HashMap<String, String>,
     /// What PLUS says of the frames.
     pub frames: PlusFrames,
     /// The lines behind `data file: LIST`.
@@ -103,7 +104,7 @@ impl<'a> Header<'a> {
             path,
             stated: Stated::new(&KEYS),
             values: HashMap::new(),
-            has_segments: false,
+            segments: HashMap::new(),
             frames: PlusFrames::default(),
             list: Vec::new(),
             length: 0,
@@ -165,8 +166,10 @@ impl<'a> Header<'a> {
         if lower == ORIENTATION || lower == IMAGE_TYPE || is_of_axis {
             self.values.insert(lower, value.to_string());
         } else {
-            self.has_segments |= lower.starts_with(SEGMENT);
             self.stated.note(key);
+            if lower.starts_with(SEGMENT) {
+                self.segments.insert(lower, value.to_string());
+            }
         }
         Ok(())
     }
@@ -209,7 +212,12 @@ impl<'a> Header<'a> {
 
     /// True of a segmentation of 3D Slicer.
     pub(super) fn has_segments(&self) -> bool {
-        self.has_segments
+        self.segments.keys().any(|key| key.starts_with("segment0_"))
+    }
+
+    /// What a segmentation states of a segment, by the number of the segment and the name of the field in lower case.
+    pub(super) fn of_segment(&self, segment: usize, field: &str) -> Option<&str> {
+        self.segments.get(&format!("{SEGMENT}{segment}_{field}")).map(String::as_str)
     }
 
     /// The words of a field, one for each of `count`; those in quotes may be empty. None if the field is absent.

@@ -105,6 +105,23 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
     Ok(layout)
 }
 
+/// The segments of a segmentation, in their order: label, name, and colour.
+pub(super) fn segments(path: &Path) -> Result<Vec<(u8, String, [f64; 3])>, InputError> {
+    let header = Header::read(&InputFile::new(path)?)?;
+    let one = |n: usize| {
+        let stated = header.of_segment(n, "labelvalue").unwrap_or("1");
+        let Ok(label) = stated.parse() else {
+            return header
+                .fault(&format!("Segment{n}_LabelValue"), format!("{} is not a label of 0..=255", quoted(stated)));
+        };
+        let numbers = header.of_segment(n, "color").unwrap_or("").split_whitespace().map(str::parse);
+        let colour = numbers.collect::<Result<Vec<f64>, _>>().ok().and_then(|numbers| numbers.try_into().ok());
+        Ok((label, header.of_segment(n, "name").unwrap_or("").to_string(), colour.unwrap_or([0.5; 3])))
+    };
+    // The keys of a segment are its identifier and others.
+    (0..).take_while(|n| header.of_segment(*n, "id").is_some()).map(one).collect()
+}
+
 /// The byte order of numbers of more than a byte must be stated, as Teem and pynrrd demand.
 fn is_big_endian(header: &Header, bytes: usize) -> Result<bool, InputError> {
     match header.get("endian").map(str::to_ascii_lowercase).as_deref() {

@@ -77,7 +77,7 @@ impl Phantom {
         if segmentation::is_one(path) {
             // Fluid is 0: no segment.
             let segments = self.options.body.labels().iter().filter(|label| **label as u8 > 0);
-            let segments = segments.map(|l| Segment { label: *l as u8, name: l.name(), colour: l.colour() });
+            let segments = segments.map(|l| Segment { label: *l as u8, name: l.name().into(), colour: l.colour() });
             write_labels(grid, &segments.collect::<Vec<_>>(), path, |place| label(place).unwrap_or(0))?;
         } else if VolumeFile::of(path).is_ok_and(|format| format == VolumeFile::MetaImage) {
             write_grid(grid, SampleType::U8, path, |place| label(place).map(f64::from), || ())?;

@@ -1,0 +1,94 @@
+//! Labels in files: segmentations of 3D Slicer (`.seg.nrrd`), and meshes of labels.
+
+use crate::base_files::InputError;
+use crate::labels::Labels;
+use crate::mesh::Mesh;
+use crate::mesh::nets::{Surface, surface_net};
+use crate::mesh::smooth::Smoother;
+use crate::probe::{Geometry, World};
+use crate::source::segmentation::{self, Segment};
+use crate::source::{self, OpenOptions};
+use std::collections::BTreeSet;
+use std::path::Path;
+
+/// Colours that neighbouring labels are told apart by: red, green, blue, 0..=1.
+const COLOURS: [[f64; 3]; 6] =
+    [[0.9, 0.6, 0.2], [0.3, 0.7, 0.9], [0.3, 0.7, 0.4], [0.9, 0.85, 0.3], [0.8, 0.4, 0.3], [0.75, 0.5, 0.75]];
+
+/// Bins of the histogram by which the level of a surface is found.
+const BINS: usize = 1024;
+
+/// Writes the labels as a segmentation of 3D Slicer, each as a segment with this name and a colour.
+///
+/// # Errors
+/// A file that cannot be written. A file that is there is complete.
+pub fn write(labels: &Labels, path: &Path, name: impl Fn(u8) -> String) -> Result<(), InputError> {
+    let there: BTreeSet<u8> = labels.voxels().iter().copied().filter(|label| *label > 0).collect();
+    let colour = |label: u8| COLOURS[(usize::from(label) - 1) % COLOURS.len()];
+    let segment = |label: &u8| Segment { label: *label, name: name(*label).into(), colour: colour(*label) };
+    let segments: Vec<Segment> = there.iter().map(segment).collect();
+    let [width, height, _] = labels.grid().size;
+    let label = |[x, y, z]: [usize; 3]| labels.voxels()[(z * height + y) * width + x];
+    segmentation::write(path, labels.grid(), labels.world(), &segments, label, || ())
+}
+
+/// Reads a segmentation: its labels, in the coordinates of a volume whose axes have the same directions in the world, and its segments.
+///
+/// # Errors
+/// A file that is no volume of one layer of bytes, or cannot be read.
+pub fn read(path: &Path, options: OpenOptions) -> Result<(Labels, Vec<Segment>), InputError> {
+    let segments = segmentation::segments(path)?;
+    let fault = |why: String| InputError::new(path, "labels", why);
+    if segments.is_empty() {
+        return Err(fault("are not there: it is no segmentation, of which a header states Segment0_ID".into()));
+    }
+    let mut recording = source::open_with(path, options)?;
+    let (geometry, bytes) = (recording.geometry(0), recording.stored_type().bytes());
+    let Geometry::Cartesian(grid) = geometry else { return Err(fault("are not on a lattice".into())) };
+    if bytes != 1 {
+        return Err(fault(format!("are numbers of {bytes} bytes, must be bytes")));
+    }
+    let world = recording.world_of(0).unwrap_or(World::of(&grid));
+    let mut voxels = Vec::with_capacity(grid.size.iter().product());
+    for _ in 0..grid.size[2] {
+        match recording.next_frame()? {
+            Some(frame) => voxels.extend(frame.bytes),
+            None => break,
+        }
+    }
+    Ok((Labels::of(grid, world, voxels).map_err(fault)?, segments))
+}
+
+/// The closed surface of a label, in the world. A Gaussian of one voxel rounds off the steps of voxels; the surface is at the level that as many
+/// voxels reach as have the label, so that small bodies do not shrink.
+///
+/// # Errors
+/// One line: more triangles than are made.
+pub fn surface(labels: &Labels, label: u8) -> Result<Mesh, String> {
+    let (grid, world) = (labels.grid(), labels.world());
+    let each = grid.size[0] * grid.size[1];
+    let reader = || {
+        // In voxels, so that it is one along every axis.
+        let mut smoother = Smoother::new(grid.size, [1.0; 3], 1.0);
+        move |z: usize, out: &mut [f64]| {
+            smoother.slice(z, out, |z, out| {
+                let from = &labels.voxels()[z * each..][..each];
+                out.iter_mut().zip(from).for_each(|(out, voxel)| *out = f64::from(u8::from(*voxel == label)));
+            });
+            Ok::<(), String>(())
+        }
+    };
+    let (mut bins, mut read, mut smoothed) = (vec![0usize; BINS + 1], reader(), vec![0.0; each]);
+    for z in 0..grid.size[2] {
+        read(z, &mut smoothed)?;
+        smoothed.iter().for_each(|value| bins[(value * BINS as f64) as usize] += 1);
+    }
+    let mut left = labels.voxels().iter().filter(|voxel| **voxel == label).count();
+    let is_reached = |count: usize| {
+        left = left.saturating_sub(count);
+        left == 0
+    };
+    let bin = bins.iter().rev().copied().position(is_reached).map_or(BINS / 2, |n| BINS - n);
+    let surface = Surface { threshold: bin.max(1) as f64 / BINS as f64, closed: true };
+    surface_net(grid.size, surface, reader(), |at| world.at(at))
+}

@@ -1,0 +1,103 @@
+//! A label for each voxel of a lattice, and the brush that edits it.
+
+use crate::lattice::{self, Region};
+use crate::memory;
+use crate::probe::{Grid, World};
+use glam::DVec3;
+
+/// Labels of the voxels of a lattice; 0 is none. Voxels are spheres of no extent at their centres.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Labels {
+    grid: Grid,
+    world: World,
+    voxels: Vec<u8>,
+}
+
+/// The shape of a [`Brush`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shape {
+    /// All voxels within the radius.
+    Ball,
+    /// Those of them that are no further than half of the thickness, mm, from the plane through the centre with this unit normal.
+    Disc { normal: DVec3, thickness: f64 },
+}
+
+/// A stroke of a brush: a ball or disc that is moved along a straight line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Brush {
+    /// Where it starts and ends, mm, in the coordinates of the grid.
+    pub from: DVec3,
+    pub to: DVec3,
+    /// mm.
+    pub radius: f64,
+    pub shape: Shape,
+}
+
+impl Labels {
+    /// A lattice without labels. `world`: where the voxels of the grid are in the world.
+    ///
+    /// # Errors
+    /// One line: a grid that is not valid, or one that takes more memory than is allowed.
+    pub fn new(grid: Grid, world: World) -> Result<Labels, String> {
+        let voxels = lattice::voxels(&grid)?;
+        memory::check(voxels as u64).map_err(|why| format!("a label volume {why}"))?;
+        Ok(Labels { grid, world, voxels: vec![0; voxels] })
+    }
+
+    /// As [`Labels::new`], with labels: x is the fastest.
+    ///
+    /// # Errors
+    /// As [`Labels::new`], and a number of labels that is not that of the voxels.
+    pub fn of(grid: Grid, world: World, voxels: Vec<u8>) -> Result<Labels, String> {
+        match lattice::voxels(&grid)? {
+            count if count == voxels.len() => Ok(Labels { grid, world, voxels }),
+            count => Err(format!("{} labels do not fill {count} voxels", voxels.len())),
+        }
+    }
+
+    pub fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
+    pub fn world(&self) -> &World {
+        &self.world
+    }
+
+    /// The labels; x is the fastest.
+    pub fn voxels(&self) -> &[u8] {
+        &self.voxels
+    }
+
+    pub(crate) fn voxels_mut(&mut self) -> &mut [u8] {
+        &mut self.voxels
+    }
+
+    /// Gives the voxels of a stroke a label; 0 removes them. With `only`, voxels of other labels stay as they are. Returns how many changed.
+    pub fn paint(&mut self, brush: &Brush, label: u8, only: Option<u8>) -> usize {
+        let reach = DVec3::splat(brush.radius);
+        let within = [brush.from.min(brush.to) - reach, brush.from.max(brush.to) + reach];
+        let Some(region) = Region::within(&self.grid, within) else { return 0 };
+        let mut changed = 0;
+        for (n, place) in region.places(&self.grid) {
+            let voxel = &mut self.voxels[n];
+            if *voxel != label && only.is_none_or(|only| *voxel == only) && brush.has(place) {
+                *voxel = label;
+                changed += 1;
+            }
+        }
+        changed
+    }
+}
+
+impl Brush {
+    fn has(&self, place: DVec3) -> bool {
+        let along = self.to - self.from;
+        let share = (place - self.from).dot(along) / along.length_squared().max(f64::MIN_POSITIVE);
+        let off = place - (self.from + along * share.clamp(0.0, 1.0));
+        let is_near = off.length() <= self.radius;
+        match self.shape {
+            Shape::Ball => is_near,
+            Shape::Disc { normal, thickness } => is_near && off.dot(normal).abs() <= thickness / 2.0,
+        }
+    }
+}

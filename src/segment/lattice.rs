@@ -1,0 +1,102 @@
+//! Voxels of a lattice: their number, their places, and boxes of them.
+
+use crate::probe::Grid;
+use glam::DVec3;
+
+/// Most voxels of a lattice: their numbers fit into 32 bits.
+const MAX_VOXELS: usize = 1 << 30;
+
+/// The number of voxels.
+///
+/// # Errors
+/// One line: a grid that is not valid, or too many voxels.
+pub(crate) fn voxels(grid: &Grid) -> Result<usize, String> {
+    grid.check().map_err(|e| format!("the {} of the lattice {}", e.field, e.fault))?;
+    let [x, y, z] = grid.size;
+    let count = x.checked_mul(y).and_then(|n| n.checked_mul(z)).filter(|n| *n <= MAX_VOXELS);
+    count.ok_or_else(|| format!("{x} x {y} x {z} voxels are too many: at most {MAX_VOXELS}"))
+}
+
+/// The centre of a voxel at a fractional index, mm.
+pub(crate) fn place(grid: &Grid, at: DVec3) -> DVec3 {
+    DVec3::from(grid.origin) + at * DVec3::from(grid.spacing)
+}
+
+/// The volume of a voxel, mm^3.
+pub(crate) fn voxel_volume(grid: &Grid) -> f64 {
+    grid.spacing.iter().product()
+}
+
+/// A box of voxels: the first one and the number of them along each axis, none of them 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Region {
+    pub low: [usize; 3],
+    pub size: [usize; 3],
+}
+
+impl Region {
+    /// The voxels whose centres lie between two corners, mm; None if there are none.
+    pub fn within(grid: &Grid, [low, high]: [DVec3; 2]) -> Option<Region> {
+        let index = |at: DVec3| (at - DVec3::from(grid.origin)) / DVec3::from(grid.spacing);
+        let (from, to) = (index(low), index(high));
+        let mut region = Region { low: [0; 3], size: [0; 3] };
+        for axis in 0..3 {
+            // Saturates; NaN becomes 0.
+            let first = from[axis].ceil().max(0.0) as usize;
+            let end = ((to[axis].floor() + 1.0).max(0.0) as usize).min(grid.size[axis]);
+            region.low[axis] = first;
+            region.size[axis] = end.checked_sub(first).filter(|n| *n > 0)?;
+        }
+        Some(region)
+    }
+
+    /// The smallest box around some voxels of a lattice with a margin, mm, as far as the lattice reaches.
+    pub fn around(voxels: &[u32], grid: &Grid, margin: f64) -> Region {
+        let (mut low, mut high) = (grid.size, [0; 3]);
+        for n in voxels {
+            let at = voxel(*n as usize, grid.size);
+            for axis in 0..3 {
+                low[axis] = low[axis].min(at[axis]);
+                high[axis] = high[axis].max(at[axis]);
+            }
+        }
+        let mut region = Region { low, size: [0; 3] };
+        for axis in 0..3 {
+            let more = (margin / grid.spacing[axis]).ceil() as usize;
+            region.low[axis] = low[axis].saturating_sub(more);
+            region.size[axis] = (high[axis] + more).min(grid.size[axis] - 1) + 1 - region.low[axis];
+        }
+        region
+    }
+
+    /// The number of each voxel in the lattice; x is the fastest.
+    pub fn indices(&self, size: [usize; 3]) -> impl Iterator<Item = usize> + use<> {
+        let Region { low, size: [width, height, depth] } = *self;
+        (low[2]..low[2] + depth).flat_map(move |z| {
+            (low[1]..low[1] + height).flat_map(move |y| {
+                let row = (z * size[1] + y) * size[0] + low[0];
+                row..row + width
+            })
+        })
+    }
+
+    /// The number of each voxel in the lattice, and its centre, mm.
+    pub fn places<'a>(&self, grid: &'a Grid) -> impl Iterator<Item = (usize, DVec3)> + use<'a> {
+        self.indices(grid.size).map(|n| (n, place(grid, DVec3::from_array(voxel(n, grid.size).map(|i| i as f64)))))
+    }
+
+    pub fn voxels(&self) -> usize {
+        self.size.iter().product()
+    }
+
+    /// The number of a voxel of the lattice within the box, which it must be in.
+    pub fn own(&self, at: [usize; 3]) -> usize {
+        let [x, y, z] = [0, 1, 2].map(|axis| at[axis] - self.low[axis]);
+        (z * self.size[1] + y) * self.size[0] + x
+    }
+}
+
+/// The indices of a voxel by its number.
+pub(crate) fn voxel(n: usize, [width, height, _]: [usize; 3]) -> [usize; 3] {
+    [n % width, n / width % height, n / (width * height)]
+}

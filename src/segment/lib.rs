@@ -1,0 +1,25 @@
+//! Segmentation without a device: label volumes, and the volumes of what they label.
+//!
+//! - [`Labels`] is a label for each voxel of a lattice. A [`Brush`] edits it, [`contours`] fills it between drawn sections, [`files`] reads and
+//!   writes it.
+//! - [`Field`] holds linear echoes on the same lattice. [`bodies`] finds the bodies that are brighter or darker than what is around
+//!   them, by threshold or from a seed.
+//! - [`volume`] measures the volume of a body from the echoes at its surface, with an interval.
+
+#![forbid(unsafe_code)]
+
+pub mod bodies;
+pub mod contours;
+mod distance;
+mod field;
+pub mod files;
+mod labels;
+mod lattice;
+pub mod volume;
+
+use echolume_base::{files as base_files, memory, statistics};
+use echolume_core::mesh;
+use {echolume_probe as probe, echolume_source as source};
+
+pub use field::{Field, Scale};
+pub use labels::{Brush, Labels, Shape};
