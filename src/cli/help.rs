@@ -170,7 +170,7 @@ const USUAL: [(&str, &[&str]); 9] = [
         ],
     ),
     ("convert", &["spacing", "volume", "probe", "outside", "mask", "sequence", "secondary_capture"]),
-    ("mesh", &["threshold", "spacing", "smooth", "simplify", "base", "open", "volume", "probe"]),
+    ("mesh", &["threshold", "spacing", "smooth", "simplify", "fast", "base", "open", "volume", "probe"]),
     ("segment", &["output", "threshold", "dark", "seed", "smooth", "box", "least", "csv", "stl", "volume", "probe"]),
     ("phantom", &["output", "body", "volumes", "seed", "sampling", "frames", "lines", "truth"]),
     ("verify", &["device", "full", "only", "list", "baseline", "json", "junit", "html", "self_test", "against"]),

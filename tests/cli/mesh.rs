@@ -77,6 +77,11 @@ fn a_ball_keeps_its_volume_and_place_whatever_the_hand_of_its_axes() {
         let most = 0.1 * 4.0 * std::f64::consts::PI * RADIUS * RADIUS;
         assert!((simple - volume).abs() < most, "mirrored {mirrored}: {simple} of {volume}");
         let left = fs::metadata(&output).expect("a mesh").len();
+        // Without a bound, and it says so. A ball of quadrics loses hardly more.
+        let said = done(&["mesh", &input, &output, "--threshold", &share, "--simplify", "0.1", "--fast"]);
+        assert!(said.contains(" triangles by quadrics for 0.1 mm, without a bound"), "{said}");
+        let (fast, _) = measured(&output);
+        assert!((fast - volume).abs() < 2.0 * most, "mirrored {mirrored}: {fast} of {volume}");
         // Half of the ball on a cylinder that ends 2 mm below its deepest row, at most a voxel and a half more.
         let said = done(&["mesh", &input, &relief, "--threshold", &share, "--base", "2"]);
         assert!(said.contains("closed, 0.") && said.contains(", filled down to a base at a depth of "), "{said}");
@@ -106,6 +111,7 @@ fn a_mesh_that_would_be_wrong_is_not_written() {
         (&[&input, &stl, "--spacing", "0"], "--spacing 0"),
         (&[&input, &stl, "--volume", "1"], "--volume 1"),
         (&[&input, &stl, "--simplify", "0"], "--simplify 0"),
+        (&[&input, &stl, "--fast"], "--simplify"),
         (&[&input, &stl, "--base", "0"], "--base 0"),
         (&[&input, &stl, "--start", "inf"], "--start inf"),
         (&[&input, &stl, "--base", "1000", "--spacing", "0.05", "--threshold", "0.6"], "--base 1000: makes 20"),

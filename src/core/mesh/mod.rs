@@ -1,5 +1,5 @@
 //! Triangle meshes of a threshold's surface, on the CPU in f64: surface nets of a lattice ([`nets`]) that may be smoothed
-//! ([`smooth`]) or filled to a solid with a flat base ([`base`]), meshes of fewer triangles ([`simplify`]), the open sheet of a distance map ([`sheet`]), and files of them ([`files`]).
+//! ([`smooth`]) or filled to a solid with a flat base ([`base`]), meshes of fewer triangles ([`simplify`], [`quadrics`]), the open sheet of a distance map ([`sheet`]), and files of them ([`files`]).
 //!
 //! A mesh is welded: triangles share vertices by their index. One without open edges is a closed manifold: every edge belongs to exactly two
 //! triangles, which run along it in opposite directions.
@@ -9,6 +9,7 @@ mod cell;
 pub mod files;
 pub mod nets;
 pub mod polygons;
+pub mod quadrics;
 pub mod sheet;
 pub mod simplify;
 pub mod smooth;
@@ -21,8 +22,8 @@ pub struct Mesh {
     pub vertices: Vec<DVec3>,
     /// Indices of vertices; anticlockwise as seen from outside, where the values are below the threshold.
     pub triangles: Vec<[u32; 3]>,
-    /// Number of lattice edges at which the surface continues without a triangle, at the border of the known values. 0 for a closed
-    /// surface.
+    /// Number of lattice edges at which the surface continues without a triangle, at the border of the known values; of [`quadrics`] edges
+    /// of the triangles. 0 for a closed surface.
     pub open_edges: u64,
 }
 
