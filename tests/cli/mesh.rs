@@ -111,7 +111,6 @@ fn a_mesh_that_would_be_wrong_is_not_written() {
         (&[&input, &stl, "--spacing", "0"], "--spacing 0"),
         (&[&input, &stl, "--volume", "1"], "--volume 1"),
         (&[&input, &stl, "--simplify", "0"], "--simplify 0"),
-        (&[&input, &stl, "--fast"], "--simplify"),
         (&[&input, &stl, "--base", "0"], "--base 0"),
         (&[&input, &stl, "--start", "inf"], "--start inf"),
         (&[&input, &stl, "--base", "1000", "--spacing", "0.05", "--threshold", "0.6"], "--base 1000: makes 20"),
