@@ -61,7 +61,8 @@ fn the_fault_matrix() {
         ("unplugged@0.3", "2000", 1, &["the port is gone", "could not be stopped", "cut its power"], false),
         ("wrong-module", "2000", 1, &["open: this is the wrong module", "3110", "1140", "was stopped"], true),
         ("slow", "300", 1, &["open: no reply", "--timeout", "has not confirmed"], true),
-        ("slow@0.3", "500", 1, &["sweep: no reply", "has not confirmed"], true),
+        // Its late replies may confirm the stop.
+        ("slow@0.3", "1000", 1, &["sweep: no reply"], true),
         ("noise", "2000", 0, &[], false),
         ("noise@0.3", "2000", 0, &[], false),
     ];
