@@ -51,8 +51,8 @@ fn the_fault_matrix() {
     // Fault, time-out in ms (short only where nothing answers in time, however fast the machine is), exit code, message, whether the module receives a stop (MST).
     let matrix: &[(&str, &str, i32, &[&str], bool)] = &[
         ("mute", "300", 1, &["open: no reply", "power, the cable", "told to stop but has not confirmed"], true),
-        ("mute@0.3", "1000", 1, &["sweep: no reply to", "told to stop but has not confirmed"], true),
-        ("checksum", "1000", 1, &["open: the reply", "wrong checksum", "has not confirmed"], true),
+        ("mute@0.3", "500", 1, &["sweep: no reply to", "told to stop but has not confirmed"], true),
+        ("checksum", "2000", 1, &["open: the reply", "wrong checksum", "has not confirmed"], true),
         ("checksum@0.3", "2000", 1, &["sweep: the reply", "wrong checksum", "--baud", "has not confirmed"], true),
         ("limit-switch", "2000", 1, &["sweep: the right limit switch is closed", "The motor was stopped"], true),
         ("limit-switch@0.7", "2000", 1, &["sweep: the right limit switch is closed at", "was stopped"], true),
@@ -62,11 +62,11 @@ fn the_fault_matrix() {
         ("wrong-module", "2000", 1, &["open: this is the wrong module", "3110", "1140", "was stopped"], true),
         ("slow", "300", 1, &["open: no reply", "--timeout", "has not confirmed"], true),
         // Its late replies may confirm the stop.
-        ("slow@0.3", "1000", 1, &["sweep: no reply"], true),
+        ("slow@0.3", "500", 1, &["sweep: no reply"], true),
         ("noise", "2000", 0, &[], false),
         ("noise@0.3", "2000", 0, &[], false),
     ];
-    // All at a time: each waits most of the time.
+    // A few at a time: each waits most of the time, but a simulator must answer within the time-out on a machine that is busy.
     let next = std::sync::atomic::AtomicUsize::new(0);
     let one = || {
         while let Some((fault, timeout, code, named, told)) =
@@ -93,7 +93,7 @@ fn the_fault_matrix() {
         }
     };
     std::thread::scope(|scope| {
-        for _ in matrix {
+        for _ in 0..4 {
             scope.spawn(one);
         }
     });
