@@ -7,18 +7,11 @@
 
 use crate::labels::Labels;
 use crate::lattice::Region;
+use crate::sections::{Arrangement, Plane, SAME_ANGLE, SAME_PLANE, arranged};
 use glam::{DMat3, DVec2, DVec3};
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 
-/// Planes whose normals are closer than this are parallel: sine of the angle, 1 degree.
-const PARALLEL: f64 = 0.0175;
-/// Contours of parallel planes that are closer than this lie in one plane, mm.
-const SAME_PLANE: f64 = 0.05;
-/// Contours whose planes are turned by less than this lie in one plane, radians.
-const SAME_ANGLE: f64 = 0.002;
-/// Largest distance of the common axis from a plane that is turned about it, mm.
-const OFF_AXIS: f64 = 1.0;
 /// Most points of all contours.
 const MAX_POINTS: usize = 65_536;
 
@@ -140,33 +133,13 @@ enum Body {
     Rotated { axes: DMat3, through: DVec3, halves: Vec<Section> },
 }
 
-/// The plane of a contour.
-struct Plane {
-    at: DVec3,
-    normal: DVec3,
-}
-
 impl Body {
     fn of(contours: &[Vec<DVec3>]) -> Result<Body, String> {
-        let area = |contour: &Vec<DVec3>| {
-            let first = contour.first().copied().unwrap_or_default();
-            contour.windows(2).map(|ends| (ends[0] - first).cross(ends[1] - first)).sum::<DVec3>() / 2.0
-        };
-        let areas: Vec<DVec3> = contours.iter().map(area).collect();
-        if areas.len() < 2 {
-            return Err("a body needs contours in two planes or more".into());
+        let (planes, arrangement) = arranged(contours)?;
+        match arrangement {
+            Arrangement::Parallel { normal } => Body::parallel(contours, &planes, normal),
+            Arrangement::Rotated { axis, through } => Ok(Body::rotated(contours, &planes, axis, through)),
         }
-        if areas.iter().any(|area| !area.is_finite() || area.length() < 1e-9) {
-            return Err("a contour encloses no area".into());
-        }
-        let mean = |points: &[DVec3]| points.iter().sum::<DVec3>() / points.len().max(1) as f64;
-        let plane = |(contour, area): (&Vec<DVec3>, &DVec3)| Plane { at: mean(contour), normal: area.normalize() };
-        let planes: Vec<Plane> = contours.iter().zip(&areas).map(plane).collect();
-        let normal = planes[0].normal;
-        if planes.iter().all(|plane| plane.normal.cross(normal).length() < PARALLEL) {
-            return Body::parallel(contours, &planes, normal);
-        }
-        Body::rotated(contours, &planes, mean(&planes.iter().map(|plane| plane.at).collect::<Vec<_>>()))
     }
 
     fn parallel(contours: &[Vec<DVec3>], planes: &[Plane], normal: DVec3) -> Result<Body, String> {
@@ -186,30 +159,7 @@ impl Body {
         Ok(Body::Parallel { axes, through, sections, caps })
     }
 
-    fn rotated(contours: &[Vec<DVec3>], planes: &[Plane], middle: DVec3) -> Result<Body, String> {
-        // The axis is perpendicular to all normals: the sum of their products, with one sense.
-        let mut axis = DVec3::ZERO;
-        for (n, plane) in planes.iter().enumerate() {
-            for other in &planes[n + 1..] {
-                let across = plane.normal.cross(other.normal);
-                axis += if across.dot(axis) < 0.0 { -across } else { across };
-            }
-        }
-        let axis = axis.normalize_or_zero();
-        // The point on the axis nearest to all planes, next to their middle.
-        let outer = |v: DVec3| DMat3::from_cols(v * v.x, v * v.y, v * v.z);
-        let (mut sums, mut right) = (outer(axis), axis * axis.dot(middle));
-        for plane in planes {
-            sums += outer(plane.normal);
-            right += plane.normal * plane.normal.dot(plane.at);
-        }
-        let through = sums.inverse() * right;
-        let is_through = |plane: &Plane| {
-            plane.normal.dot(axis).abs() < PARALLEL && plane.normal.dot(through - plane.at).abs() <= OFF_AXIS
-        };
-        if axis == DVec3::ZERO || !through.is_finite() || !planes.iter().all(is_through) {
-            return Err("the contours lie neither in parallel planes nor in planes through one axis".into());
-        }
+    fn rotated(contours: &[Vec<DVec3>], planes: &[Plane], axis: DVec3, through: DVec3) -> Body {
         let x = axis.any_orthonormal_vector();
         let axes = DMat3::from_cols(x, axis.cross(x), axis);
         let of = |(contour, plane): (&Vec<DVec3>, &Plane)| {
@@ -227,7 +177,7 @@ impl Body {
             polygons: section.polygons.iter().map(|p| p.iter().map(|v| DVec2::new(-v.x, v.y)).collect()).collect(),
         };
         let other: Vec<Section> = sections.iter().map(mirrored).collect();
-        Ok(Body::Rotated { axes, through, halves: [sections, other].concat() })
+        Body::Rotated { axes, through, halves: [sections, other].concat() }
     }
 
     /// Corners of a box that holds the body.

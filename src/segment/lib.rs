@@ -4,6 +4,7 @@
 //!   writes it.
 //! - [`Field`] holds linear echoes on the same lattice. [`bodies`] finds the bodies that are brighter or darker than what is around
 //!   them, by threshold or from a seed.
+//! - [`sections`] finds how the planes of drawn contours lie to each other.
 //! - [`volume`] measures the volume of a body from the echoes at its surface, with an interval.
 
 #![forbid(unsafe_code)]
@@ -15,6 +16,7 @@ mod field;
 pub mod files;
 mod labels;
 mod lattice;
+pub mod sections;
 pub mod volume;
 
 use echolume_base::{files as base_files, memory, statistics};

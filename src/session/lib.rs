@@ -18,4 +18,5 @@ pub mod workspace;
 use echolume_base::{canvas, files, metrics, picture, text, tree};
 use echolume_core::{passes, plan, scene};
 use echolume_gpu::{self as gpu, machine};
+use echolume_segment as segment;
 use {echolume_probe as probe, echolume_source as source};

@@ -1,18 +1,9 @@
 //! The volume of a body from contours of its sections: parallel planes by Cavalieri's principle, and planes through one axis by Pappus'
 //! theorem (the method of rotated contours of ultrasound systems).
 
-use super::shapes::{centroid, vector_area};
-use glam::{DMat3, DVec3};
+use crate::segment::sections::{Arrangement, Plane, SAME_ANGLE, SAME_PLANE, arranged};
+use glam::DVec3;
 use std::f64::consts::PI;
-
-/// Planes whose normals are closer than this are parallel: sine of the angle, 1 degree.
-const PARALLEL: f64 = 0.0175;
-/// Contours of parallel planes that are closer than this lie in one plane, mm.
-const SAME_PLANE: f64 = 0.05;
-/// Contours whose planes are turned by less than this lie in one plane, radians.
-const SAME_ANGLE: f64 = 0.002;
-/// Largest distance of the common axis from a plane that is turned about it, mm.
-const OFF_AXIS: f64 = 1.0;
 
 /// The arrangement of the planes of contours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,32 +21,10 @@ pub enum Stack {
 /// # Errors
 /// One line: there are fewer than two planes, a contour has no area, or the planes are neither parallel nor share an axis.
 pub fn volume(contours: &[Vec<DVec3>]) -> Result<(f64, Stack), &'static str> {
-    let areas: Vec<DVec3> = contours.iter().map(|contour| vector_area(contour)).collect();
-    if areas.len() < 2 {
-        return Err("a volume needs contours in two planes or more");
-    }
-    if areas.iter().any(|area| !area.is_finite() || area.length() < 1e-9) {
-        return Err("a contour encloses no area");
-    }
-    let planes: Vec<Plane> = contours.iter().zip(&areas).map(|(contour, area)| Plane::of(contour, *area)).collect();
-    let first = planes[0].normal;
-    if planes.iter().all(|plane| plane.normal.cross(first).length() < PARALLEL) {
-        return parallel(&planes, first).map(|mm3| (mm3, Stack::Parallel));
-    }
-    rotated(contours, &planes).map(|mm3| (mm3, Stack::Rotated))
-}
-
-/// The plane of a contour.
-struct Plane {
-    at: DVec3,
-    normal: DVec3,
-    /// mm^2.
-    area: f64,
-}
-
-impl Plane {
-    fn of(contour: &[DVec3], area: DVec3) -> Plane {
-        Plane { at: centroid(contour), normal: area.normalize(), area: area.length() }
+    let (planes, arrangement) = arranged(contours)?;
+    match arrangement {
+        Arrangement::Parallel { normal } => parallel(&planes, normal).map(|mm3| (mm3, Stack::Parallel)),
+        Arrangement::Rotated { axis, through } => Ok((rotated(contours, &planes, axis, through), Stack::Rotated)),
     }
 }
 
@@ -76,31 +45,7 @@ fn parallel(planes: &[Plane], normal: DVec3) -> Result<f64, &'static str> {
     Ok((ends + between) / 2.0)
 }
 
-fn rotated(contours: &[Vec<DVec3>], planes: &[Plane]) -> Result<f64, &'static str> {
-    const NEITHER: &str = "the contours lie neither in parallel planes nor in planes through one axis";
-    // The axis is perpendicular to all normals: the sum of their products, with one sense.
-    let mut axis = DVec3::ZERO;
-    for (n, plane) in planes.iter().enumerate() {
-        for other in &planes[n + 1..] {
-            let across = plane.normal.cross(other.normal);
-            axis += if across.dot(axis) < 0.0 { -across } else { across };
-        }
-    }
-    let axis = axis.normalize_or_zero();
-    let middle = centroid(&planes.iter().map(|plane| plane.at).collect::<Vec<_>>());
-    // The point on the axis nearest to all planes, next to their middle.
-    let (mut sums, mut right) = (outer(axis), axis * axis.dot(middle));
-    for plane in planes {
-        sums += outer(plane.normal);
-        right += plane.normal * plane.normal.dot(plane.at);
-    }
-    let through = sums.inverse() * right;
-    let is_through = |plane: &Plane| {
-        plane.normal.dot(axis).abs() < PARALLEL && plane.normal.dot(through - plane.at).abs() <= OFF_AXIS
-    };
-    if axis == DVec3::ZERO || !through.is_finite() || !planes.iter().all(is_through) {
-        return Err(NEITHER);
-    }
+fn rotated(contours: &[Vec<DVec3>], planes: &[Plane], axis: DVec3, through: DVec3) -> f64 {
     let reference = planes[0].normal;
     let mut sections: Vec<(f64, f64)> = contours
         .iter()
@@ -124,11 +69,7 @@ fn rotated(contours: &[Vec<DVec3>], planes: &[Plane]) -> Result<f64, &'static st
         true => sections[0].0 + PI - sections[n].0,
         false => sections[n + 1].0 - sections[n].0,
     };
-    Ok((0..count).map(|n| sections[n].1 * (gap(n) + gap((n + count - 1) % count)) / 2.0).sum())
-}
-
-fn outer(v: DVec3) -> DMat3 {
-    DMat3::from_cols(v * v.x, v * v.y, v * v.z)
+    (0..count).map(|n| sections[n].1 * (gap(n) + gap((n + count - 1) % count)) / 2.0).sum()
 }
 
 /// The integral of the distance from the axis over the area of a contour, mm^3: what it sweeps in a turn of one radian, of both sides.

@@ -1,5 +1,6 @@
 //! Lengths, angles and areas of points in space. All in f64, in mm, mm^2 and degrees.
 
+use crate::segment::sections::vector_area;
 use glam::DVec3;
 use std::f64::consts::{PI, TAU};
 
@@ -24,21 +25,9 @@ pub fn angle(leg: DVec3, vertex: DVec3, other: DVec3) -> Option<f64> {
     is_one.then(|| a.cross(b).length().atan2(a.dot(b)).to_degrees())
 }
 
-/// The area of a contour as a vector along its normal, mm^2 (Newell). For a plane contour the length of the vector is the enclosed area, as
-/// by the shoelace formula. For another contour it is the area of its projection onto the plane where that is largest.
-pub(crate) fn vector_area(contour: &[DVec3]) -> DVec3 {
-    let Some((first, rest)) = contour.split_first() else { return DVec3::ZERO };
-    rest.windows(2).map(|ends| (ends[0] - first).cross(ends[1] - first)).sum::<DVec3>() / 2.0
-}
-
 /// The area that a plane contour encloses, mm^2. If a contour crosses itself, parts of opposite sense are subtracted from each other.
 pub fn area(contour: &[DVec3]) -> f64 {
     vector_area(contour).length()
-}
-
-/// The mean of the points.
-pub fn centroid(points: &[DVec3]) -> DVec3 {
-    points.iter().sum::<DVec3>() / points.len().max(1) as f64
 }
 
 /// An ellipse in space.
