@@ -63,7 +63,7 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
         return refuse("ray.rays", format!("makes {width}x{height} rays, each edge must lie in 1..={MAX_PICTURE}"));
     }
     if settings.layout.has_planes() && settings.mode.is_flat() {
-        return refuse("layout", "shows three planes and a rendering: the mode must be one that renders");
+        return refuse("layout", "four and beside show planes and a rendering: the mode must be one that renders");
     }
     if settings.marks.are_mirrored() {
         return refuse(

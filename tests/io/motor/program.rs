@@ -66,7 +66,7 @@ fn the_fault_matrix() {
         ("noise", "2000", 0, &[], false),
         ("noise@0.3", "2000", 0, &[], false),
     ];
-    // A few at a time: each waits most of the time, but a simulator must answer within the time-out on a machine that is busy.
+    // Two at a time: each waits most of the time, but a simulator must answer within the time-out on a machine that is busy.
     let next = std::sync::atomic::AtomicUsize::new(0);
     let one = || {
         while let Some((fault, timeout, code, named, told)) =
@@ -93,7 +93,7 @@ fn the_fault_matrix() {
         }
     };
     std::thread::scope(|scope| {
-        for _ in 0..4 {
+        for _ in 0..2 {
             scope.spawn(one);
         }
     });
