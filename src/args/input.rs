@@ -310,7 +310,7 @@ impl SceneArgs {
         Ok(layers)
     }
 
-    /// The files that settings are read from.
+    /// The values of `--scene` and `--transfer` as paths. A transfer function may be a built-in name.
     pub fn files(&self) -> impl Iterator<Item = PathBuf> {
         self.scene.iter().cloned().chain(self.transfer.iter().map(PathBuf::from))
     }

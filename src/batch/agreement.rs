@@ -50,7 +50,7 @@ pub struct Agreement {
     pub same_bytes: bool,
     /// Whether the difference is within what the class allows.
     pub agrees: bool,
-    /// Errors with the limits of `verify`; empty if the bytes are equal.
+    /// Errors between the two pictures, each with its limit in `verify`; empty if the bytes are equal.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub figures: Vec<Figure>,
     /// One line that describes the difference, if the pictures do not agree.

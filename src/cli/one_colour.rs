@@ -9,7 +9,7 @@ use crate::picture::Picture;
 use crate::scene::{Layout, Mode, Scene, transfer};
 use crate::source::StoredType;
 
-/// The content of a picture in which nothing is visible.
+/// What fills a picture in which nothing is visible.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Nothing {
     /// One colour: red, green, blue.

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 /// The options of `profile --pipelines`.
 pub struct Request<'a> {
     pub input: &'a InputArgs,
-    /// Measures every mode, preset and filter instead of the scene alone.
+    /// Measures the pipelines of each mode, preset and filter instead of those of the scene alone.
     pub all: bool,
     pub json: Option<&'a Path>,
     /// Files to compare: one is compared with the new measurement, two with each other.

@@ -104,7 +104,7 @@ pub enum First {
     BeingOpened(Receiver<Result<Box<dyn Live>, Failure>>),
 }
 
-/// The source and the console. A kiosk reads them again after a fault.
+/// The source, and the options of the console: the viewer's interface. A kiosk reads its configuration again after a fault.
 pub struct ConsoleConfig {
     /// None: the console shows only a message.
     pub source: Option<SourceArgs>,

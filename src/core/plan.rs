@@ -225,7 +225,8 @@ impl Plan {
         Rerun::Steps { steps, slots }
     }
 
-    /// The steps that have to run again in the same scene after shaders changed.
+    /// The steps to run again in the same scene after shaders changed: those with a changed shader, and those that read what these write.
+    /// `is_changed` is given the shader's name.
     pub fn rerun_shaders(&self, scene: &Scene, is_changed: impl Fn(&str) -> bool) -> Rerun {
         let (mut changed, mut steps) = (Vec::new(), Vec::new());
         for (i, step) in self.steps.iter().enumerate() {

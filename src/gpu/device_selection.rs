@@ -56,11 +56,11 @@ pub struct Candidate {
     pub can_present: bool,
     /// Identity of the device and driver that stored pipelines must match.
     pub(crate) driver_identity: DriverIdentity,
-    /// Reports when a picture is on the monitor.
+    /// Can report when a picture is on the monitor.
     pub(crate) present_wait: bool,
-    /// Reports why the device was lost.
+    /// Can report why it was lost.
     pub(crate) device_fault: bool,
-    /// Reports the passes that its queues had reached when the device was lost.
+    /// Can report the passes that its queues had reached when it was lost.
     pub checkpoints: bool,
     /// The memory budget at the time of listing, if the device reports one.
     pub budget: Option<MemoryBudget>,

@@ -61,7 +61,7 @@ impl GpuError {
             || self.is_given_up()
     }
 
-    /// True if the device was given up because it did not finish.
+    /// True if the wait for the device was given up, after a time-out or at a signal.
     pub fn is_given_up(&self) -> bool {
         matches!(self, GpuError::TimedOut { .. } | GpuError::Stopped { .. })
     }

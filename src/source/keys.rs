@@ -11,7 +11,7 @@ use std::path::Path;
 const MAX_NAME: usize = 64;
 const MAX_NAMES: usize = 256;
 
-/// The property of the samples that a key describes.
+/// What a key of a file's header describes: a property of the samples, or anything else.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Aspect {
     /// Sizes, spacings and positions.

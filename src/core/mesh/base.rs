@@ -31,7 +31,8 @@ impl Base {
         self.deepest
     }
 
-    /// Fills `out`, which also has the rows below the deepest position, from a slice. NaN where nothing is known and nothing is filled.
+    /// Copies a slice to `out`, which may have more rows. From where a column first reaches the threshold, each row has the column's largest value so
+    /// far. NaN before that where the value is not known.
     pub fn fill(&self, slice: &[f64], out: &mut [f64]) {
         for column in 0..self.width {
             let mut values = slice.iter().skip(column).step_by(self.width);

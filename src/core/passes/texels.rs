@@ -195,7 +195,7 @@ impl Texels {
         Texels { size, channels: format.channels(), values: in_order(format, &values).into_owned() }
     }
 
-    /// The value that the format stores for a value.
+    /// What a texel of the format holds, in its first channel, after `value` was stored in it.
     pub fn stored(format: Format, value: f64) -> f64 {
         let one = Texels { size: [1; 3], channels: format.channels(), values: vec![value; format.channels()] };
         Texels::decode([1; 3], format, &one.encode(format)).values[0]

@@ -175,7 +175,7 @@ impl Line {
         (0..self.starts.len()).filter(|n| !straight || n % PIECES == 0).map(|n| self.place_of(n)).collect()
     }
 
-    /// A direction from which the whole line deviates by at most 45 degrees. None if the line bends more.
+    /// A unit vector from which the whole line deviates by at most 45 degrees. None if the line bends more.
     pub fn heading(&self) -> Option<DVec2> {
         let (first, last) = (self.segments.first()?, self.segments.last()?);
         let chord = (last.to - first.from).try_normalize()?;

@@ -118,7 +118,8 @@ impl Layers {
         Ok(())
     }
 
-    /// The presets of the built-in phantom: the face as a lit surface, and with `is_plain`, where nobody chose a look, light in the volume.
+    /// Adds the presets of the built-in phantom: `face-classic`, a lit surface, and over it `face`, light in the volume, if `is_plain`: if nobody
+    /// chose a look.
     ///
     /// # Errors
     /// None: the presets are embedded, and a test reads them.

@@ -66,7 +66,8 @@ pub fn resolved(transfer: &Transfer) -> Vec<TransferPoint> {
     }
 }
 
-/// The points of a volume's transfer function, with the colours and the opacities of others where these are named.
+/// The points of a volume's transfer function. If `volume.colour` or `volume.opacity` names another function, colours or opacities are those of
+/// that one.
 pub fn of(volume: &Volume) -> Vec<TransferPoint> {
     let whole = resolved(&volume.transfer);
     if volume.colour.is_none() && volume.opacity.is_none() {

@@ -31,7 +31,7 @@ pub struct Effort {
 /// Bounds of every ray of a picture.
 #[derive(Clone, Debug)]
 pub struct PictureBounds {
-    /// Red, green, blue and opacity, before stage 4.
+    /// Lower bounds of red, green, blue and opacity, before postprocessing (stage 4). `high`: upper bounds.
     pub low: Texels,
     pub high: Texels,
     /// Number of parts of all rays.

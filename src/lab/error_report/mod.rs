@@ -117,7 +117,8 @@ pub struct Dial {
     pub points: Vec<Point>,
     /// Order of the error in the value, if there is one.
     pub order: Option<Fit>,
-    /// RMSE of the device against f64 that is due to arithmetic and formats alone.
+    /// RMSE, 0..1, of the device with the finest settings: what its arithmetic and formats alone cause. None for other dials than the step, and without
+    /// a reference in f64.
     #[serde(default)]
     pub floor: Option<f64>,
     /// The reason why the reference is not the exact one, if the dial is one of rays.

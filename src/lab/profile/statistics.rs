@@ -3,7 +3,7 @@
 
 use crate::statistics;
 
-/// The reason why values are not a sample.
+/// The reason why values are not a sample: there are none, or one is not finite.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SampleError {
     #[error("there are no samples")]

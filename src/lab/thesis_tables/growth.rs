@@ -49,7 +49,7 @@ impl Growth {
         Growth { centre, sigma, windows, counts }
     }
 
-    /// Share of the pixels whose window grew by n rings, 0..1; None if it cannot grow that far.
+    /// Share of the pixels, 0..1, whose window grew by exactly so many rings of pixels; None if it cannot grow that far.
     pub fn share(&self, rings: usize) -> Option<f64> {
         let all: u64 = self.counts.iter().sum();
         self.counts.get(rings).map(|n| *n as f64 / all.max(1) as f64)

@@ -120,7 +120,7 @@ pub struct Row {
     pub label: String,
     pub conditions: Conditions,
     pub thesis: Thesis,
-    /// Empty until measured, and without time stamps.
+    /// Empty until measured, and on a device without time stamps.
     pub times: Times,
     /// None until measured.
     pub reached: Option<Reached>,

@@ -28,7 +28,7 @@ pub fn time_line(now: SystemTime) -> String {
     now.replace('T', " ").replace('Z', " UTC")
 }
 
-/// When a picture of the phantom without a bar states that it is not of a patient.
+/// When a picture of the phantom that has no bar below it (`marks.bar`) states that it is not of a patient.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Demo {
     /// Only if something else is drawn on it. Otherwise it has the rendered pixels and nothing else.

@@ -59,7 +59,7 @@ pub(super) struct Surroundings {
     pub still: bool,
     /// Fluid between the near wall and the fetus where they are nearest, mm.
     pub gap: f64,
-    /// Level of the clutter, dB re full scale.
+    /// Level of the clutter, dB re full scale; None: no clutter.
     pub clutter_db: Option<f64>,
 }
 
@@ -117,7 +117,7 @@ enum Part {
 }
 
 impl Head {
-    /// A head in front of an array whose face is at Y = `face` mm.
+    /// A head with what is around it, in front of an array whose face is at Y = `face` mm.
     pub fn new(face: f64, surroundings: &Surroundings) -> Head {
         let face = face as f32;
         let Surroundings { still, gap, clutter_db } = *surroundings;
@@ -214,7 +214,7 @@ impl Head {
         if here.abs() > NEAR { here } else { here / gradient(place, distance).length().clamp(0.5, 2.0) }
     }
 
-    /// The label at a position and a time.
+    /// The tissue's label at a position, mm in space, and a time, s.
     pub fn label(&self, place: Vec3, time: f64) -> Label {
         let pose = self.pose(time);
         match self.tissue(place, &pose) {

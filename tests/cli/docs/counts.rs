@@ -30,14 +30,16 @@ fn generated_numbers_of_checks_are_those_that_verify_prints() {
     }
     writeln!(part, "| all | {} | {} |\n", quick.len(), full.len()).expect("text");
     let pipelines = sum_of(&done(&["verify", "--coverage"]), "; pipelines: ");
-    let with_outliers = PASSES.iter().filter(|pass| pass.tolerance.outliers > 0.0).count();
+    let outliers: Vec<f64> = PASSES.iter().map(|pass| pass.tolerance.outliers).filter(|share| *share > 0.0).collect();
+    let [least, most] = [f64::min, f64::max].map(|of| 100.0 * outliers.iter().copied().reduce(of).expect("a pass"));
     writeln!(
         part,
         "The program has {} passes. The checks of single passes run {pipelines} pipelines of them.",
         PASSES.len()
     )
     .expect("text");
-    writeln!(part, "In {with_outliers} passes a share of the texels may be off.").expect("text");
+    writeln!(part, "In {} passes {least} to {most} % of the texels may be beyond the tolerance.", outliers.len())
+        .expect("text");
     hold_part("docs/verify.md", part.trim_end());
 }
 

@@ -67,7 +67,7 @@ pub struct Evidence {
     /// Grey level of the tissue in front of the pocket or behind it, whichever is darker. `pocket` is that of the pocket.
     pub tissue: u32,
     pub pocket: u32,
-    /// Share of the columns in view whose near face was found, or that begin in the pocket, per cent.
+    /// Measured share of the volume's columns in view, per cent, in which the pocket's near face was found or that begin in the pocket.
     pub share: u32,
 }
 

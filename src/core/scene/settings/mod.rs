@@ -244,7 +244,7 @@ pub struct Region {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Clip {
-    /// A point of the plane, mm.
+    /// Any point of the plane, mm.
     pub at: [f64; 3],
     /// Normal of the plane, of any length but 0.
     pub normal: [f64; 3],

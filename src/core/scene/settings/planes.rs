@@ -146,17 +146,17 @@ impl Default for Cube {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Inset {
-    /// -lateral.
+    /// The face at -lateral.
     pub left: f64,
-    /// +lateral.
+    /// The face at +lateral.
     pub right: f64,
-    /// Nearest to the probe.
+    /// The face nearest to the probe.
     pub near: f64,
-    /// Farthest from the probe.
+    /// The face farthest from the probe.
     pub far: f64,
-    /// -elevation.
+    /// The face at -elevation.
     pub bottom: f64,
-    /// +elevation.
+    /// The face at +elevation.
     pub top: f64,
 }
 
@@ -165,17 +165,17 @@ pub struct Inset {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Tilt {
-    /// -lateral.
+    /// The face at -lateral.
     pub left: [f64; 2],
-    /// +lateral.
+    /// The face at +lateral.
     pub right: [f64; 2],
-    /// Nearest to the probe.
+    /// The face nearest to the probe.
     pub near: [f64; 2],
-    /// Farthest from the probe.
+    /// The face farthest from the probe.
     pub far: [f64; 2],
-    /// -elevation.
+    /// The face at -elevation.
     pub bottom: [f64; 2],
-    /// +elevation.
+    /// The face at +elevation.
     pub top: [f64; 2],
 }
 

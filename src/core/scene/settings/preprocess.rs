@@ -87,7 +87,7 @@ pub struct Slices {
     pub median: bool,
     /// A local estimator as a filter.
     pub estimator: Option<Estimator>,
-    /// Edge constant k of a Perona-Malik estimator.
+    /// Edge constant k of the estimator perona-malik: differences above it, in 0..1, are preserved.
     pub estimator_edge: f64,
     /// Sigma filter.
     pub sigma: Option<Sigma>,

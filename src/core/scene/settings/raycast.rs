@@ -283,7 +283,7 @@ pub struct TransferPoint {
     pub opacity: f64,
 }
 
-/// Surface rendering: the surface detector (thesis 4-3).
+/// Surface rendering: the surface detector (thesis, equation 4-3).
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Surface {
@@ -293,7 +293,7 @@ pub struct Surface {
     pub start_depth: Option<f64>,
     /// Detection rule.
     pub detector: Detector,
-    /// Adaptive and lasting detector: an edge counts at once if it exceeds this many standard deviations of the noise before it.
+    /// Detectors `adaptive` and `lasting`: an edge counts at once if it exceeds this many standard deviations of the noise before it.
     pub noise: f64,
     /// Length of an edge, mm: the difference is the mean echo over this length behind a place minus the mean echo over this length in front
     /// of it, at any step of the rays. The detector takes at least 4 and at most 256 samples of this length. `samples`: 4 steps of the

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Distance {
-    /// Window size of the median filter, pixels; 0 for none.
+    /// Window size of the median filter, pixels of the distance map; 0 for none.
     pub median: u32,
     /// The same in mm at the middle of the region, in place of `median`: the nearest odd number of pixels, at most 63; less
     /// than two are no filter.
@@ -328,7 +328,7 @@ pub struct Post {
     pub gamma: f64,
     /// Colour map.
     pub colour_map: ColourMap,
-    /// Keeps a float picture in addition to the 8-bit one even if no pass needs it. Planes are then cut first and tone-mapped after.
+    /// Keeps a float picture in addition to the 8-bit one even if no pass needs it. Planes are then cut and tone-mapped by two passes instead of one.
     pub floats: bool,
 }
 

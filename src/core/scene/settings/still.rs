@@ -44,7 +44,7 @@ impl Still {
         self.batch.max(self.samples.div_ceil(Still::MAX_DISPATCHES))
     }
 
-    /// Dispatches of a picture.
+    /// Number of dispatches of one picture.
     pub fn dispatches(&self) -> u32 {
         self.samples.div_ceil(self.samples_at_once())
     }

@@ -20,7 +20,7 @@ pub struct Change {
     pub is_worse: bool,
 }
 
-/// Two sets of statistics compared.
+/// A newer set of statistics, compared with an older one.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PipelineComparison {
     pub format: &'static str,

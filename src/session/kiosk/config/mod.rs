@@ -88,7 +88,7 @@ pub struct Motor {
     pub angle: Option<f64>,
     /// Passes over the angle per second; each gives a volume.
     pub sweeps: Option<f64>,
-    /// Home was found before and the module has not been off since. Default: false.
+    /// The motor's home is known: it was found before, and its controller has been on since. Default: false.
     pub homed: bool,
     /// Time from a frame's last line to its arrival, 0 to 10000 ms. Default: 0.
     pub delay: Option<f64>,
@@ -100,7 +100,7 @@ pub struct Motor {
     pub parity: Option<String>,
     /// 1 or 2. Default: 1.
     pub stop_bits: Option<u8>,
-    /// Longest wait for a reply, 20 to 10000 ms. Default: 500.
+    /// Longest wait for a reply of the controller, 20 to 10000 ms. Default: 500.
     pub timeout: Option<u64>,
 }
 
@@ -122,7 +122,7 @@ pub struct Display {
     pub panels: bool,
     /// Scale of text and buttons, 0.5 to 4. Default: 1.
     pub scale: f64,
-    /// Frame budget: longest time of a picture while the view moves, 1 ms to 10 s; `none`: no limit. Default: 33 ms.
+    /// Frame budget: longest time of a picture while the view moves, 1 ms to 10 s; `none` (None): no limit. Default: 33 ms.
     #[serde(with = "optional_duration")]
     pub budget: Option<Duration>,
     /// The error.json of `echolume report error` with the quality ladder for the budget. Default: the built-in ladder.

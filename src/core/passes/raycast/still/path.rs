@@ -12,7 +12,7 @@ const LEAST_TRANSMITTANCE: f64 = 0.1;
 /// Collisions from which on Russian roulette decides whether a path goes on.
 const SURE_EVENTS: u32 = 4;
 
-/// The medium of a still: scattering and absorption at each position, and bounds of them.
+/// The medium of a path-traced picture (setting `still`): scattering and absorption at each position, and upper bounds of the extinction.
 pub struct Medium<'a> {
     scene: &'a Scene,
     volume: &'a Texels,
