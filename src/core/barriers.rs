@@ -15,7 +15,7 @@ pub enum Resource {
     Readback,
 }
 
-/// The pipeline stage of an access.
+/// The Vulkan pipeline stage, or the host, that makes an access.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum PipelineStage {
     Compute,
@@ -23,7 +23,7 @@ pub enum PipelineStage {
     Host,
 }
 
-/// A set of pipeline stages.
+/// A set of [`PipelineStage`]s.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct PipelineStages(u8);
 
@@ -51,7 +51,8 @@ impl From<PipelineStage> for PipelineStages {
     }
 }
 
-/// One memory access of an operation. The parts are slices of a 3D image or layers of an array; anything else has a single part.
+/// One memory access of an operation (a dispatch, copy or clear). Its parts are slices of a 3D image or layers of an array; any other resource has a
+/// single part.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Access {
     pub resource: Resource,

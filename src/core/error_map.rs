@@ -6,7 +6,7 @@ use crate::passes::Texels;
 use crate::picture::Picture;
 use crate::scene::{Edge, EdgeName, Mode, Scene};
 
-/// The smallest and the largest difference that the colours tell apart; the scale is logarithmic.
+/// The smallest and the largest difference, in values of 0..1, that have colours of their own; the scale between them is logarithmic.
 pub const SCALE: [f64; 2] = [1e-4, 1.0];
 
 /// Pixels between two lines of the hatching.
@@ -17,14 +17,14 @@ const HATCH: usize = 6;
 const COLOURS: [[f64; 3]; 5] =
     [[0.07, 0.08, 0.17], [0.41, 0.15, 0.46], [0.80, 0.33, 0.38], [0.97, 0.64, 0.35], [0.99, 0.95, 0.75]];
 
-/// A map of the error with its statistics.
+/// A picture of the error of each pixel, with statistics of the errors.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ErrorMap {
     pub picture: Picture,
-    /// RMS and largest of the differences of the pixels.
+    /// Root mean square over all pixels of a pixel's error (0..1), and `largest`, the largest error of any pixel.
     pub rms: f64,
     pub largest: f64,
-    /// Share of the pixels above the tolerance.
+    /// Share (0..1) of the pixels whose error exceeds the tolerance.
     pub share_above: f64,
 }
 
@@ -83,7 +83,8 @@ pub fn finer(scene: &Scene) -> Result<Scene, String> {
     Ok(finer)
 }
 
-/// The difference of each pixel, the largest of red, green and blue, as a colour; hatched where it exceeds `tolerance` (0..1).
+/// Draws the error of each pixel as a colour, hatched where it exceeds `tolerance` (0..1). The error is the largest difference of red, green and blue
+/// between both pictures.
 ///
 /// # Errors
 /// One line: the pictures differ in size or have fewer than 3 channels.

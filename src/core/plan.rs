@@ -7,44 +7,44 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::ops::Range;
 
-/// One dispatch of a plan. A pass that repeats has several steps.
+/// One dispatch of a plan. A pass that repeats has one step for each repetition.
 #[derive(Clone, Copy)]
 pub struct Step {
     pub pass: &'static Pass,
     pub iteration: u32,
 }
 
-/// The steps that a scene needs, in order, and the slots that they use.
+/// The dispatches that a scene needs, in order, and the slots that they use.
 pub struct Plan {
     pub steps: Vec<Step>,
     pub slots: Vec<Slot>,
 }
 
-/// The work that a change of scene requires.
+/// What has to run again after a change of scene or shaders.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Rerun {
     /// Slots or pipelines differ: the plan is rebuilt, and all frames have to be sent again.
     Everything,
     /// All frames have to be sent again, through stage 1.
     Frames,
-    /// These steps over the volume and the picture have to run again, by their index in [`Plan::steps`], and the CPU has to compute these
+    /// These steps over the volume and the picture have to run again, given by their indices in [`Plan::steps`], and the CPU has to compute these
     /// slots again.
     Steps { steps: Vec<usize>, slots: Vec<Slot> },
 }
 
-/// The part of the rendering that a change repeats, from the least to the most.
+/// The most expensive part of a rendering that has to run again, from the least to the most expensive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Work {
-    /// Planes beside a rendering, and stage 4. Both take little time.
+    /// Only planes beside a rendering and stage 4. Both take little time.
     Tone,
-    /// Stage 3, on the present distance map.
+    /// Stage 3, on the distance map that exists.
     Shading,
-    /// Rays are cast.
+    /// Stage 2: rays are cast again.
     Rays,
 }
 
 impl Work {
-    /// The work that a change from `before` to `after` repeats.
+    /// The work that a change of scene from `before` to `after` requires.
     pub fn between(before: &Scene, after: &Scene) -> Work {
         let plan = Plan::new(after);
         match plan.rerun(before, after) {
@@ -55,7 +55,7 @@ impl Work {
 }
 
 impl Plan {
-    /// The work of these steps, given by their index in [`Plan::steps`].
+    /// The work that these steps are, given by their indices in [`Plan::steps`].
     pub fn work(&self, scene: &Scene, steps: impl IntoIterator<Item = usize>) -> Work {
         let of_planes = |slot: &Slot| matches!(slot, Slot::SharpSectionVolume | Slot::SectionVolume);
         let work_of = |step: &Step| match step.pass.stage {
@@ -85,7 +85,7 @@ impl Plan {
         self.steps.iter().enumerate().filter(move |(_, s)| s.pass.frequency == frequency)
     }
 
-    /// Device memory of all slots, bytes; a multibuffered slot counts once.
+    /// Device memory of all slots, bytes; a multibuffered slot is counted once.
     pub fn bytes(&self, scene: &Scene) -> u64 {
         self.slots.iter().map(|s| s.bytes(scene)).sum()
     }
@@ -185,8 +185,8 @@ impl Plan {
         format!("{last}, the last pass of a frame, writes them into the 3D image; of up to {at_once} frames at once")
     }
 
-    /// What has to run again after a change from `old` to `new`; `self` is the plan of `new`. This does not depend on the meaning of
-    /// settings: steps are compared by their parameters, shaders and slots, and a step that reads a changed slot changes too.
+    /// What has to run again after a change from `old` to `new`; `self` is the plan of `new`. It does not know what settings mean: steps are compared
+    /// by their parameters, shaders and slots, and a step that reads a slot that changes runs again too.
     pub fn rerun(&self, old: &Scene, new: &Scene) -> Rerun {
         let before = Plan::new(old);
         // The slots that frames fill. Everything else can be computed again from them.
@@ -225,8 +225,8 @@ impl Plan {
         Rerun::Steps { steps, slots }
     }
 
-    /// The steps to run again in the same scene after shaders changed: those with a changed shader, and those that read what these write.
-    /// `is_changed` is given the shader's name.
+    /// What has to run again in an unchanged scene after shaders were edited: the steps of these shaders and all that read their results.
+    /// `is_changed` gets a shader's path below glsl/ with its variant.
     pub fn rerun_shaders(&self, scene: &Scene, is_changed: impl Fn(&str) -> bool) -> Rerun {
         let (mut changed, mut steps) = (Vec::new(), Vec::new());
         for (i, step) in self.steps.iter().enumerate() {
@@ -244,12 +244,12 @@ impl Plan {
     }
 }
 
-/// For each slot, the step (pass and iteration) that wrote it last.
+/// For each slot the step (name of the pass, iteration) that wrote it last.
 pub type Contents = BTreeMap<Slot, (&'static str, u32)>;
 
 impl Plan {
-    /// Marks in `stale` (one entry per step) further steps that have to run: those whose results a stale step reads, but that a later
-    /// filter of the same chain has overwritten. `contents` is what the slots hold now.
+    /// Marks further steps in `stale` (one entry per step) that have to run: those whose results a stale step reads, but that a later filter of the
+    /// same chain has overwritten. `contents`: which step's result each slot holds now.
     pub fn complete(&self, scene: &Scene, stale: &mut [bool], contents: &Contents) {
         'again: loop {
             let mut now = contents.clone();
@@ -274,7 +274,7 @@ impl Plan {
     }
 }
 
-/// Ranges of slices that have to be recomputed if the marked ones have changed and each depends on `reach` neighbours on either side.
+/// Ranges of slices that have to be recomputed if the marked slices have changed and each result depends on `reach` neighbours on either side.
 pub fn affected(changed: &[bool], reach: u32) -> Vec<Range<u32>> {
     let mut runs: Vec<Range<u32>> = Vec::new();
     for slice in (0..changed.len() as u32).filter(|s| changed[*s as usize]) {
@@ -288,23 +288,23 @@ pub fn affected(changed: &[bool], reach: u32) -> Vec<Range<u32>> {
 }
 
 impl Step {
-    /// Number of neighbouring slices on either side that a pass over the volume reads.
+    /// Number of neighbouring slices on either side that this step reads, for a pass over the volume.
     pub fn reach(&self, scene: &Scene) -> u32 {
         let reads = self.pass.reads(scene, &self.args());
         reads.iter().map(|b| if let Part::Around(more) = b.part { more } else { 0 }).max().unwrap_or(0)
     }
 
-    /// The step's pass and iteration.
+    /// Name of the step's pass, and its iteration.
     pub fn id(&self) -> (&'static str, u32) {
         (self.pass.name, self.iteration)
     }
 
-    /// The slots that it reads.
+    /// The slots that the step reads.
     pub fn reads(&self, scene: &Scene) -> Vec<Slot> {
         self.pass.reads(scene, &self.args()).iter().map(|b| b.slot).collect()
     }
 
-    /// The slots that it writes.
+    /// The slots that the step writes.
     pub fn writes(&self, scene: &Scene) -> Vec<Slot> {
         self.pass.writes(scene, &self.args()).iter().map(|b| b.slot).collect()
     }

@@ -8,13 +8,13 @@ use crate::probe::Frame;
 use crate::scene::Scene;
 use std::collections::BTreeMap;
 
-/// Renders a volume. `frames`: one array per slice in geometric order, with the values that the texture of a frame yields. Returns the
-/// contents of all slots of the plan.
+/// Renders a volume by the references of all passes. `frames`: one array per slice in geometric order, with the values that the shader reads from the
+/// frame (0..1). Returns the contents of all slots of the plan.
 pub fn render(scene: &Scene, frames: &[Texels]) -> BTreeMap<Slot, Texels> {
     render_with(scene, frames, &mut |_, _, _| false)
 }
 
-/// The frames of a volume in geometric order, as the values that the texture of a frame yields.
+/// Converts the frames of a volume, in geometric order, to the values that shaders read from them.
 pub fn decoded(scene: &Scene, frames: &[Frame]) -> Vec<Texels> {
     let format = Slot::Frames.format(scene);
     let [width, height] = scene.frame_size().map(|n| n as usize);
@@ -23,11 +23,11 @@ pub fn decoded(scene: &Scene, frames: &[Frame]) -> Vec<Texels> {
     frames.iter().map(|f| Texels::decode([width, height, 1], format, &f.bytes)).collect()
 }
 
-/// Takes the place of a pass's reference: given the pass's name, its inputs and its outputs, fills the outputs and returns true, or
-/// returns false for a pass that it leaves to its own reference.
+/// A function that may compute the outputs of a pass in place of its own reference: it gets the pass's name, its inputs and its outputs, and returns
+/// true if it filled the outputs.
 pub type Replacement<'a> = dyn FnMut(&str, &Arrays, &mut Arrays) -> bool + 'a;
 
-/// As [`render`], with some passes by another reference than their own.
+/// As [`render`], but `replace` may compute some passes instead of their own reference.
 pub fn render_with(scene: &Scene, frames: &[Texels], replace: &mut Replacement) -> BTreeMap<Slot, Texels> {
     let plan = Plan::new(scene);
     let mut slots: BTreeMap<Slot, Texels> = plan.slots.iter().map(|s| (*s, empty(*s, scene))).collect();

@@ -11,23 +11,23 @@ const MISSED: f64 = 0.006;
 /// Bits of a word of marks, four rows of eight pixels, whose pixels are those of the lattice.
 const OF_LATTICE: u32 = 0x0055_0055;
 
-/// Statistics of the errors that the pixels of a picture state.
+/// Statistics of the errors that the pixels of a picture state (`ray.tolerance`). Shares are 0..1.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stated {
     /// The tolerance of each pixel, levels of 8 bits.
     pub tolerance: f64,
-    /// Share of the pixels whose own rays meet only empty bricks. These have no error.
+    /// Share of the pixels whose rays meet only empty bricks. They have no error.
     pub certain: f64,
-    /// Share of the pixels whose estimated error is below the tolerance, less the share that estimates miss.
+    /// Share of the pixels whose estimated error is at most the tolerance, less the share for which estimates are known to be too small.
     pub estimated: f64,
-    /// Share of the pixels that have a ray of their own. The others are means of neighbouring rays.
+    /// Share of the pixels that have a ray of their own. The others are interpolated from neighbouring rays.
     pub with_rays: f64,
     /// The largest error that a pixel states, levels of 8 bits.
     pub largest: f64,
 }
 
 impl Stated {
-    /// The slots that this is computed from.
+    /// The slots that the statistics are computed from, in the order of the arguments of [`Stated::new`].
     pub const SLOTS: [Slot; 2] = [Slot::PixelErrors, Slot::ErrorMarks];
 
     /// `errors` and `marks`: texels of [`Stated::SLOTS`]. `tolerance`: levels of 8 bits.
@@ -50,7 +50,7 @@ impl Stated {
         }
     }
 
-    /// Share of the pixels that state an error under the tolerance.
+    /// Share of the pixels that keep the tolerance: `certain` and `estimated` together.
     pub fn kept(&self) -> f64 {
         self.certain + self.estimated
     }

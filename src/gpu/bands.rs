@@ -26,10 +26,10 @@ const FIRST_TEXELS: u64 = 1 << 21;
 /// picture does not make the next bands too long.
 const DECAY: f64 = 0.75;
 
-/// How long dispatches are divided into bands.
+/// By which rule dispatches are divided into bands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Bands {
-    /// By measured time. Each loss of the device so far halves the time that a submission may take.
+    /// By measured time. `losses`: how often the device was lost so far; each loss halves the time that a submission may take.
     Measured { losses: u32 },
     /// Into bands of at most this many invocations, but at least one row of workgroups: for tests.
     Fixed(u64),
@@ -41,7 +41,7 @@ impl Default for Bands {
     }
 }
 
-/// The measured time of an invocation of a pipeline, ns. 0 until it is measured.
+/// The measured time of one invocation of a pipeline, ns. 0 until it is measured.
 #[derive(Debug, Default)]
 pub(crate) struct InvocationTime(AtomicU64);
 
@@ -65,19 +65,19 @@ impl InvocationTime {
     }
 }
 
-/// A part of a dispatch, in workgroups.
+/// A part of a dispatch: first workgroup (`base`) and number of workgroups along x, y and z.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Band {
     pub base: [u32; 3],
     pub groups: [u32; 3],
 }
 
-/// The limit to the work in one submission.
+/// How much work one submission may have.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum BandLimit {
-    /// Time, ns, and how often the first bands are halved.
+    /// `target`: expected time, ns. `halvings`: how often the first bands, whose time is not known, are halved.
     Time { target: f64, halvings: u32 },
-    /// Invocations of a band.
+    /// Number of invocations of a band.
     Invocations(u64),
 }
 
@@ -93,7 +93,7 @@ impl BandLimit {
         }
     }
 
-    /// The limit of a device whose queue draws a window's panels between the bands.
+    /// The limit of a device whose queue also draws a window's panels, between the bands. `None` if nothing is divided.
     pub fn paced(bands: Bands, is_software: bool) -> Option<BandLimit> {
         match bands {
             Bands::Measured { losses } if is_software => Some(BandLimit::Time {
@@ -104,7 +104,7 @@ impl BandLimit {
         }
     }
 
-    /// Expected time of the work that is submitted at once, so that the device does not wait for the host between two bands.
+    /// Expected time of the work that is submitted ahead, so that the device does not wait for the host between two bands. Zero: one band at a time.
     pub(crate) fn in_flight(&self) -> Duration {
         match *self {
             BandLimit::Time { target, .. } => Duration::from_nanos((2.0 * target) as u64),
@@ -127,7 +127,7 @@ impl BandLimit {
         each * invocations as f64
     }
 
-    /// True if a dispatch of this expected time does not fit into a submission with work of `open` ns.
+    /// True if a dispatch of `expected` ns does not fit into a submission that already has work of `open` ns.
     pub fn is_full(&self, open: f64, expected: f64) -> bool {
         match *self {
             BandLimit::Time { target, .. } => open > 0.0 && open + expected > target,
@@ -135,8 +135,8 @@ impl BandLimit {
         }
     }
 
-    /// The bands of a dispatch of `groups` workgroups and `invocations` invocations with this expected time, ns. They are slabs along the
-    /// axis with the most workgroups.
+    /// Divides a dispatch of `groups` workgroups and `invocations` invocations, which is expected to take `expected` ns. The bands are slabs along
+    /// the axis with the most workgroups.
     pub fn bands(&self, groups: [u32; 3], invocations: u64, expected: f64) -> Vec<Band> {
         let count = match *self {
             BandLimit::Time { target, .. } => (expected / target).ceil() as u64,
@@ -163,16 +163,16 @@ fn after_losses(target: f64, losses: u32) -> f64 {
     (target / 2f64.powi(losses.min(64) as i32)).max(LEAST_NS)
 }
 
-/// A pass in a submission whose time is measured.
+/// A dispatch in a submission whose time is measured.
 #[derive(Clone, Debug)]
 pub struct Work {
     pub time: std::sync::Arc<InvocationTime>,
-    /// Expected time of the pass, ns.
+    /// Expected time of the dispatch, ns.
     pub expected: f64,
     pub invocations: u64,
 }
 
-/// Notes the measured time of this work, ns. If it is several passes, each gets the share of the time that was expected of it.
+/// Stores the measured time, ns, of a submission with this work. Of several dispatches, each gets the part of the time that was expected of it.
 pub fn measured(work: &[Work], ns: f64) {
     let expected: f64 = work.iter().map(|w| w.expected).sum();
     for w in work.iter().filter(|w| w.invocations > 0) {

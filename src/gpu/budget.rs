@@ -8,23 +8,23 @@ use ash::vk;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct HeapBudget {
     pub size: u64,
-    /// The most that this process can use at present.
+    /// The most that this process can use of the heap at present.
     pub budget: u64,
-    /// The amount that this process uses now.
+    /// What this process uses of the heap now.
     pub used: u64,
     pub is_device_local: bool,
 }
 
-/// The heaps of a device, and the heap of each memory type.
+/// The memory heaps of a device by VK_EXT_memory_budget, and the heap of each memory type.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct MemoryBudget {
     pub(crate) heaps: Vec<HeapBudget>,
-    /// For each memory type the index of its heap, and its properties.
+    /// For each memory type the index of its heap and its properties.
     pub types: Vec<(usize, vk::MemoryPropertyFlags)>,
 }
 
 impl MemoryBudget {
-    /// The current budget of a device that has the extension.
+    /// Reads the current budget of a device, which must have VK_EXT_memory_budget.
     pub fn read(instance: &ash::Instance, device: vk::PhysicalDevice) -> MemoryBudget {
         let mut budget = vk::PhysicalDeviceMemoryBudgetPropertiesEXT::default();
         let mut properties = vk::PhysicalDeviceMemoryProperties2::default().push_next(&mut budget);
@@ -43,8 +43,9 @@ impl MemoryBudget {
         }
     }
 
-    /// Refuses an allocation that fits into the budget of no heap that it could use. `types`: bits of the allowed memory types; `required`:
-    /// properties that the type must have; `reserve`: bytes that this process has allocated but does not use.
+    /// Refuses an allocation that fits into the budget of no heap that it could use. `what`: name of the allocation for the message; `needed`: its
+    /// bytes; `types`: bits of the allowed memory types; `required`: properties that the type must have; `reserve`: bytes that this process has
+    /// allocated but does not use.
     ///
     /// # Errors
     /// One line with the needed size, the budget, and the used part of it.

@@ -29,19 +29,19 @@ pub struct Buffer {
 pub enum Purpose {
     /// A lookup table that shaders read.
     Table,
-    /// Uniform numbers of passes, written by the CPU.
+    /// Parameters of passes (a uniform buffer), written by the CPU.
     Params,
     /// Data to upload, written by the CPU.
     Staging,
-    /// Results to download, read by the CPU.
+    /// Results that the CPU reads.
     Readback,
-    /// Numbers of workgroups for indirect dispatches.
+    /// Numbers of workgroups for indirect dispatches, written by the device.
     Groups,
 }
 
 const TEXELS: [vk::Format; 3] = [vk::Format::R32_SFLOAT, vk::Format::R32G32_SFLOAT, vk::Format::R32G32B32A32_SFLOAT];
 
-/// True if a lookup table of this size can be a texel buffer, for any size of its entries.
+/// True if a lookup table of this size can be a texel buffer, whatever the size of its entries.
 pub(crate) fn has_texels(context: &Context, bytes: u64) -> bool {
     bytes >= 16 && bytes / 4 <= u64::from(context.candidate.limits.max_texel_buffer_elements)
 }
@@ -61,6 +61,8 @@ fn readback_type(types: &[vk::MemoryType], allowed: u32) -> Option<(u32, bool)> 
 }
 
 impl Buffer {
+    /// Makes a buffer of `size` bytes. `name` is for captures and messages.
+    ///
     /// # Errors
     /// The device does not allow the size, is out of memory, or fails.
     pub fn new(context: &Arc<Context>, name: &str, size: u64, purpose: Purpose) -> Result<Buffer, GpuError> {
@@ -177,7 +179,7 @@ impl Drop for Buffer {
     }
 }
 
-/// Parts (slices or layers) and rows of an image that are copied as one region.
+/// A region of an image that is copied at once: slices or layers (`parts`), and rows of each.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Piece {
     pub parts: Range<u32>,
@@ -206,14 +208,15 @@ fn pieces(shape: Shape, texel_bytes: usize, parts: Range<u32>, most: u64) -> Vec
     cuts.map(|(part, row)| piece(part, 1, row..(row + rows).min(height))).collect()
 }
 
-/// Staging buffers with the texels of parts of an image. There are several if one would be larger than the device allows.
+/// Staging buffers that hold the texels of some parts (slices or layers) of an image. There are several if one would be larger than the device
+/// allows.
 pub struct Upload {
     pieces: Vec<(Piece, Buffer)>,
 }
 
 impl Upload {
-    /// Fills staging buffers for an image of this shape. `texel_bytes`: bytes of a texel; `bytes`: the texels of the parts, slice by slice.
-    /// Bytes that are missing at the end stay undefined.
+    /// Fills staging buffers for the `parts` of an image of this shape. `texel_bytes`: bytes of a texel; `bytes`: the texels of these parts, part by
+    /// part. If bytes are missing at the end, the texels there are undefined.
     ///
     /// # Errors
     /// Memory is exhausted, or the device fails.
@@ -235,7 +238,7 @@ impl Upload {
         cut.into_iter().map(filled).collect::<Result<_, _>>().map(|pieces| Upload { pieces })
     }
 
-    /// Each piece and the buffer with its texels.
+    /// Each region of the image, with the buffer that holds its texels.
     pub fn pieces(&self) -> impl Iterator<Item = (&Piece, &Buffer)> {
         self.pieces.iter().map(|(piece, buffer)| (piece, buffer))
     }
@@ -246,7 +249,7 @@ impl Upload {
 pub struct Readback {
     context: Arc<Context>,
     pieces: Vec<(Piece, Buffer)>,
-    /// Bytes of the image.
+    /// Size of the image, bytes.
     pub size: u64,
 }
 
@@ -265,12 +268,12 @@ impl Readback {
         Ok(Readback { context: context.clone(), pieces, size: shape.texels() * texel_bytes as u64 })
     }
 
-    /// Each piece and the buffer for its texels.
+    /// Each region of the image, with the buffer for its texels.
     pub fn pieces(&self) -> impl Iterator<Item = (&Piece, &Buffer)> {
         self.pieces.iter().map(|(piece, buffer)| (piece, buffer))
     }
 
-    /// The bytes that the device wrote. The device must have finished the copy.
+    /// The texels of the image that the device wrote. The device must have finished the copy.
     ///
     /// # Errors
     /// The device fails.

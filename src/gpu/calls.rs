@@ -3,12 +3,13 @@
 
 use std::sync::OnceLock;
 
-/// Receives the name of a call, and of the object that it is made for.
+/// A function that gets the name of a Vulkan call, and the name of the object that the call is for.
 pub type Told = fn(call: &'static str, of: &str);
 
 static TOLD: OnceLock<Told> = OnceLock::new();
 
-/// From now on `told` is called before such calls, on the thread that makes them. Only the first call of this function has an effect.
+/// From now on `told` is called before each Vulkan call in which a driver may crash or hang, on the thread that makes it. Only the first call of this
+/// function has an effect.
 pub fn tell(told: Told) {
     let _ = TOLD.set(told);
 }

@@ -40,7 +40,7 @@ pub struct Dispatch<'a> {
     pub args: &'a DispatchArgs,
 }
 
-/// Parts of a slot's image: layers of an array or slices of a 3D image. `copy` is the number of the volume image.
+/// Parts of a slot's image: layers of an array or slices of a 3D image. `copy` is the index of the volume image.
 #[derive(Clone, Debug)]
 pub(crate) struct SlotParts {
     pub slot: Slot,
@@ -48,20 +48,20 @@ pub(crate) struct SlotParts {
     pub parts: Range<u32>,
 }
 
-/// Layout of copied texels in a buffer. Lengths of 0 mean that the rows follow each other without gaps.
+/// Layout of copied texels in a buffer, as in VkBufferImageCopy.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct BufferLayout {
     /// Byte offset of the first texel.
     pub offset: u64,
-    /// Texels from the beginning of one row to the next.
+    /// Texels from the beginning of one row to the next; 0: rows follow each other without gaps.
     pub row_length: u32,
-    /// Rows from the beginning of one image to the next.
+    /// Rows from the beginning of one slice or layer to the next; 0: without gaps.
     pub image_height: u32,
-    /// Bytes from one part to the next, if the parts lie in descending order. None if they ascend.
+    /// If the slices or layers lie in descending order, bytes from one to the next. None if they ascend.
     pub descending: Option<u64>,
 }
 
-/// Command buffers that are recorded and submitted repeatedly. A recording needs one, and more only for work in bands.
+/// Records and submits command buffers again and again on one queue. A recording needs one of them, and several only for work in bands.
 pub(crate) struct CommandRecorder {
     context: Arc<Context>,
     pool: vk::CommandPool,
@@ -86,7 +86,7 @@ pub(crate) struct CommandRecorder {
     /// Time stamps that were read, for later submissions.
     spare: Vec<Stamps>,
     time_stamps: TimeStamps,
-    /// How many runs each pass and copy of the recording counts as: one for each frame of a batch.
+    /// How many runs each pass and copy of the recording counts as: the number of frames of a batch, otherwise 1.
     pub runs: u32,
     /// Invocations are counted.
     statistics: bool,
@@ -197,7 +197,7 @@ impl CommandRecorder {
         Ok(())
     }
 
-    /// Ends the command buffer here and continues the recording in another one. Each is submitted on its own.
+    /// Ends the command buffer and continues the recording in another one; each is submitted on its own.
     pub fn cut(&mut self, queues: &mut DeviceQueues) -> Result<(), GpuError> {
         self.submit(queues)?;
         // Where each pass is timed, that of a band is a run of its own.
@@ -235,7 +235,7 @@ impl CommandRecorder {
         }
     }
 
-    /// Adds the times of the last submission, and of those that were set aside, once they are done. Each is added once.
+    /// Adds up the times of the last submission and of those that were set aside, as far as they are done. Each is added once.
     pub fn collect(&mut self, queues: &mut DeviceQueues) -> Result<(), GpuError> {
         let (bits, period) =
             (self.context.queue(self.queue).valid_bits, self.context.candidate.limits.timestamp_period);
@@ -255,8 +255,8 @@ impl CommandRecorder {
         Ok(())
     }
 
-    /// Waits for the last submission, and keeps its time stamps for a later [`CommandRecorder::collect`]. If too many are kept already, its
-    /// work counts as not timed.
+    /// Waits for the last submission, and keeps its time stamps for a later [`CommandRecorder::collect`]. If too many are kept already, its work is
+    /// counted as not timed.
     pub fn set_aside(&mut self, queues: &mut DeviceQueues) -> Result<(), GpuError> {
         self.wait(queues)?;
         if self.collected_to == self.done_at {
@@ -453,10 +453,10 @@ impl CommandRecorder {
         Ok(offset)
     }
 
-    /// If each pass is timed, writes a time stamp. The work since the previous stamp is named `name`.
+    /// Writes a time stamp if each pass is timed. `name`: the work since the previous stamp.
     ///
     /// # Errors
-    /// A device that fails, where CPU time is counted.
+    /// The device fails, where CPU time is counted.
     pub fn stamp(&mut self, queues: &mut DeviceQueues, name: &'static str) -> Result<(), GpuError> {
         if let Some(stamps) = self.stamps.as_mut().filter(|_| self.time_stamps == TimeStamps::EachPass) {
             stamps.end_of(self.commands, name, self.runs, Vec::new());
@@ -601,7 +601,7 @@ impl CommandRecorder {
 }
 
 impl CommandRecorder {
-    /// Moves new images from UNDEFINED to GENERAL and clears them to zero. Passes rely on this: they never write pixels outside the
+    /// Moves the images of these slots from UNDEFINED to GENERAL and clears them to zero. Passes rely on that: they never write pixels outside the
     /// sector.
     pub(crate) fn clear_new(&mut self, queues: &mut DeviceQueues, slots: &SlotResources, new: &[(Slot, u32)]) {
         let images: Vec<(&Image, Slot, u32)> =
@@ -680,15 +680,15 @@ impl CommandRecorder {
         }
     }
 
-    /// Records a barrier that states that everything submitted so far has finished, for a validation layer that does not see waits for
-    /// timelines. For other layers nothing is recorded.
+    /// For a validation layer that does not see waits for timelines, records a barrier that states that everything submitted so far has finished. For
+    /// other layers nothing is recorded.
     pub(crate) fn show_layer_the_wait(&self) {
         if self.context.layer_misses_waits() {
             flush(&self.context.device, self.commands, vk::AccessFlags2::MEMORY_READ | vk::AccessFlags2::MEMORY_WRITE);
         }
     }
 
-    /// Copies the content of an upload into its parts of an image.
+    /// Copies the texels of an upload into the parts of an image that it was made for.
     pub fn upload(&mut self, queues: &mut DeviceQueues, from: &Upload, image: &Image, to: SlotParts) {
         self.barrier(queues, &[Access::of_slot(to.slot, to.copy, to.parts, true, PipelineStage::Copy)]);
         for (piece, buffer) in from.pieces() {

@@ -31,17 +31,17 @@ const MAX_UNUSED_PIPELINES: usize = 256;
 /// Size of a block of memory on a software device, bytes.
 const SOFTWARE_BLOCK: u64 = 8 << 20;
 
-/// The device that a [`Context`] uses, and how.
+/// Which device a [`Context`] opens, and with which options.
 #[derive(Clone, Debug)]
 pub struct ContextOptions {
     /// The device. The default is the best one.
     pub device: DeviceChoice,
     /// Enables core and synchronization validation. Every message is kept in [`Context::messages`].
     pub validation: bool,
-    /// Time after which a device that does not finish is given up.
+    /// Time after which a device that does not finish a submission is given up.
     pub deadline: Deadline,
-    /// Is called during every wait for the device. Once it returns true, the wait ends within a second, and the device is given up if it is
-    /// still busy.
+    /// This function is called during every wait for the device. Once it returns true, the wait ends within a second, and the device is given up if
+    /// it is still busy. `None`: nothing stops a wait.
     pub stop: Option<fn() -> bool>,
     /// The folder in which compiled pipelines are stored for the next run. `None`: they are not stored.
     pub pipeline_cache: Option<PathBuf>,
@@ -53,7 +53,8 @@ pub struct ContextOptions {
     /// instruction of each pipeline, so that the first picture takes less than half of the time; the compilers of some GPUs then use more
     /// registers.
     pub specialize: Option<bool>,
-    /// Most compiled pipelines that are kept although no plan uses them, at least 1. Returning to a forgotten pipeline compiles it again.
+    /// Number of compiled pipelines that are kept although no plan uses them, at least 1. A pipeline beyond that is compiled again when it is needed
+    /// again.
     pub max_unused_pipelines: usize,
 }
 
@@ -73,80 +74,80 @@ impl Default for ContextOptions {
     }
 }
 
-/// An open Vulkan device. Every object on the device is made from an `Arc` of this.
+/// An open Vulkan device. Every object on the device holds an `Arc` of its context.
 pub struct Context {
-    /// The loader stays loaded as long as anything made from it lives.
+    /// The Vulkan loader, which stays loaded as long as the context lives.
     pub(super) entry: ash::Entry,
     pub(super) instance: ash::Instance,
-    /// Of a context that presents pictures.
+    /// Extensions for presentation; `None` in a context that presents no pictures.
     pub(super) presentation: Option<Presentation>,
     /// With validation.
     messenger: Option<Messenger>,
     pub candidate: Candidate,
     pub device: ash::Device,
-    /// `None` if the device has no push descriptors. Sets of a pool are then used.
+    /// Push descriptors; `None` if the device has none, so that descriptor sets of a pool are used.
     pub push_descriptor: Option<ash::khr::push_descriptor::Device>,
     /// Reads the device's clock, if the device can.
     clock: Option<ash::ext::calibrated_timestamps::Device>,
     names: Option<ash::ext::debug_utils::Device>,
-    /// With [`ContextOptions::compile_statistics`], if the device has them.
+    /// Statistics on the compilation of pipelines; `None` without [`ContextOptions::compile_statistics`] or if the device has none.
     pub(super) executables: Option<ash::khr::pipeline_executable_properties::Device>,
     /// See [`ContextOptions::specialize`].
     pub(super) specializes: bool,
     /// See [`ContextOptions::max_unused_pipelines`].
     pub(super) max_unused_pipelines: usize,
     pub(super) pipeline_cache: PipelineCache,
-    /// State that the renderers of the device share while one of them holds it: [`super::pipelines::Pipelines`], whose module depends on
-    /// this one.
+    /// The pipelines that the renderers of the device share, as long as one of them holds them. Their type is [`super::pipelines::Pipelines`], whose
+    /// module depends on this one.
     pub(super) shared: Mutex<Vec<Weak<dyn Any + Send + Sync>>>,
-    /// Reports why the device was lost.
+    /// The extensions that report why the device was lost.
     pub(super) loss: LossReporting,
     /// In the order of `candidate.queues`: rendering, ingestion, copies.
     queues: Vec<Mutex<vk::Queue>>,
-    /// The queue families that share slots used on several queues.
+    /// The queue families of slots that several queues use (VK_SHARING_MODE_CONCURRENT).
     pub(crate) queue_families: Vec<u32>,
-    /// Taken in `drop`, before the device is destroyed.
+    /// Allocator of device memory; None once `drop` has taken it, before the device is destroyed.
     pub(super) allocator: Mutex<Option<Allocator>>,
     formats: Mutex<HashMap<vk::Format, vk::FormatFeatureFlags>>,
     pub(super) watchdog: Watchdog,
-    /// How the window takes pictures without a conversion.
+    /// The pixel format of the window; a picture in it is copied there without a conversion.
     pub window_texels: Mutex<WindowTexels>,
     pub faults: Faults,
     pub counts: Counts,
 }
 
-/// The extensions that present pictures.
+/// The extensions for presenting pictures.
 #[cfg_attr(not(feature = "view"), expect(dead_code, reason = "only a window reads it"))]
 pub(crate) struct Presentation {
     pub surfaces: ash::khr::surface::Instance,
     pub swapchains: ash::khr::swapchain::Device,
-    /// If the target is a monitor.
+    /// VK_KHR_display, if the target is a monitor without a window system.
     pub displays: Option<ash::khr::display::Instance>,
-    /// Waits until a picture is on the monitor, if the device can.
+    /// VK_KHR_present_wait, which waits until a picture is on the monitor, if the device has it.
     pub waits: Option<ash::khr::present_wait::Device>,
 }
 
-/// A simultaneous reading of the device's clock and the host's.
+/// A simultaneous reading of the device's clock (`ticks`) and the host's.
 pub(super) struct ClockReading {
     pub ticks: u64,
-    /// The host's monotonic clock, ns, if the driver reads it in the same call.
+    /// The host's monotonic clock, ns; None if the driver does not read it in the same call.
     pub monotonic: Option<u64>,
-    /// The host's clock around the call.
+    /// The host's clock in the middle of the call.
     pub at: Instant,
     /// Largest time between the readings, ns.
     pub deviation: u64,
 }
 
-/// Counts, since the start, of costly operations that must not happen for every frame.
+/// Counts of costly operations since the context was opened; they must not happen for every frame.
 #[derive(Debug, Default)]
 pub struct Counts {
-    /// Allocations of device memory.
+    /// Number of allocations of device memory.
     pub allocations: AtomicU64,
     pub pipelines: AtomicU64,
-    /// Pipelines that were compiled in the background.
+    /// Number of pipelines that were compiled in the background.
     pub async_pipelines: AtomicU64,
     pub dispatches: AtomicU64,
-    /// Waits until the device is idle.
+    /// Number of waits for an idle device.
     pub waits_idle: AtomicU64,
 }
 
@@ -301,24 +302,24 @@ impl Context {
         Ok(context)
     }
 
-    /// All validation messages so far. A correct program has none.
+    /// All messages of the validation layer so far. A correct program has none.
     pub fn messages(&self) -> Vec<String> {
         self.messenger.as_ref().map(Messenger::messages).unwrap_or_default()
     }
 
-    /// True if the hazards between submissions that validation reports are real. Older layers ignore that a queue waits for the timeline of
+    /// True if hazards between submissions that the validation layer reports are real. Older layers ignore that a queue waits for the timeline of
     /// another queue; with a single queue that does not matter.
     pub fn validates_timelines(&self) -> bool {
         !self.layer_misses_waits() || self.queue_count() == 1
     }
 
-    /// Bytes of device memory in use.
+    /// Bytes of device memory that this context has allocated.
     pub fn allocated(&self) -> u64 {
         let allocator = self.allocator.lock().unwrap_or_else(|e| e.into_inner());
         allocator.as_ref().map_or(0, |allocator| allocator.generate_report().total_allocated_bytes)
     }
 
-    /// Total bytes of the device's own memory.
+    /// Total size of the device's own memory heaps, bytes.
     pub fn memory(&self) -> u64 {
         // SAFETY: the handle belongs to this instance; the call only reads.
         let there = unsafe { self.instance.get_physical_device_memory_properties(self.candidate.handle) };
@@ -346,8 +347,7 @@ impl Context {
         })
     }
 
-    /// The host's clock, and the same instant on the monotonic clock that the driver reads, ns. The second is None if the driver does not
-    /// read that clock.
+    /// Now by the host's clock, and by the monotonic clock that the driver reads, ns. The second is None if the driver does not read that clock.
     pub(super) fn clocks_now(&self) -> (Instant, Option<u64>) {
         let asked = [vk::CalibratedTimestampInfoEXT::default().time_domain(vk::TimeDomainEXT::CLOCK_MONOTONIC)];
         let read = || {
@@ -365,7 +365,7 @@ impl Context {
         }
     }
 
-    /// Features of a format with optimal tiling.
+    /// Features of images of a format with optimal tiling.
     pub(crate) fn format_features(&self, format: vk::Format) -> vk::FormatFeatureFlags {
         let mut known = self.formats.lock().unwrap_or_else(|e| e.into_inner());
         // SAFETY: the handle belongs to this instance; the call only reads.
@@ -373,7 +373,7 @@ impl Context {
         *known.entry(format).or_insert_with(|| query().optimal_tiling_features)
     }
 
-    /// True if shaders that declare no format may store texels of this one.
+    /// True if shaders that declare no image format may store texels of this format.
     pub(super) fn writes_without_format(&self, format: vk::Format) -> bool {
         let mut features = vk::FormatProperties3::default();
         let mut properties = vk::FormatProperties2::default().push_next(&mut features);
@@ -383,7 +383,7 @@ impl Context {
         features.optimal_tiling_features.contains(vk::FormatFeatureFlags2::STORAGE_WRITE_WITHOUT_FORMAT)
     }
 
-    /// Fault injection: from now on a format has these features.
+    /// Fault injection: from now on the device appears to have these features for images of a format.
     pub(super) fn override_features(&mut self, format: vk::Format, features: vk::FormatFeatureFlags) {
         self.formats.lock().unwrap_or_else(|e| e.into_inner()).insert(format, features);
     }
@@ -411,8 +411,7 @@ impl Context {
         }
     }
 
-    /// The queue for a role: 0 renders, 1 ingests frames, 2 copies them. If the device has fewer queues than roles, several roles share the
-    /// last one.
+    /// The queue for a role: 0 renders, 1 ingests frames, 2 copies them. If the device has fewer queues than that, several roles share the last one.
     pub fn queue(&self, number: usize) -> QueueInfo {
         self.candidate.queues[number.min(self.queues.len() - 1)]
     }
@@ -422,7 +421,10 @@ impl Context {
         self.queues.len()
     }
 
-    /// Submits to a queue. `done` is a fence to signal at completion, or null.
+    /// Submits to the queue with this number. `done`: a fence to signal at completion, or null; `operation`: its name for an error.
+    ///
+    /// # Errors
+    /// The device fails, or was given up before.
     pub(super) fn submit(
         &self,
         queue: usize,
@@ -452,7 +454,7 @@ impl Context {
         }
     }
 
-    /// Waits for a fence of a submission that was made at `since`.
+    /// Waits for the fence of a submission that was made at the time `since`.
     ///
     /// # Errors
     /// The device fails or is given up.
@@ -462,13 +464,13 @@ impl Context {
         self.watchdog.wait(&|| operation.into(), || since, attempt)
     }
 
-    /// True once the device did not finish in time, or was busy when the program had to end. Objects of the context are then leaked instead
-    /// of destroyed, and so is the context: the device may still use them.
+    /// True once the device was given up: it did not finish in time, or was busy when the program had to end. Objects of the context and the context
+    /// itself are then leaked instead of destroyed, because the device may still use them.
     pub fn is_given_up(&self) -> bool {
         self.watchdog.has_given_up()
     }
 
-    /// An error with the report of the driver, if the device is lost and its driver reports anything.
+    /// Adds the driver's report to an error, if the error is the loss of the device and the driver reports anything.
     pub(super) fn explain(&self, error: GpuError) -> GpuError {
         let GpuError::Vulkan { operation, result: vk::Result::ERROR_DEVICE_LOST } = error else { return error };
         let report = self.faults.loss_report().unwrap_or_else(|| {
@@ -497,9 +499,9 @@ impl Context {
         work(*self.queues[0].lock().unwrap_or_else(|e| e.into_inner()))
     }
 
-    /// Shows an older validation layer an idle queue. Such a layer does not see that a timeline is waited for: it keeps what every
-    /// submission read and wrote until it sees an idle queue, which took 1 GiB after some minutes of verification. Call it after a wait for
-    /// the last submission of a timeline.
+    /// Waits for an idle queue if an older validation layer needs it. Such a layer does not see waits for timelines: it keeps what every submission
+    /// read and wrote until it sees an idle queue, which took 1 GiB after some minutes of verification. Call it after a wait for the last submission
+    /// of a timeline.
     ///
     /// # Errors
     /// The device fails or is given up.
@@ -508,8 +510,8 @@ impl Context {
         if is_due { self.wait_queue(0) } else { Ok(()) }
     }
 
-    /// As [`Context::show_layer_an_idle_queue`], but at once and on any number of queues. Call it before another timeline uses what the
-    /// first queue wrote: an older layer would report a hazard.
+    /// As [`Context::show_layer_an_idle_queue`], but each time, and with any number of queues. Call it before another timeline uses what the first
+    /// queue wrote: an older layer would report a hazard.
     ///
     /// # Errors
     /// The device fails or is given up.
@@ -545,7 +547,7 @@ impl Context {
     /// Waits until the device is idle.
     ///
     /// # Errors
-    /// The device fails, and is then idle, or it is given up.
+    /// The device fails (and is then idle), or is given up.
     pub(super) fn wait_idle(&self) -> Result<(), GpuError> {
         self.counts.waits_idle.fetch_add(1, Ordering::Relaxed);
         let operation = || "wait for an idle device".to_string();
@@ -557,10 +559,10 @@ impl Context {
         unsafe { self.device.device_wait_idle() }.context(operation)
     }
 
-    /// The limits of an image of this format, type and usage.
+    /// The limits of images of this format, type and usage.
     ///
     /// # Errors
-    /// A combination that the device does not support.
+    /// The device does not support the combination.
     pub(crate) fn image_limits(
         &self,
         format: vk::Format,

@@ -45,12 +45,12 @@ pub(crate) struct DescriptorSets {
 }
 
 impl DescriptorSets {
-    /// Allocates no pool yet: push descriptors need none.
+    /// Makes an empty collection. A pool is allocated with the first set, so that a device with push descriptors needs none.
     pub fn new(context: &Arc<Context>) -> DescriptorSets {
         DescriptorSets { context: context.clone(), pools: Vec::new(), left: FULL, current: 0 }
     }
 
-    /// Frees all sets. The device must be done with the command buffer.
+    /// Frees all sets. The device must be done with the command buffer that uses them.
     pub fn begin(&mut self) -> Result<(), GpuError> {
         for pool in &self.pools {
             // SAFETY: the pool is alive, and the device is done with what was taken from it.

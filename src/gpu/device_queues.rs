@@ -11,19 +11,19 @@ use crate::queues::{QueueTracker, Wait};
 use ash::vk;
 use std::sync::Arc;
 
-/// Orders all operations that use the same slots, and counts their barriers and times. It records the barriers that [`crate::barriers`]
-/// derives as Vulkan commands.
+/// The queues of a device in use. It orders all operations on the same slots: the barriers that [`crate::barriers`] derives are recorded as Vulkan
+/// commands. It also holds the timelines and times.
 pub(crate) struct DeviceQueues {
     pub tracker: QueueTracker,
     pub(super) timelines: Timelines,
     pub timings: Timings,
-    /// Number of barriers recorded so far.
+    /// Number of barriers that were needed so far, a dropped one included.
     pub count: u32,
-    /// The names and invocations of the dispatched passes, in order, while they are counted.
+    /// The names and numbers of invocations of the passes dispatched so far, in order. `None` while they are not recorded.
     pub dispatched: Option<Vec<(&'static str, [u32; 3])>>,
-    /// Fault injection: leaves out the n-th barrier.
+    /// Fault injection: the barrier with this number, from 1, is left out.
     pub drop_barrier: Option<u32>,
-    /// Everything recorded and submitted, if it is logged.
+    /// The log of everything recorded and submitted. `None` if nothing is logged.
     pub log: Option<SubmissionLog>,
 }
 
@@ -41,7 +41,7 @@ impl DeviceQueues {
         })
     }
 
-    /// Blocks until everything submitted is done.
+    /// Blocks until everything that was submitted to these queues is done.
     pub(crate) fn wait_all(&self) -> Result<(), GpuError> {
         self.timelines.wait_all()
     }
@@ -54,7 +54,7 @@ impl DeviceQueues {
         done
     }
 
-    /// Records the barrier that an operation with these accesses needs, if it needs one.
+    /// Records the barrier in front of an operation with these accesses, if it needs one.
     pub(super) fn before(&mut self, context: &Context, queue: usize, commands: vk::CommandBuffer, accesses: &[Access]) {
         let barrier = self.tracker.record(queue, accesses);
         self.count += u32::from(barrier.is_some());
@@ -77,18 +77,18 @@ impl DeviceQueues {
         unsafe { context.device.cmd_pipeline_barrier2(commands, &dependency) };
     }
 
-    /// A time stamp was recorded on this queue.
+    /// Notes in the log that a time stamp was recorded on this queue.
     pub(super) fn stamped(&mut self, queue: usize) {
         self.log.iter_mut().for_each(|log| log.event(queue, Event::Stamp));
     }
 
-    /// Begins the recording of a submission to this queue.
+    /// Begins the recording of a submission to this queue, in the tracker of barriers and in the log.
     pub(super) fn begin(&mut self, queue: usize) {
         self.tracker.begin(queue);
         self.log.iter_mut().for_each(|log| log.begin(queue));
     }
 
-    /// The recording of this queue was submitted with these waits; it is done at this value of the queue's timeline.
+    /// Notes that the recording of this queue was submitted with these waits. It is done when the queue's timeline has this value.
     pub(super) fn submitted(&mut self, queue: usize, waits: &[Wait], value: u64) {
         self.tracker.submitted(queue, waits, value);
         self.log.iter_mut().for_each(|log| log.submit(queue, waits, value));

@@ -14,7 +14,7 @@ pub enum DeviceChoice {
     /// The best device that lacks no required feature.
     #[default]
     Best,
-    /// By its number in `echolume devices`.
+    /// By its number in the list of `echolume devices`.
     Number(usize),
     /// By a part of its name, ignoring case.
     Name(String),
@@ -28,7 +28,7 @@ impl std::str::FromStr for DeviceChoice {
     }
 }
 
-/// A physical device.
+/// A physical device, with what it lacks and supports.
 #[derive(Clone, Debug)]
 pub struct Candidate {
     pub handle: vk::PhysicalDevice,
@@ -38,36 +38,36 @@ pub struct Candidate {
     pub version: u32,
     /// Required features that the device lacks.
     pub missing: Vec<Cow<'static, str>>,
-    /// Optional features that the device lacks, with the consequence.
+    /// Optional features that the device lacks, each with the consequence.
     pub missing_optional: Vec<&'static str>,
-    /// The queues to use: the first renders, the second (if any) ingests frames, and the third (if any) copies them.
+    /// The queues to use: the first renders, the second (if any) converts frames, and the third (if any) copies them.
     pub queues: Vec<QueueInfo>,
-    /// Time stamps can be converted to the host's clock.
+    /// True if time stamps can be converted to the host's clock (VK_EXT_calibrated_timestamps).
     pub calibrated_timestamps: bool,
-    /// The host's monotonic clock can be read in the same call.
+    /// True if the host's monotonic clock can be read in the same call as the device's.
     pub(crate) reads_monotonic: bool,
-    /// Supports push descriptors.
+    /// True if it supports push descriptors.
     pub(crate) push_descriptors: bool,
-    /// Can count shader invocations.
+    /// True if it can count shader invocations.
     pub pipeline_statistics: bool,
-    /// Can report statistics on the compilation of pipelines.
+    /// True if it can report statistics on the compilation of pipelines.
     pub compile_statistics: bool,
-    /// Can present pictures, with panels drawn over them.
+    /// True if it can present pictures with panels drawn over them.
     pub can_present: bool,
     /// Identity of the device and driver that stored pipelines must match.
     pub(crate) driver_identity: DriverIdentity,
-    /// Can report when a picture is on the monitor.
+    /// True if it can report when a picture is on the monitor (VK_KHR_present_wait).
     pub(crate) present_wait: bool,
-    /// Can report why it was lost.
+    /// True if it can report why it was lost (VK_EXT_device_fault).
     pub(crate) device_fault: bool,
-    /// Can report the passes that its queues had reached when it was lost.
+    /// True if it can report, after it was lost, which passes its queues had reached (VK_NV_device_diagnostic_checkpoints).
     pub checkpoints: bool,
-    /// The memory budget at the time of listing, if the device reports one.
+    /// The memory budget when the devices were listed; None if the device reports none.
     pub budget: Option<MemoryBudget>,
     pub limits: vk::PhysicalDeviceLimits,
-    /// Largest allocation, bytes: the limit of an image.
+    /// Largest allocation of device memory, bytes; it limits images.
     pub max_allocation: u64,
-    /// Largest buffer, bytes. Several drivers allow 2 GiB only, but far larger images.
+    /// Largest buffer, bytes. Several drivers allow only 2 GiB, but far larger images.
     pub max_buffer: u64,
 }
 
@@ -75,13 +75,13 @@ pub struct Candidate {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct QueueInfo {
     pub family: u32,
-    /// Index within the family.
+    /// Index of the queue within its family.
     pub index: u32,
-    /// Number of valid bits of its time stamps; 0 if it has none.
+    /// Number of valid bits of time stamps on the queue; 0 if it has none.
     pub valid_bits: u32,
     pub computes: bool,
     pub draws: bool,
-    /// True if it can copy single slices of a 3D image; otherwise only complete images.
+    /// True if the queue can copy single slices of a 3D image; otherwise it copies only complete images.
     pub(crate) copies_slices: bool,
 }
 
@@ -96,7 +96,7 @@ impl Candidate {
         self.is_software() && self.name.contains("llvmpipe")
     }
 
-    /// True if it shares the machine's memory.
+    /// True if the device uses the machine's memory and has none of its own.
     pub fn has_unified_memory(&self) -> bool {
         self.is_software() || self.kind == vk::PhysicalDeviceType::INTEGRATED_GPU
     }
@@ -132,7 +132,7 @@ impl Candidate {
     }
 }
 
-/// Every device of an instance, in the driver's order.
+/// Lists every device of an instance, in the driver's order.
 pub fn candidates(entry: &ash::Entry, instance: &ash::Instance) -> Result<Vec<Candidate>, GpuError> {
     calls::begins("vkEnumeratePhysicalDevices", "");
     // SAFETY: the instance is alive; the call only reads.

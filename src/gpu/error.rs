@@ -67,7 +67,7 @@ impl GpuError {
     }
 }
 
-/// Adds the operation that failed to a Vulkan result.
+/// Converts a Vulkan result to a [`GpuError`] that names the operation that failed.
 pub(crate) trait ErrorContext<T> {
     fn context(self, operation: impl FnOnce() -> String) -> Result<T, GpuError>;
 }

@@ -12,7 +12,7 @@ use std::borrow::Cow;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Mutex, OnceLock};
 
-/// A kind of driver call that can be made to fail.
+/// A kind of Vulkan call that can be made to fail.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InjectionPoint {
     Allocate,
@@ -22,7 +22,7 @@ pub enum InjectionPoint {
     Acquire,
 }
 
-/// How a call fails, for modules that do not use types of Vulkan.
+/// The Vulkan result of a call that is made to fail, for modules that do not use types of Vulkan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InjectedFailure {
     OutOfDeviceMemory,
@@ -42,7 +42,7 @@ impl InjectedFailure {
     }
 }
 
-/// The content of newly allocated memory.
+/// Content for newly allocated memory, to find uses of uninitialized memory.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Poison {
     /// Value of texels of float formats.
@@ -56,13 +56,13 @@ pub struct Poison {
 }
 
 impl Poison {
-    /// Two poisons that differ in every significant bit. A result that differs between them was computed from uninitialized memory.
+    /// Two poisons that differ in every significant bit. A result that differs between them depends on uninitialized memory.
     pub const BOTH: [Poison; 2] = [
         Poison { float: f32::NAN, normalized: 2.0 / 3.0, integer: 0xabab_abab, byte: 0xff },
         Poison { float: -999.5, normalized: 1.0 / 3.0, integer: 0x5555_5555, byte: 0x55 },
     ];
 
-    /// The value of a poisoned texel of a format.
+    /// The value of a texel of a format after memory was filled with this poison.
     pub fn texel_value(self, format: Format) -> f64 {
         match format {
             Format::R32u | Format::Rg32u => f64::from(self.integer),
@@ -73,7 +73,7 @@ impl Poison {
     }
 }
 
-/// The injected faults of a context: at most one failure, one slow pass, one poison, and one wrong result.
+/// The injected faults of a context: at most one failing or hanging call, one slow pass, one poison, and one wrong result.
 #[derive(Default)]
 pub struct Faults {
     planned: Mutex<Option<(InjectionPoint, u32, vk::Result)>>,
@@ -121,7 +121,7 @@ impl Faults {
         *self.hang.lock().unwrap_or_else(|e| e.into_inner()) = Some(after);
     }
 
-    /// True if the device must appear to hang at this submission.
+    /// True if the submission that follows must not reach the device, because the device is to appear to hang.
     pub(super) fn keeps_submission(&self) -> bool {
         let mut hang = self.hang.lock().unwrap_or_else(|e| e.into_inner());
         match hang.as_mut() {
@@ -134,7 +134,7 @@ impl Faults {
         }
     }
 
-    /// From now on the host waits for each submission before the next. This is not a fault: it hides faults of synchronization, and so
+    /// From now on the host waits for each submission before it makes the next one. This is no fault: it hides faults of synchronization, and so
     /// distinguishes them from others.
     pub fn wait_for_each_submission(&self) {
         self.waits.store(true, Ordering::Relaxed);
@@ -144,7 +144,7 @@ impl Faults {
         self.waits.load(Ordering::Relaxed)
     }
 
-    /// While it is set, a picture in flight counts as not done, as on a slow device.
+    /// While `holds` was last set to true, a picture in flight counts as not done, as on a slow device.
     pub fn hold_pictures(&self, holds: bool) {
         self.holds_pictures.store(holds, Ordering::Relaxed);
     }
@@ -153,17 +153,17 @@ impl Faults {
         self.holds_pictures.load(Ordering::Relaxed)
     }
 
-    /// Cancels a planned failure that has not happened.
+    /// Cancels a failure that was injected but has not happened yet.
     pub fn forget(&self) {
         *self.planned.lock().unwrap_or_else(|e| e.into_inner()) = None;
     }
 
-    /// From now on the driver reports this loss of the device.
+    /// From now on the driver appears to give this report after a loss of the device.
     pub fn report_loss(&self, report: LossReport) {
         *self.loss.lock().unwrap_or_else(|e| e.into_inner()) = Some(report);
     }
 
-    /// True if the device was only said to be lost: the driver must not be asked why.
+    /// True if the loss of the device was injected, so that the driver must not be asked for its cause.
     pub(super) fn pretends_loss(&self) -> bool {
         self.has_lost.load(Ordering::Relaxed)
     }
@@ -183,7 +183,7 @@ impl Faults {
         self.budget.lock().unwrap_or_else(|e| e.into_inner()).clone()
     }
 
-    /// From now on new memory holds this content. Slots that must start with zeros still do
+    /// From now on newly allocated memory holds this content; `None`: it is not filled. Slots that must start with zeros still do
     /// ([`Slot::starts_clear`](crate::passes::Slot::starts_clear)).
     pub fn poison(&self, poison: Option<Poison>) {
         *self.poison.lock().unwrap_or_else(|e| e.into_inner()) = poison;
@@ -193,7 +193,7 @@ impl Faults {
         *self.poison.lock().unwrap_or_else(|e| e.into_inner())
     }
 
-    /// From now on each dispatch of the pass runs `times` times; the results stay the same. 0 leaves the dispatch out.
+    /// From now on each dispatch of the pass is recorded `times` times, with the same results. 0 leaves the dispatch out.
     pub fn slow_down(&self, pass: &'static str, times: u32) {
         *self.slow.lock().unwrap_or_else(|e| e.into_inner()) = Some((pass, times));
     }
@@ -205,13 +205,13 @@ impl Faults {
         }
     }
 
-    /// Changes what the device receives, as long as the context lives. Call it before anything is made from the context. Only the first
-    /// call has an effect.
+    /// Injects a wrong result: changes what the device receives, as long as the context lives. Call it before anything is made from the context. Only
+    /// the first call has an effect.
     pub fn inject_change(&self, change: Change) {
         self.change.get_or_init(|| change);
     }
 
-    /// Number of times that the injected change has changed something.
+    /// How many times the injected change has changed something so far.
     pub fn change_count(&self) -> u64 {
         self.changes.load(Ordering::Relaxed)
     }
@@ -224,12 +224,12 @@ impl Faults {
         changed
     }
 
-    /// True if the driver must carry out this command wrongly.
+    /// True if the injected change is that this Vulkan command is executed wrongly.
     pub(super) fn breaks(&self, command: Command) -> bool {
         self.apply(|change| matches!(change, Change::Command(broken) if *broken == command))
     }
 
-    /// The arguments of a dispatch; `None` if it is left out.
+    /// The arguments of a dispatch after the injected change; `None` if the change leaves the dispatch out.
     pub(super) fn args(&self, pass: &Pass, scene: &Scene, args: &DispatchArgs) -> Option<DispatchArgs> {
         let mut args = *args;
         self.apply(|change| change.args(pass.name, scene, &mut args));
@@ -270,7 +270,7 @@ impl Faults {
         self.apply(|change| change.frame(scene, bytes));
     }
 
-    /// The bytes of a frame that is uploaded.
+    /// The bytes of an uploaded frame after the injected change.
     pub(super) fn changed_frame<'a>(&self, scene: &Scene, bytes: &'a [u8]) -> Cow<'a, [u8]> {
         if !matches!(self.change.get(), Some(Change::Frame(_))) {
             return Cow::Borrowed(bytes);
@@ -280,7 +280,7 @@ impl Faults {
         Cow::Owned(changed)
     }
 
-    /// The input bytes of a slot for a single pass.
+    /// The bytes of a slot that is an input of a single pass, after the injected change.
     pub(super) fn given(&self, slot: Slot, scene: &Scene, mut bytes: Vec<u8>) -> Vec<u8> {
         if slot == Slot::Frames {
             let [width, height] = scene.frame_size().map(|n| n as usize);

@@ -10,7 +10,7 @@ use crate::plan::Plan;
 use crate::scene::{Sampling, Scene, WindowTexels};
 use ash::vk;
 
-/// How single texels are read.
+/// By which instructions shaders read single texels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TexelAccess {
     /// `texelFetch` from textures, as the shaders are written.
@@ -20,12 +20,12 @@ pub enum TexelAccess {
 }
 
 impl TexelAccess {
-    /// The fast access for a device. A software device runs its complete sampler for every fetch; on a GPU textures have their own caches.
+    /// The faster access on a device. A software device runs its complete sampler for every fetch; on a GPU textures have caches of their own.
     pub fn for_device(candidate: &Candidate) -> TexelAccess {
         if candidate.is_software() { TexelAccess::Storage } else { TexelAccess::Textures }
     }
 
-    /// The sampling that the setting `auto` selects.
+    /// The sampling that `ray.sampling = "auto"` selects with this access.
     pub fn sampling(self) -> Sampling {
         if self == TexelAccess::Storage { Sampling::PackedNeighbours } else { Sampling::Hardware }
     }
@@ -38,7 +38,7 @@ impl TexelAccess {
     }
 }
 
-/// The Vulkan format.
+/// The Vulkan format of images in a format of slots.
 pub(super) fn vulkan(format: Format) -> vk::Format {
     match format {
         Format::R8 => vk::Format::R8_UNORM,
@@ -57,7 +57,7 @@ pub(super) fn vulkan(format: Format) -> vk::Format {
     }
 }
 
-/// The clear value that fills an image of a format with a poison.
+/// The clear value that fills an image of a format with the content of a poison.
 pub(super) fn clear_value(poison: Poison, format: Format) -> vk::ClearColorValue {
     match format {
         Format::R32u | Format::Rg32u => vk::ClearColorValue { uint32: [poison.integer; 4] },
@@ -68,7 +68,7 @@ pub(super) fn clear_value(poison: Poison, format: Format) -> vk::ClearColorValue
     }
 }
 
-/// The usage of a slot's image. One that no pass writes is a storage image only if texels are read from storage images.
+/// Usage flags of a slot's image. An image that no pass writes is a storage image only if texels are read from storage images.
 pub(super) fn usage(context: &Context, slot: Slot) -> vk::ImageUsageFlags {
     let read = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST | vk::ImageUsageFlags::TRANSFER_SRC;
     match slot {
@@ -93,10 +93,10 @@ fn features(context: &Context, slot: Slot, scene: &Scene) -> vk::FormatFeatureFl
 /// Frames whose slots of stage 1 stay in the caches of a CPU.
 const FRAMES_IN_CACHE: u32 = 4;
 
-/// Sets the fields of a scene that depend on the device. Sampling is the fastest one, which reads eight texels if texels are loaded or if
-/// the device cannot filter the volume's format. Packed neighbours are left out if the device cannot hold them. The volume has the format
-/// that the device stores best, the picture the format of the window, and passes use shared memory on a GPU. On a CPU few frames go through
-/// stage 1 at once, so that their slots stay in its caches.
+/// Sets the fields of a scene that depend on the device. Sampling becomes the fastest one: it reads eight texels if texels are loaded or if the
+/// device cannot filter the volume's format. Packed neighbours are left out if the device cannot hold them. The volume gets the format that the
+/// device stores best, the picture that of the window, and passes use shared memory on a GPU. On a CPU few frames go through stage 1 at once, so that
+/// their slots stay in its caches.
 pub fn adapt_scene(context: &Context, texel_access: TexelAccess, mut scene: Scene) -> Scene {
     scene.truncates_halves = context.candidate.truncates_halves();
     let filters = filters(context, Slot::Volume.format(&scene));
@@ -131,7 +131,7 @@ fn window_texels(context: &Context) -> WindowTexels {
     if is_stored && context.writes_without_format(format) { wanted } else { WindowTexels::Rgba8 }
 }
 
-/// True if the device has a linear filter of images in this format.
+/// True if the device can filter images in this format linearly.
 pub fn filters(context: &Context, format: Format) -> bool {
     context.format_features(vulkan(format)).contains(vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR)
 }
@@ -207,7 +207,7 @@ pub fn check(context: &Context, plan: &Plan, scene: &Scene) -> Result<(), GpuErr
     Ok(())
 }
 
-/// The uses of a format that a device supports.
+/// Which uses of one format a device supports.
 pub struct FormatSupport {
     pub format: String,
     pub supported: Vec<&'static str>,
@@ -216,7 +216,7 @@ pub struct FormatSupport {
     pub max_extent: [u32; 3],
 }
 
-/// Lists all formats of slots with all uses that slots make of them.
+/// Support for every format that slots have, with every use that slots make of it.
 pub fn format_support(context: &Context) -> Vec<FormatSupport> {
     let formats = [
         Format::R8,
@@ -257,7 +257,7 @@ pub fn format_support(context: &Context) -> Vec<FormatSupport> {
     formats.into_iter().map(of).collect()
 }
 
-/// Fault injection: the device appears unable to filter any format of a volume.
+/// Fault injection: the device appears unable to filter any format of a volume linearly.
 pub fn disable_linear_filter(context: &mut Context) {
     for format in [Format::R8, Format::R16, Format::R16f, Format::R32f].map(vulkan) {
         let there = context.format_features(format);

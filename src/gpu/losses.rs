@@ -6,7 +6,7 @@ use super::{Bands, GpuError};
 /// Most losses in a row after which the work is tried again. By then a band has a 64th of its time, and smaller bands have not helped.
 const MAX_LOSSES: u32 = 6;
 
-/// Number of consecutive losses of a device by the same work.
+/// Counts consecutive losses of the device by the same work.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Losses(u32);
 
@@ -27,12 +27,12 @@ impl Losses {
         allowed
     }
 
-    /// True if the device was lost since the work began.
+    /// True if the device was lost at least once since the work began.
     pub fn any(self) -> bool {
         self.0 > 0
     }
 
-    /// How the next try divides its dispatches.
+    /// How the next try of the work divides its dispatches: into smaller bands after each loss.
     pub fn bands(self) -> Bands {
         Bands::Measured { losses: self.0 }
     }

@@ -9,7 +9,7 @@ use std::fmt::{self, Display, Formatter};
 /// Most addresses, codes or checkpoints that one line reports of each.
 const MAX_REPORTED: usize = 4;
 
-/// The report of a driver. Each list may be empty, because drivers report only what they know.
+/// The driver's report on the loss of a device. Each list may be empty, because drivers report only what they know.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LossReport {
     pub description: String,
@@ -18,16 +18,16 @@ pub struct LossReport {
     pub checkpoints: Vec<Checkpoint>,
 }
 
-/// The address of a failed access or of an instruction.
+/// An address in the report: of a failed memory access, or of an instruction.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FaultAddress {
     pub kind: &'static str,
     pub address: u64,
-    /// Number of bytes around the address within which the fault lies, a power of two. 1 is exact.
+    /// The fault lies within this many bytes around the address, a power of two; 1 means exactly there.
     pub precision: u64,
 }
 
-/// A code that only the vendor can interpret.
+/// A code in the report that only the vendor can interpret.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct VendorCode {
     pub description: String,
@@ -35,10 +35,10 @@ pub struct VendorCode {
     pub data: u64,
 }
 
-/// A pass that a queue had reached.
+/// A pass that a queue had reached when the device was lost.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Checkpoint {
-    /// Number of the queue.
+    /// Number of the queue, from 0.
     pub queue: usize,
     pub pass: &'static str,
     /// True if all work before the pass was done; otherwise the pass had begun.
@@ -75,14 +75,14 @@ impl LossReport {
     }
 }
 
-/// The extensions that report a lost device, where they are enabled.
+/// The extensions by which drivers report on a lost device, where they are enabled.
 pub(crate) struct LossReporting {
     pub faults: Option<ash::ext::device_fault::Device>,
     pub checkpoints: Option<ash::nv::device_diagnostic_checkpoints::Device>,
 }
 
 impl LossReporting {
-    /// The report of the device that was just lost. No other thread may use `queues`.
+    /// Reads the report on the device that was just lost. No other thread may use `queues`.
     pub fn read(&self, device: vk::Device, queues: &[vk::Queue]) -> LossReport {
         let mut report = self.faults.as_ref().map_or_else(LossReport::default, |faults| read_faults(faults, device));
         for (queue, handle) in queues.iter().enumerate() {

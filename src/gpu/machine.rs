@@ -6,13 +6,13 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::SystemTime;
 
-/// A Vulkan device, as reports describe it.
+/// A Vulkan device as reports describe it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Device {
     pub name: String,
     pub driver: String,
-    /// Vulkan version.
+    /// The Vulkan version that it supports.
     pub api: String,
     /// True if it computes on the CPU.
     pub is_software: bool,
@@ -22,12 +22,12 @@ pub struct Device {
     pub valid_bits: u32,
     /// True if the device's clock can be related to the host's, so that both can be drawn on one axis.
     pub calibrated: bool,
-    /// Description of clocks and power state; None if unknown.
+    /// Description of clock rates and power state; None if unknown.
     pub clocks: Option<String>,
 }
 
 impl Device {
-    /// A device of which nothing is known.
+    /// A device about which nothing is known.
     pub fn unknown() -> Device {
         let unknown = || "not known".to_string();
         Device {
@@ -42,8 +42,8 @@ impl Device {
         }
     }
 
-    /// The name without the versions that some drivers put in parentheses after it, such as that of LLVM. It stays the same when such a
-    /// version changes.
+    /// The name without the versions that some drivers put in parentheses after it, such as that of LLVM, so that results before and after an update
+    /// of a driver are compared.
     pub fn identity(&self) -> String {
         let Some((name, rest)) = self.name.split_once(" (") else { return self.name.clone() };
         let is_version = |word: &str| word.contains('.') && word.starts_with(|c: char| c.is_ascii_digit());
@@ -52,7 +52,7 @@ impl Device {
         if parts.is_empty() { name.into() } else { format!("{name} ({})", parts.join(", ")) }
     }
 
-    /// The conditions that times depend on, each with a name for users.
+    /// The conditions that measured times depend on, each with a name that the user reads.
     pub fn conditions(&self) -> [(&'static str, String); 4] {
         [
             ("device", self.name.clone()),
@@ -118,7 +118,7 @@ impl CpuTime {
         (!threads.is_empty()).then_some(CpuTime(threads))
     }
 
-    /// CPU time of all threads since `then`, ns. Time of threads that have ended meanwhile is lost; drivers keep their threads alive.
+    /// CPU time of all threads since `then`, ns. Time of threads that have ended since then is lost; drivers keep their threads alive.
     pub fn since(&self, then: &CpuTime) -> f64 {
         let of = |(name, now): (&String, &u64)| now.saturating_sub(then.0.get(name).copied().unwrap_or(0));
         self.0.iter().map(of).sum::<u64>() as f64

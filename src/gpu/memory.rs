@@ -8,19 +8,19 @@ use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
 use std::sync::atomic::Ordering;
 
-/// Memory that is wanted.
+/// The device memory that an image or a buffer needs.
 pub(super) struct Reserve<'a> {
     pub name: &'a str,
     pub requirements: vk::MemoryRequirements,
     pub location: MemoryLocation,
-    /// For a buffer.
+    /// True for a buffer, false for an image.
     pub linear: bool,
 }
 
-/// Reserves memory.
+/// Allocates device memory. `operation`: what it is for, in an error.
 ///
 /// # Errors
-/// Out of memory.
+/// Memory is exhausted.
 pub(super) fn reserve(
     context: &Context,
     wanted: Reserve,
@@ -57,7 +57,7 @@ pub(super) fn reserve(
         .map_err(|e| GpuError::Memory { operation: operation(), fault: e.to_string() })
 }
 
-/// Frees reserved memory.
+/// Frees device memory that [`reserve`] allocated.
 pub(super) fn free(context: &Context, allocation: Option<Allocation>) {
     let mut allocator = context.allocator.lock().unwrap_or_else(|e| e.into_inner());
     if let (Some(allocator), Some(allocation)) = (allocator.as_mut(), allocation) {

@@ -4,7 +4,7 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// Submissions of one queue, in order, and what the device is doing of them.
+/// Submissions of one queue, in order, held back until the device has little enough work.
 #[derive(Debug)]
 pub(super) struct Paced<T> {
     /// The device has less than this to do, expected, ns. A submission that takes longer by itself is alone.
@@ -24,41 +24,41 @@ struct Submission<T> {
 }
 
 impl<T> Paced<T> {
-    /// `most`: expected time of what is submitted at once.
+    /// `most`: expected time of the work that may be submitted at once.
     pub(super) fn new(most: Duration) -> Paced<T> {
         Paced { most: most.as_nanos() as f64, held: VecDeque::new(), running: VecDeque::new() }
     }
 
-    /// Adds a submission behind the others. `value`: that of the timeline once it is done; `expected`: its time, ns.
+    /// Adds a submission at the end. `value`: value of the queue's timeline once it is done; `expected`: its expected time, ns.
     pub(super) fn push(&mut self, value: u64, expected: f64, work: T) {
         self.held.push_back(Submission { value, expected, work });
     }
 
-    /// Takes back the last submission, if it is still held.
+    /// Removes the last submission, if it is still held.
     pub(super) fn pop_back(&mut self) {
         self.held.pop_back();
     }
 
-    /// The device has reached a value of the timeline.
+    /// Notes that the queue's timeline has this value: the submissions up to it are done.
     pub(super) fn reached(&mut self, value: u64) {
         while self.running.front().is_some_and(|submission| submission.value <= value) {
             self.running.pop_front();
         }
     }
 
-    /// The next submission, if the device has little enough to do. It counts as submitted after [`Paced::sent`].
+    /// The next submission, if the device has little enough work for it. Call [`Paced::sent`] once it was submitted.
     pub(super) fn due(&self) -> Option<&T> {
         let next = self.held.front()?;
         let busy: f64 = self.running.iter().map(|submission| submission.expected).sum();
         (self.running.is_empty() || busy + next.expected < self.most).then_some(&next.work)
     }
 
-    /// The next submission up to this value, whatever the device has to do.
+    /// The next submission if its timeline value is at most `value`, however much work the device has.
     pub(super) fn up_to(&self, value: u64) -> Option<&T> {
         self.held.front().filter(|next| next.value <= value).map(|next| &next.work)
     }
 
-    /// The next submission was submitted.
+    /// Notes that the next submission was submitted.
     pub(super) fn sent(&mut self) {
         if let Some(Submission { value, expected, .. }) = self.held.pop_front() {
             self.running.push_back(Submission { value, expected, work: () });

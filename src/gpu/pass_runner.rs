@@ -16,7 +16,7 @@ use crate::plan::Plan;
 use crate::scene::Scene;
 use std::sync::Arc;
 
-/// Runs single passes on inputs of the caller.
+/// Runs single passes on inputs that the caller gives, for tests and verification.
 pub struct PassRunner {
     context: Arc<Context>,
     pipelines: Arc<Pipelines>,
@@ -24,13 +24,15 @@ pub struct PassRunner {
 }
 
 impl PassRunner {
+    /// Makes a runner with the device's fast way to read texels.
+    ///
     /// # Errors
     /// The device fails.
     pub fn new(context: &Arc<Context>) -> Result<PassRunner, GpuError> {
         PassRunner::with_texel_access(context, TexelAccess::for_device(&context.candidate))
     }
 
-    /// As [`PassRunner::new`], with texels read in the given way.
+    /// As [`PassRunner::new`], with texels read by `texel_access`.
     ///
     /// # Errors
     /// The device fails.
@@ -42,18 +44,18 @@ impl PassRunner {
         })
     }
 
-    /// Number of fractional bits of the weights in the device's texture filter.
+    /// Number of fractional bits of the weights in the device's linear texture filter.
     pub fn filter_bits(&self) -> u32 {
         self.context.candidate.limits.sub_texel_precision_bits
     }
 
-    /// The scene as [`PassRunner::run`] runs it: with the fields that the device decides, but with the caller's dispatches.
+    /// The scene as [`PassRunner::run`] runs it: fields that depend on the device are set, except those that decide the number of dispatches.
     pub fn adapted(&self, scene: &Scene) -> Scene {
         let adapted = formats::adapt_scene(&self.context, self.texel_access, scene.clone());
         Scene { shared_memory: scene.shared_memory, frames_at_once: scene.frames_at_once, ..adapted }
     }
 
-    /// The SPIR-V and layout of a pass in an adapted scene, as the driver receives them.
+    /// The SPIR-V and the reflected declarations of a pass in an adapted scene, as the driver gets them.
     ///
     /// # Errors
     /// The shader does not exist, or disagrees with the declaration of the pass.
@@ -61,8 +63,8 @@ impl PassRunner {
         self.pipelines.prepare(&self.pipelines.key(pass, scene, args), pass, scene, args)
     }
 
-    /// Dispatches `pass` once and returns its outputs. `inputs` have the names of the shader's bindings; slots that the scene computes may
-    /// be missing. Every texel of the outputs holds `poison` before the dispatch, so that texels which the pass does not write are visible.
+    /// Dispatches `pass` once and returns its outputs. `inputs` have the names of the shader's bindings; tables that the CPU computes from the scene
+    /// may be missing. Every texel of the outputs holds `poison` before the dispatch, so that texels that the pass does not write can be recognised.
     ///
     /// # Errors
     /// The device cannot hold a slot, a shader does not compile, or the device fails.
@@ -77,8 +79,7 @@ impl PassRunner {
         self.run_within(scene, pass, args, inputs, poison, u64::MAX)
     }
 
-    /// As [`PassRunner::run`], in bands of at most `most` invocations, but at least one row of workgroups. A dispatch whose number of
-    /// workgroups another pass counts is not divided.
+    /// As [`PassRunner::run`], in bands of at most `most` invocations, but at least one row of workgroups. An indirect dispatch is not divided.
     ///
     /// # Errors
     /// As of [`PassRunner::run`].
@@ -154,7 +155,7 @@ impl PassRunner {
     }
 }
 
-/// Times a single pass of a scene, with its own slots and pipelines.
+/// Measures the GPU time of a single pass of a scene, with slots and pipelines of its own.
 pub struct PassTimer {
     // Fields are dropped in this order, after `drop` has waited for the device.
     recorder: CommandRecorder,
@@ -169,9 +170,9 @@ pub struct PassTimer {
 }
 
 impl PassTimer {
-    /// Allocates the slots and runs the pass once, because drivers compile at the first run. `contents`: the content of images before that
-    /// run, for the volume all of it. Slots that the scene computes are filled; all others hold zeros. A pass over frames works on layer 0
-    /// and the middle slice, a pass over volumes on all visible slices.
+    /// Allocates the slots and runs the pass once, because drivers compile at the first run. `contents`: content of images before that run, for the
+    /// volume all of it. Tables that the CPU computes from the scene are filled; all other slots hold zeros. A pass over frames works on layer 0 and
+    /// the middle slice, a pass over volumes on all visible slices.
     ///
     /// # Errors
     /// The device cannot hold a slot, or a shader does not compile; the error names it.
@@ -184,7 +185,7 @@ impl PassTimer {
         PassTimer::with_texel_access(context, scene, pass, contents, TexelAccess::for_device(&context.candidate))
     }
 
-    /// As [`PassTimer::new`], with texels read in the given way.
+    /// As [`PassTimer::new`], with texels read by `texel_access`.
     ///
     /// # Errors
     /// As for [`PassTimer::new`].

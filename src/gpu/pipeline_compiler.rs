@@ -14,10 +14,10 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Wakes the event loop of a view.
+/// A function that wakes the event loop of the viewer's window.
 pub type Wake = Arc<dyn Fn() + Send + Sync>;
 
-/// Makes a scene that may come next. None if these settings cannot be drawn.
+/// A function that makes a scene which may be shown next. None if its settings cannot be drawn.
 pub type SceneMaker = Box<dyn FnOnce() -> Option<Scene> + Send>;
 
 /// Longest pause after a pipeline that nobody waits for.
@@ -92,7 +92,7 @@ impl Shared {
     }
 }
 
-/// A thread that compiles pipelines, and its requests.
+/// A thread that compiles pipelines in the background, and what was requested of it.
 pub(crate) struct AsyncPipelineCompiler {
     shared: Arc<Shared>,
     pipelines: Arc<Pipelines>,
@@ -119,10 +119,10 @@ impl AsyncPipelineCompiler {
         Ok(AsyncPipelineCompiler { shared, pipelines: pipelines.clone(), held: Vec::new(), thread: Some(thread) })
     }
 
-    /// True if every pipeline of a plan is compiled; requests those that are not.
+    /// True if every pipeline of a plan is compiled; otherwise requests the missing ones.
     ///
     /// # Errors
-    /// A pipeline that could not be compiled.
+    /// A pipeline could not be compiled.
     pub fn prepare(&mut self, plan: &Plan, scene: &Scene) -> Result<bool, GpuError> {
         // If the thread has died, pipelines are compiled at their first use.
         let is_alive = self.thread.as_ref().is_some_and(|thread| !thread.is_finished());
@@ -151,7 +151,7 @@ impl AsyncPipelineCompiler {
         Ok(is_ready)
     }
 
-    /// While drawing waits for no pipeline, compiles the pipelines of these scenes. They replace the scenes of an earlier call.
+    /// Compiles the pipelines of these scenes whenever no requested pipeline is missing. They replace the scenes of an earlier call.
     pub fn warm(&self, scenes: Vec<SceneMaker>) {
         let mut queue = self.shared.queue();
         queue.stop_warming();
@@ -160,7 +160,7 @@ impl AsyncPipelineCompiler {
         self.shared.changed.notify_one();
     }
 
-    /// Forgets the scenes of [`AsyncPipelineCompiler::warm`] that are left.
+    /// Drops the scenes of [`AsyncPipelineCompiler::warm`] whose pipelines are not compiled yet.
     pub fn stop_warming(&self) {
         self.shared.queue().stop_warming();
     }

@@ -17,32 +17,32 @@ use std::ffi::CStr;
 use std::sync::Arc;
 use std::time::{Duration, SystemTime};
 
-/// A pipeline and the measurements of its compilation.
+/// A pipeline with measurements of its compilation.
 pub struct MeasuredPipeline {
-    /// The first pass that uses it.
+    /// The first pass, in the order of the scenes, that uses it.
     pub pass: &'static str,
     pub shader: &'static str,
     /// Specialization constants by name.
     pub constants: Vec<(&'static str, i32)>,
-    /// Formats of the inputs, in the order of the pass.
+    /// Formats of the inputs, in the order in which the pass declares them.
     pub formats: Vec<Format>,
-    /// The programs that the driver made of it. Empty without
+    /// The executables that the driver compiled for it. Empty without
     /// [`ContextOptions::compile_statistics`](super::ContextOptions::compile_statistics).
     pub executables: Vec<Executable>,
-    /// Time of compilation without any cache, also without the driver's own.
+    /// Compile time without any cache, the driver's own included.
     pub cold: Duration,
-    /// Time of compilation with a pipeline cache that holds the pipeline.
+    /// Compile time with a pipeline cache that holds the pipeline.
     pub warm: Duration,
-    /// True if the driver took the pipeline from the cache in the second case. `None` if the driver does not report it.
+    /// True if the driver took the pipeline from the cache when `warm` was measured. `None` if the driver does not report it.
     pub warm_hit: Option<bool>,
 }
 
-/// A program for the device. A pipeline may have several, of which the driver chooses one for a dispatch.
+/// An executable of a pipeline (VK_KHR_pipeline_executable_properties). A pipeline may have several, of which the driver chooses one for a dispatch.
 pub struct Executable {
     pub name: String,
     /// Number of invocations in a subgroup.
     pub subgroup: u32,
-    /// The driver's statistics under the driver's names.
+    /// The driver's statistics on it, by the driver's names.
     pub statistics: Vec<(String, f64)>,
 }
 
@@ -54,7 +54,7 @@ struct Target<'a> {
     args: DispatchArgs,
 }
 
-/// Measures every pipeline that these scenes need on a device with these shaders, each once, in the order of the scenes.
+/// Compiles and measures every pipeline that these scenes need on a device, each once, in the order of the scenes.
 ///
 /// # Errors
 /// The device cannot hold a scene, or a shader does not compile.

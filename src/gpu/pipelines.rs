@@ -27,42 +27,42 @@ use std::time::{Duration, Instant};
 pub struct Pipeline {
     context: Arc<Context>,
     pub module: Module,
-    /// Sampler of its filtered textures, owned by [`Pipelines`].
+    /// The linear sampler of its filtered textures; [`Pipelines`] owns it.
     pub sampler: vk::Sampler,
     pub(crate) set_layout: vk::DescriptorSetLayout,
     pub layout: vk::PipelineLayout,
     pub handle: vk::Pipeline,
-    /// Time of its compilation, and whether it came from a pipeline cache; the second is `None` if the driver does not report it.
+    /// Compile time, and whether the pipeline came from a pipeline cache (`None` if the driver does not report it).
     pub compilation: (Duration, Option<bool>),
-    /// Time of an invocation, measured on its last dispatches.
+    /// Time of an invocation, measured on the pipeline's last dispatches.
     pub time: Arc<InvocationTime>,
 }
 
-/// Key of a pipeline: shader, specialization constants, and for each input its format, which is part of the module, and whether it is read
-/// as a storage image or a texel buffer. The last may differ between slots, because a lookup table may be too large for a texel buffer.
+/// What determines a pipeline: shader, specialization constants, and for each input its format and whether it is read as a storage image or a texel
+/// buffer. The last may differ between slots, because a lookup table may be too large for a texel buffer.
 pub type Key = (&'static str, Vec<(&'static str, i32)>, Vec<(Format, bool)>);
 
-/// The input of a compilation: the SPIR-V as the device gets it, its reflected declarations, and constants by name.
+/// The input of a compilation: SPIR-V as the device gets it, its reflected declarations, and the values of specialization constants by name.
 pub struct Prepared {
     pub words: Vec<u32>,
     pub module: Module,
     pub constants: Vec<(&'static str, i32)>,
 }
 
-/// How a pipeline is compiled.
+/// The cache and the flags that a pipeline is compiled with.
 #[derive(Clone, Copy)]
 pub struct Compile {
     pub cache: vk::PipelineCache,
     pub flags: vk::PipelineCreateFlags,
 }
 
-/// Returns the SPIR-V words of a shader by name.
+/// A function that returns the SPIR-V words of a shader, given its path below glsl/ with the variant.
 pub type Shaders = dyn Fn(&str) -> Result<Vec<u32>, String> + Send + Sync;
 
 /// A pipeline that was compiled just now.
 type Compiled = (Key, Arc<Pipeline>);
 
-/// A cache of pipelines, so that returning to an earlier setting compiles nothing. Of the pipelines that no plan uses, the latest
+/// The compiled pipelines, so that returning to an earlier setting compiles nothing. Of the pipelines that no plan uses, the most recently used
 /// [`ContextOptions::max_unused_pipelines`](super::ContextOptions::max_unused_pipelines) are kept.
 pub struct Pipelines {
     context: Arc<Context>,
@@ -72,7 +72,7 @@ pub struct Pipelines {
     sampler: vk::Sampler,
 }
 
-/// The embedded shaders. Every call returns the same `Arc`.
+/// A function that returns the embedded shaders. Every call returns the same `Arc`.
 pub fn embedded() -> Arc<Shaders> {
     static EMBEDDED: LazyLock<Arc<Shaders>> = LazyLock::new(|| {
         Arc::new(|name| {
@@ -94,7 +94,7 @@ pub(crate) fn descriptor_type(kind: Kind) -> vk::DescriptorType {
 }
 
 impl Pipelines {
-    /// Pipelines of these shaders. Pipelines of the embedded shaders are shared by all renderers of a context: a second renderer of a scene
+    /// The pipelines of these shaders. Those of the embedded shaders are shared by all renderers of a context, so that a second renderer of a scene
     /// compiles nothing.
     ///
     /// # Errors
@@ -119,7 +119,7 @@ impl Pipelines {
         Ok(made)
     }
 
-    /// An empty cache of pipelines. No other renderer uses it, unlike that of [`Pipelines::shared`].
+    /// Makes an empty collection of pipelines that no other renderer uses, unlike that of [`Pipelines::shared`].
     ///
     /// # Errors
     /// The device cannot create the sampler.
@@ -141,7 +141,7 @@ impl Pipelines {
         Ok(Pipelines { context: context.clone(), made, shaders, texel_access, sampler })
     }
 
-    /// The key of the pipeline of a pass in a scene.
+    /// The key of the pipeline for a dispatch of a pass in a scene.
     pub fn key(&self, pass: &Pass, scene: &Scene, args: &DispatchArgs) -> Key {
         let inputs =
             pass.reads(scene, args).iter().map(|b| (b.slot.format(scene), self.stores(b.slot, scene))).collect();
@@ -157,7 +157,7 @@ impl Pipelines {
             }
     }
 
-    /// The pipeline of a key, if it is compiled.
+    /// The pipeline of a key. None if it is not compiled.
     pub fn cached(&self, key: &Key) -> Option<Arc<Pipeline>> {
         self.made().get(key)
     }
@@ -176,7 +176,7 @@ impl Pipelines {
         &self.context
     }
 
-    /// The pipeline of a pass in a scene, compiled at its first use.
+    /// The pipeline for a dispatch of a pass in a scene; it is compiled at its first use.
     ///
     /// # Errors
     /// The shader does not exist, or disagrees with the declaration of the pass.
@@ -191,11 +191,11 @@ impl Pipelines {
         Ok(pipeline)
     }
 
-    /// The pipelines of a plan, by step. Missing ones are compiled in parallel while `goes_on` returns true. It is called before the first
-    /// and after each with the number of compiled pipelines and the total. If it returns false, the rest is left out.
+    /// The pipelines of a plan, one for each step. Missing ones are compiled in parallel. Before the first and after each of them `goes_on` is called
+    /// with the number of compiled pipelines and the total; if it returns false, the rest is not compiled.
     ///
     /// # Errors
-    /// As of [`Pipelines::get`]: the first of the plan that fails. Those that were compiled are kept.
+    /// As of [`Pipelines::get`], for the first step that fails. Pipelines that were compiled are kept.
     pub(super) fn of_plan_while(
         &self,
         plan: &Plan,
@@ -207,8 +207,8 @@ impl Pipelines {
         steps
     }
 
-    /// Compiles the pipelines of a plan again that use `shaders`, and forgets all other pipelines that use them. Returns the pipelines of
-    /// the plan, by step. The device must have finished with the previous pipelines, and no other thread may compile any.
+    /// Compiles those pipelines of a plan again that use `shaders`, and drops all other pipelines that use them. Returns the pipelines of the plan,
+    /// one for each step. The device must have finished with the previous pipelines, and no other thread may compile any.
     ///
     /// # Errors
     /// As of [`Pipelines::of_plan_while`]; the previous pipelines stay.

@@ -11,13 +11,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread::JoinHandle;
 
-/// The compiled pipelines of a scene. A renderer that is made while this is held compiles none of them.
+/// The compiled pipelines of a scene. As long as this lives, a renderer that is made for the scene compiles none of them.
 pub struct Prepared {
     _compiler: SceneCompiler,
     _made: Vec<Arc<Pipeline>>,
 }
 
-/// Pipelines that are being compiled.
+/// The compilation in the background of the pipelines of a scene.
 pub struct Preparation {
     progress: Arc<Progress>,
     thread: Option<JoinHandle<Result<Prepared, GpuError>>>,
@@ -45,8 +45,8 @@ struct Progress {
 }
 
 impl Preparation {
-    /// Begins to compile the pipelines that a renderer of this scene with these options will need. `wake` is called after each pipeline and
-    /// at the end. None for shaders of a folder, because renderers do not share their pipelines.
+    /// Begins to compile the pipelines that a renderer of this scene with these options will need. `wake` is called after each pipeline and at the
+    /// end. None if the options have shaders from a folder, because renderers do not share the pipelines of those.
     ///
     /// # Errors
     /// The thread cannot be started.
@@ -87,7 +87,7 @@ impl Preparation {
         Ok(Some(Preparation { progress, thread: Some(thread) }))
     }
 
-    /// Number of compiled pipelines, and their total. Both are 0 before they are counted.
+    /// Number of pipelines that are compiled, and of all. Both are 0 until the number is known.
     pub fn progress(&self) -> [usize; 2] {
         [&self.progress.done, &self.progress.count].map(|count| count.load(Ordering::Relaxed))
     }
@@ -97,12 +97,12 @@ impl Preparation {
             || self.thread.as_ref().is_none_or(|thread| thread.is_finished())
     }
 
-    /// Begins no further pipeline. Does not wait for those that are being compiled.
+    /// Starts the compilation of no further pipeline, and does not wait for those that are being compiled.
     pub fn cancel(&self) {
         self.progress.is_cancelled.store(true, Ordering::Relaxed);
     }
 
-    /// Waits for the end. None if the thread panicked: the renderer then compiles the pipelines and reports the fault.
+    /// Waits until all are compiled. None if the thread panicked: the renderer then compiles the pipelines itself and reports the fault.
     ///
     /// # Errors
     /// The error with which a renderer of the scene would fail.

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::hash::Hash;
 use std::sync::Arc;
 
-/// Keeps a limited number of values that only the cache holds, and all values that others hold. The value added last is always kept.
+/// A cache that keeps all values that somebody else holds, and a limited number of others. The value added last is always kept.
 pub(crate) struct RecentlyUsed<K, V> {
     /// Each value, and the number of its last use.
     values: HashMap<K, (Arc<V>, u64)>,
@@ -24,7 +24,8 @@ impl<K: Hash + Eq + Clone, V> RecentlyUsed<K, V> {
         Some(value.clone())
     }
 
-    /// Adds a value, and returns the forgotten ones, so that the caller can release a lock before they are dropped.
+    /// Adds a value. Returns the values that were replaced or dropped from the cache, so that the caller can release a lock before they are
+    /// destroyed.
     #[must_use]
     pub fn insert(&mut self, key: K, value: Arc<V>) -> Vec<Arc<V>> {
         self.uses += 1;
@@ -38,7 +39,7 @@ impl<K: Hash + Eq + Clone, V> RecentlyUsed<K, V> {
         replaced.into_iter().chain(oldest.map(|(value, _)| value)).collect()
     }
 
-    /// Keeps the values whose keys fulfil `is_kept`.
+    /// Drops the values for whose keys `is_kept` is false.
     pub fn retain(&mut self, is_kept: impl Fn(&K) -> bool) {
         self.values.retain(|key, _| is_kept(key));
     }

@@ -19,11 +19,10 @@ use std::sync::Arc;
 pub struct Image {
     context: Arc<Context>,
     pub handle: vk::Image,
-    /// A view of the complete image.
+    /// A view of the complete image, all layers included.
     pub view: vk::ImageView,
-    /// For the frame array, a view from each layer to the last layer of its ring entry: a batch of frames begins with the first layer of
-    /// its view. Validation assumes that every layer of a view is read, so a view contains no layers of other entries, which may be
-    /// written.
+    /// For the frame array, one view for each layer: from that layer to the last one of its ring entry. A batch of frames begins with the first layer
+    /// of its view. Validation assumes that every layer of a view is read, so a view contains no layers of other entries, which may be being written.
     pub(crate) from_layer: Vec<vk::ImageView>,
     pub extent: vk::Extent3D,
     pub shape: Shape,
@@ -32,7 +31,7 @@ pub struct Image {
 }
 
 impl Image {
-    /// An image in layout UNDEFINED.
+    /// Makes an image of a slot, in layout UNDEFINED.
     ///
     /// # Errors
     /// Memory is exhausted, or the device fails.
@@ -105,13 +104,13 @@ impl Image {
         Ok(image)
     }
 
-    /// True if another image has its shape and format.
+    /// True if the other image has the same shape and format.
     #[cfg(feature = "view")]
     pub(super) fn is_like(&self, other: &Image) -> bool {
         (self.shape, self.format) == (other.shape, other.format)
     }
 
-    /// An image of the same slot, shape and format, in layout UNDEFINED.
+    /// Makes another image of the same slot, shape and format, in layout UNDEFINED.
     ///
     /// # Errors
     /// The device has no memory for it.
@@ -120,9 +119,8 @@ impl Image {
         Image::new(context, slot, self.shape, self.format)
     }
 
-    /// Records a copy of the complete image into another image of the same shape and format, whose last use is done. This image must be in
-    /// layout GENERAL and written before a barrier for copies. The other image is then in layout GENERAL, and its content is visible to
-    /// copies.
+    /// Records a copy of the complete image to `to`, an image of the same shape and format that nothing in flight uses. This image must be in layout
+    /// GENERAL and written before a barrier for copies. Afterwards `to` is in layout GENERAL, and its content is visible to copies.
     #[cfg(feature = "view")]
     pub(super) fn copy_to(&self, device: &ash::Device, commands: vk::CommandBuffer, to: &Image) {
         let (stage, general) = (vk::PipelineStageFlags2::ALL_TRANSFER, vk::ImageLayout::GENERAL);
@@ -156,7 +154,7 @@ impl Image {
         barrier(general, [write, vk::AccessFlags2::TRANSFER_READ]);
     }
 
-    /// Its shape, and the bytes of a texel.
+    /// The image's shape, and the number of bytes of a texel.
     pub fn layout(&self) -> (Shape, usize) {
         (self.shape, self.format.texel_bytes())
     }
@@ -180,7 +178,7 @@ impl Image {
     }
 }
 
-/// All layers of the only mip level.
+/// The subresource range of all layers of a color image's only mip level.
 pub const WHOLE: vk::ImageSubresourceRange = vk::ImageSubresourceRange {
     aspect_mask: vk::ImageAspectFlags::COLOR,
     base_mip_level: 0,
@@ -205,13 +203,13 @@ impl Drop for Image {
     }
 }
 
-/// The memory of a slot.
+/// The image or buffer of a slot.
 pub enum Resource {
     Image(Image),
     Buffer(Buffer),
 }
 
-/// The allocated slots, by slot and number of the volume image.
+/// The images and buffers of all slots, by slot and index of the volume image.
 pub(crate) struct SlotResources {
     context: Arc<Context>,
     resources: BTreeMap<(Slot, u32), Resource>,
@@ -224,8 +222,8 @@ impl SlotResources {
         SlotResources { context: context.clone(), resources: BTreeMap::new(), images }
     }
 
-    /// Allocates the slots of the plan that are missing or have another shape, and frees those that it does not need. Returns the new
-    /// images, which are in layout UNDEFINED. They must be cleared, which moves them to GENERAL, before their first use.
+    /// Allocates the slots of the plan that are missing or have another shape, and frees those that it does not need. Returns the new images (slot,
+    /// index of the volume image), which are in layout UNDEFINED. They must be cleared, which moves them to GENERAL, before their first use.
     ///
     /// # Errors
     /// The device cannot hold a slot; then nothing new is kept.
@@ -247,7 +245,8 @@ impl SlotResources {
         Ok(new)
     }
 
-    /// Writes a slot that the CPU computes from the scene, if it is a buffer. Images are uploaded through staging instead.
+    /// Writes the content of a slot that the CPU computes from the scene, if the slot is a buffer. Images are uploaded through staging buffers
+    /// instead.
     pub fn fill(&mut self, slot: Slot, scene: &Scene) {
         if let (Initializer::ByScene(make), Some(Resource::Buffer(buffer))) =
             (slot.initializer(), self.resources.get_mut(&(slot, 0)))
@@ -257,7 +256,7 @@ impl SlotResources {
         }
     }
 
-    /// The memory of a slot.
+    /// The image or buffer of a slot; for a multibuffered slot, the copy of volume image `image`.
     ///
     /// # Panics
     /// If the plan has no such slot. A plan lists every slot that its passes declare.
@@ -283,7 +282,7 @@ impl SlotResources {
         }
     }
 
-    /// Frees everything.
+    /// Frees all slots.
     pub fn clear(&mut self) {
         self.resources.clear();
     }

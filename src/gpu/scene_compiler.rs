@@ -10,7 +10,7 @@ use crate::scene::Scene;
 use std::collections::HashSet;
 use std::sync::Arc;
 
-/// Plans scenes and compiles their pipelines.
+/// Makes plans of scenes and compiles their pipelines, at once or in the background.
 pub(super) struct SceneCompiler {
     /// Started at its first use. It ends before the pipelines do.
     background: Option<AsyncPipelineCompiler>,
@@ -21,7 +21,10 @@ pub(super) struct SceneCompiler {
 }
 
 impl SceneCompiler {
-    /// As the fields of the same names of [`super::RendererOptions`].
+    /// The arguments have the meaning of the fields of the same names of [`super::RendererOptions`].
+    ///
+    /// # Errors
+    /// The device fails.
     pub fn new(
         context: &Arc<Context>,
         shaders: &Arc<Shaders>,
@@ -39,7 +42,7 @@ impl SceneCompiler {
         self.texel_access
     }
 
-    /// The scene with the fields that the device resolves, and its plan.
+    /// The scene with the fields that depend on the device set, and its plan.
     pub fn plan(&self, scene: Scene) -> (Scene, Plan) {
         let adapted = formats::adapt_scene(self.pipelines.context(), self.texel_access, scene);
         let scene = Scene { frames_at_once: self.frames_at_once.unwrap_or(adapted.frames_at_once), ..adapted };
@@ -47,7 +50,7 @@ impl SceneCompiler {
         (scene, plan)
     }
 
-    /// The pipelines of a plan, by step. The rest is as of [`Pipelines::of_plan_while`].
+    /// The pipelines of a plan, one for each step. `goes_on` as for [`Pipelines::of_plan_while`].
     ///
     /// # Errors
     /// The device cannot hold a slot, or a shader does not compile.
@@ -61,7 +64,7 @@ impl SceneCompiler {
         self.pipelines.of_plan_while(plan, scene, goes_on)
     }
 
-    /// The pipelines of a plan, by step.
+    /// The pipelines of a plan, one for each step.
     ///
     /// # Errors
     /// The device cannot hold a slot, or a shader does not compile.
@@ -69,7 +72,7 @@ impl SceneCompiler {
         self.compile_while(plan, scene, &|_, _| true)
     }
 
-    /// The pipelines of a plan, of which those that use `shaders` are compiled again.
+    /// The pipelines of a plan, one for each step, after those that use `shaders` were compiled again.
     pub(crate) fn recompile(
         &mut self,
         shaders: &HashSet<String>,
@@ -79,15 +82,15 @@ impl SceneCompiler {
         self.pipelines.recompile(shaders, plan, scene)
     }
 
-    /// Ends what is compiled in the background, which may be the previous source of a shader.
+    /// Ends compilation in the background, which may use the previous source of a shader.
     pub fn stop(&mut self) {
         self.background = None;
     }
 
-    /// True if every pipeline of the scene is compiled. Those that are not are compiled in the background from now on.
+    /// True if every pipeline of the scene is compiled. Otherwise the missing ones are compiled in the background from now on.
     ///
     /// # Errors
-    /// A shader that does not compile, a slot (an image or a buffer) that the device cannot hold, a thread that cannot be started.
+    /// A shader does not compile, the device cannot hold a slot, or the thread cannot be started.
     pub fn prepare(&mut self, scene: &Scene) -> Result<bool, GpuError> {
         let (scene, plan) = self.plan(scene.clone());
         formats::check(self.pipelines.context(), &plan, &scene)?;

@@ -2,10 +2,10 @@
 
 use crate::shader_source::Source;
 
-/// Compiles one variant. A warning is an error.
+/// Compiles one variant of a shader with shaderc. A warning is an error.
 ///
 /// # Errors
-/// The shader's name and the compiler's words.
+/// The shader's name and the compiler's message.
 pub fn compile(compiler: &shaderc::Compiler, source: &Source) -> Result<Vec<u32>, String> {
     let mut options = shaderc::CompileOptions::new().map_err(|e| e.to_string())?;
     options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_3 as u32);

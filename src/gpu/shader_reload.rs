@@ -17,7 +17,7 @@ use std::time::{Duration, SystemTime};
 /// needs no crate, and works where the kernel reports nothing, such as on network drives, and with editors that replace files.
 const LOOK: Duration = Duration::from_millis(250);
 
-/// A folder of GLSL sources, and the SPIR-V that was compiled from them so far.
+/// A folder of GLSL sources, and the SPIR-V that was compiled from it so far.
 pub struct ShaderFolder {
     glsl: PathBuf,
     compiler: Compiler,
@@ -59,7 +59,7 @@ impl ShaderFolder {
         Ok(Arc::new(ShaderFolder { glsl: glsl.into(), compiler, state }))
     }
 
-    /// The shaders of this folder. One that does not compile is an error.
+    /// A function that returns the shaders of this folder. A shader that does not compile is an error.
     pub fn shaders(self: &Arc<ShaderFolder>) -> Arc<Shaders> {
         let folder = self.clone();
         // Whoever asks names the shader itself.
@@ -71,8 +71,8 @@ impl ShaderFolder {
         })
     }
 
-    /// The shaders of this folder. One that does not compile is reported by [`ShaderFolder::fault`], and the embedded one takes its
-    /// place.
+    /// A function that returns the shaders of this folder. For one that does not compile it returns the embedded shader, and [`ShaderFolder::fault`]
+    /// reports the fault.
     pub fn shaders_or_embedded(self: &Arc<ShaderFolder>) -> Arc<Shaders> {
         let (folder, embedded) = (self.clone(), embedded());
         Arc::new(move |name| folder.words(name).or_else(|fault| embedded(name).map_err(|_| fault)))
@@ -100,7 +100,7 @@ impl ShaderFolder {
         made
     }
 
-    /// The reason why the current sources are not shown: the first fault, several lines. None if there is no fault.
+    /// Why the present sources are not in use: the first fault, in several lines. None if there is no fault.
     pub fn fault(&self) -> Option<String> {
         let state = self.state();
         state
@@ -112,8 +112,8 @@ impl ShaderFolder {
             .cloned()
     }
 
-    /// The shaders that were compiled again since the last call, if any: their pipelines are out of date. Refused shaders are among them
-    /// until pipelines of them are accepted.
+    /// The shaders that were compiled again since the last call, whose pipelines are thus out of date. None if there are none. Refused shaders are
+    /// among them until pipelines of them are accepted.
     pub fn take_changed(&self) -> Option<HashSet<String>> {
         let mut state = self.state();
         let mut changed = std::mem::take(&mut state.changed);
@@ -123,13 +123,13 @@ impl ShaderFolder {
         Some(changed).filter(|changed| !changed.is_empty())
     }
 
-    /// Notes that no pipelines can be made of these shaders although they compile, and the reason.
+    /// Notes that no pipelines can be made of these shaders although they compile. `fault`: the reason.
     pub fn refuse(&self, shaders: HashSet<String>, fault: String) {
         tracing::warn!("{fault}");
         self.state().refused = Some((shaders, fault));
     }
 
-    /// Notes that pipelines were made of all changed shaders.
+    /// Notes that pipelines were made of all shaders of [`ShaderFolder::take_changed`].
     pub fn accept(&self) {
         self.state().refused = None;
     }
@@ -200,7 +200,7 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// Starts the thread. `wake` is called when shaders or faults changed.
+    /// Starts the thread. `wake` is called when shaders or the fault changed.
     ///
     /// # Errors
     /// The thread cannot be started.

@@ -4,14 +4,14 @@
 use std::path::Path;
 use std::sync::Arc;
 
-/// Options of every compilation. A change of them changes every shader.
+/// The compiler's options as the hash of every shader contains them, so that a change of them changes every hash.
 pub(crate) const OPTIONS: &str = "vulkan1.3 spirv1.5 -O -g auto-bind";
 
-/// A variant of a shader to compile.
+/// A variant of a shader with its source text.
 pub struct Source {
-    /// Path below glsl/ without extension, and the variant: `filter/sigma.slice`. Passes use this name.
+    /// Path below glsl/ without extension, and the variant, such as `filter/sigma.slice`. Passes name shaders so.
     pub name: String,
-    /// Macros defined for this variant.
+    /// Macros that are defined for this variant.
     pub defines: Vec<String>,
     /// The text with all includes expanded.
     pub text: String,
@@ -105,13 +105,13 @@ fn version_first(lines: Vec<(String, Origin)>) -> (String, Vec<Origin>) {
 }
 
 impl Source {
-    /// The text whose hash the SOURCES file holds.
+    /// The text whose hash is in the file spirv/SOURCES.
     pub fn fingerprint(&self) -> String {
         format!("{OPTIONS}\n{}\n{}", self.defines.join(" "), self.text)
     }
 
-    /// A compiler's message with the places of the files that were edited: `file:LINE:` of the expanded text becomes, for example,
-    /// `include/ray.glsl:12:`. `file` is the name that the compiler was given.
+    /// A compiler's message with lines of the edited files: `file:LINE:` of the expanded text becomes, for example, `include/ray.glsl:12:`. `file` is
+    /// the name that the compiler was given.
     pub(crate) fn with_origins(&self, message: &str, file: &str) -> String {
         let place = format!("{file}:");
         let mut parts = message.split(place.as_str());

@@ -10,12 +10,12 @@ use std::process::{Command, Stdio};
 const NONE: &str = "there is no shader compiler: install glslc (Debian: apt-get install glslc) or glslangValidator \
                     (Debian: apt-get install glslang-tools), or build with `--features hot-reload`";
 
-/// A compiler of shaders.
+/// A compiler from GLSL to SPIR-V.
 pub enum Compiler {
     #[cfg(feature = "hot-reload")]
     Shaderc,
     Glslc(PathBuf),
-    /// glslang itself does not optimise for speed. `spirv-opt` does, if it is installed.
+    /// `glslangValidator`, which does not optimise for speed; `spirv-opt` does that afterwards, if it is installed.
     Glslang {
         validator: PathBuf,
         optimizer: Option<PathBuf>,

@@ -9,11 +9,11 @@ use ash::vk;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-/// A submission is done when its queue's timeline has reached its value.
+/// The timeline semaphore of a queue. A submission is done when the timeline has reached the submission's value.
 pub(crate) struct Timeline {
     context: Arc<Context>,
     pub(super) semaphore: vk::Semaphore,
-    /// The value of the last submission.
+    /// The timeline value of the last submission.
     pub submitted: u64,
     /// Name of the last submission.
     label: String,
@@ -22,14 +22,14 @@ pub(crate) struct Timeline {
     paced: Option<Mutex<Paced<(u64, Submission)>>>,
 }
 
-/// Recorded commands, and what orders them.
+/// A recorded command buffer to submit, and what it waits for.
 pub(super) struct Submission {
     pub queue: usize,
     pub commands: vk::CommandBuffer,
-    /// Semaphores of other queues, and the values to wait for.
+    /// Timeline semaphores of other queues, with the values to wait for.
     pub waits: Vec<(vk::Semaphore, u64)>,
     pub label: &'static str,
-    /// Expected time, ns; 0 if it is short or not known.
+    /// Expected GPU time, ns; 0 if it is short or not known.
     pub expected: f64,
 }
 
@@ -45,7 +45,7 @@ impl Timeline {
         Ok(Timeline { context, semaphore, submitted: 0, label, progress, paced: None })
     }
 
-    /// Counts a submission that signals `submitted + 1`, made elsewhere. Nothing may be held back.
+    /// Counts a submission that was made elsewhere and signals `submitted + 1`. Nothing may be held back.
     #[cfg(feature = "view")]
     pub(super) fn advance(&mut self, label: &str) {
         self.submitted += 1;
@@ -53,10 +53,10 @@ impl Timeline {
         self.progress(|progress| progress.submitted(self.submitted, Instant::now()));
     }
 
-    /// Submits, or holds back where the device has enough to do. Returns the value at which the work is done.
+    /// Submits the work, or holds it back while the device has enough to do. Returns the timeline value at which it is done.
     ///
     /// # Errors
-    /// A device that fails. The work then counts as not submitted.
+    /// The device fails. The work then counts as not submitted.
     pub(super) fn submit(&mut self, work: Submission) -> Result<u64, GpuError> {
         let (value, label) = (self.submitted + 1, work.label);
         match &self.paced {
@@ -99,10 +99,10 @@ impl Timeline {
         Ok(())
     }
 
-    /// Submits what is held back up to this value.
+    /// Submits everything that is held back up to this timeline value.
     ///
     /// # Errors
-    /// A device that fails. What is not submitted stays held back.
+    /// The device fails. What was not submitted stays held back.
     pub(super) fn release(&self, value: u64) -> Result<(), GpuError> {
         let Some(paced) = &self.paced else { return Ok(()) };
         let mut paced = paced.lock().unwrap_or_else(|e| e.into_inner());
@@ -149,7 +149,7 @@ impl Timeline {
         self.busy_since().elapsed()
     }
 
-    /// Blocks until a submission is done.
+    /// Blocks until the submission with this timeline value is done.
     ///
     /// # Errors
     /// The device fails, or is given up because it does not finish.
@@ -178,7 +178,7 @@ impl Timeline {
         self.wait(self.submitted)
     }
 
-    /// True if a submission is done; does not wait. Submits what is held back and due.
+    /// True if the submission with this timeline value is done; does not wait. It also submits what is held back and due.
     ///
     /// # Errors
     /// The device fails, or is given up because it does not finish.
@@ -195,8 +195,8 @@ impl Timeline {
         Ok(false)
     }
 
-    /// Waits for all submissions, and if that fails for an idle device. Call it before resources in flight are destroyed. If the device was
-    /// lost or given up, it returns at once; after giving up, nothing is destroyed.
+    /// Waits for all submissions, or, if that fails, for an idle device. Call it before resources in flight are destroyed. If the device was lost or
+    /// given up, it returns at once; after giving up, nothing is destroyed.
     pub fn drain(&self) {
         if self.wait_all().is_err() {
             let _ = self.context.wait_idle();
@@ -212,14 +212,15 @@ impl Timelines {
         (0..queues).map(|_| Timeline::new(context)).collect::<Result<_, _>>().map(Timelines)
     }
 
-    /// From now on, submissions are held back where the device has this much to do. Of several queues, which wait for each other, none is.
+    /// From now on, submissions are held back while the device has work of this expected time. With several queues, which wait for each other,
+    /// nothing is held back.
     pub(super) fn pace(&mut self, most: Duration) {
         if let [only] = &mut self.0[..] {
             only.paced = Some(Mutex::new(Paced::new(most)));
         }
     }
 
-    /// Submits what is held back.
+    /// Submits everything that is held back.
     ///
     /// # Errors
     /// The device fails.

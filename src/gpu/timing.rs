@@ -10,7 +10,7 @@ use ash::vk;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// The operations that are timed.
+/// Which operations are timed on the device.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum TimeStamps {
     /// Nothing.
@@ -24,7 +24,7 @@ pub enum TimeStamps {
     EachPass,
 }
 
-/// The time stamps of one recording, which may be several command buffers.
+/// The time stamp queries of one recording, which may be several command buffers.
 pub(crate) struct Stamps {
     context: Arc<Context>,
     pool: vk::QueryPool,
@@ -52,18 +52,18 @@ struct Interval {
     runs: u32,
 }
 
-/// The work between two time stamps, in ticks of the device.
+/// The time stamps before and after some work, in ticks of the device.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stamp {
     pub name: &'static str,
     pub from: u64,
     pub to: u64,
     pub invocations: Option<u64>,
-    /// Number of runs that the work counts as. 0 if it goes on in the next submission.
+    /// Number of runs that the work counts as: one for each frame of a batch, 0 if the work goes on in the next submission.
     pub runs: u32,
 }
 
-/// Time between two stamps, ns. `valid_bits`: number of bits of the counter, which wraps; `period`: ns per tick.
+/// Time between two time stamps, ns. `valid_bits`: number of bits of the counter, which wraps around; `period`: ns per tick.
 pub fn elapsed(from: u64, to: u64, valid_bits: u32, period: f32) -> f64 {
     let mask = if valid_bits >= 64 { u64::MAX } else { (1 << valid_bits) - 1 };
     (to.wrapping_sub(from) & mask) as f64 * f64::from(period)
@@ -77,7 +77,8 @@ fn signed_ticks(from: u64, to: u64, valid_bits: u32) -> i64 {
 }
 
 impl Stamps {
-    /// `None` if the queue has no time stamps. With `statistics`, invocations are counted too, if the device can.
+    /// Makes the queries for `capacity` stamps. `None` if the queue has no time stamps. With `statistics`, invocations are counted too, if the device
+    /// can.
     pub fn new(
         context: &Arc<Context>,
         queue: usize,
@@ -133,13 +134,13 @@ impl Stamps {
         (self.written, self.counted, self.left_out, self.since) = (0, 0, 0, None);
     }
 
-    /// Writes the stamp that the next interval begins with.
+    /// Writes the stamp at which the next interval begins.
     pub(super) fn start(&mut self, commands: vk::CommandBuffer) {
         self.since = self.stamp(commands);
     }
 
-    /// Writes a stamp: the work since the last one is called `name` and counts as so many runs. Once the capacity is used up, it is only
-    /// counted.
+    /// Writes the stamp at which an interval ends: the work since the last stamp is called `name` and counts as `runs` runs. Once the capacity is
+    /// used up, runs are only counted. `work`: dispatches whose expected times the measured time will update.
     pub(super) fn end_of(&mut self, commands: vk::CommandBuffer, name: &'static str, runs: u32, work: Vec<Work>) {
         let from = self.since;
         self.since = self.stamp(commands);
@@ -151,7 +152,7 @@ impl Stamps {
         }
     }
 
-    /// The last interval goes on in the next submission.
+    /// Notes that the work of the last interval goes on in the next submission.
     pub(super) fn continues(&mut self) {
         self.intervals.iter_mut().last().into_iter().for_each(|last| last.runs = 0);
     }
@@ -193,17 +194,20 @@ impl Stamps {
         Some(at)
     }
 
-    /// Number of runs that were stamped, or would have been.
+    /// Number of runs that were stamped, or would have been if there had been room.
     pub(super) fn count(&self) -> u64 {
         self.intervals.iter().map(|interval| u64::from(interval.runs)).sum::<u64>() + self.left_out
     }
 
-    /// Number of runs for which there was no room.
+    /// Number of runs that were not stamped, because the capacity was used up.
     pub(super) fn left_out(&self) -> u64 {
         self.left_out
     }
 
-    /// The measured work. The device must have finished the recording. The measured times are also noted for each pass.
+    /// Reads the stamps, one entry for each interval, and updates the expected times of its dispatches. The device must have finished the recording.
+    ///
+    /// # Errors
+    /// The device fails.
     pub fn read(&self, valid_bits: u32, period: f32) -> Result<Vec<Stamp>, GpuError> {
         let ticks = self.results(self.pool, self.written)?;
         let counts = match self.statistics {
@@ -243,7 +247,7 @@ impl Drop for Stamps {
     }
 }
 
-/// Times measured since they were last taken.
+/// Times of passes, spans and CPU times that were measured since they were last taken.
 pub(crate) struct Timings {
     times: Vec<PassTime>,
     /// Passes and copies that could not be timed.
@@ -288,7 +292,7 @@ impl Timings {
         self.cpu.is_some()
     }
 
-    /// The CPU time of all threads since the last call was that of this pass; of none if it has no name.
+    /// Assigns the CPU time of all threads since the last call to this pass; with None, to no pass.
     pub fn cpu_of(&mut self, pass: Option<&'static str>) {
         let Some(log) = &mut self.cpu else { return };
         let Some(now) = CpuTime::now() else { return };
@@ -301,7 +305,7 @@ impl Timings {
         self.cpu.as_mut().map(|log| std::mem::take(&mut log.passes)).unwrap_or_default()
     }
 
-    /// Largest error of the position of device times on the host's clock, ns. `None` if the device's clock cannot be read.
+    /// Largest error of the position of device times on the host's clock, ns. `None` without spans, or if the device's clock cannot be read.
     pub fn clock_deviation(&self) -> Option<u64> {
         self.spans.as_ref()?.deviation
     }
@@ -311,7 +315,7 @@ impl Timings {
         self.spans.as_ref().map(|spans| spans.began.elapsed().as_nanos() as f64)
     }
 
-    /// Records host work that began at this time, if spans are enabled, and ends now.
+    /// Records the span of host work from `begin` (as of [`Timings::since_began`]) until now, if spans are enabled.
     pub(super) fn add_host(&mut self, name: &'static str, begin: Option<f64>) {
         if let (Some(begin), Some(end), Some(spans)) = (begin, self.since_began(), &mut self.spans) {
             spans.list.push(Span { name, on_device: false, begin, end, runs: 1, invocations: None });
@@ -342,7 +346,7 @@ impl Timings {
         }
     }
 
-    /// Counts work that cannot be timed.
+    /// Counts passes and copies that cannot be timed.
     pub fn leave_out(&mut self, count: u64) {
         self.untimed += count;
     }

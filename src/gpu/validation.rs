@@ -9,11 +9,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// The first version whose synchronization validation handles timeline semaphores (Vulkan-ValidationLayers #8559, September 2024).
 const KNOWS_TIMELINES: u32 = vk::make_api_version(0, 1, 3, 297);
 
-/// The installed layer.
+/// The validation layer that is installed.
 #[derive(Clone, Copy, Debug)]
 pub struct Layer {
     version: u32,
-    /// Whether the layer takes its settings from the program that creates the instance, as it does since January 2024.
+    /// True if the layer takes its settings from the program that creates the instance (VK_EXT_layer_settings), as it does since January 2024.
     pub(crate) has_settings: bool,
 }
 
@@ -37,14 +37,14 @@ impl Layer {
         self.version >= KNOWS_TIMELINES
     }
 
-    /// The layer's own extension by which the instance asks for synchronization validation.
+    /// The extension of the layer through which the instance enables synchronization validation.
     pub fn extension(self) -> &'static CStr {
         if self.has_settings { ash::ext::layer_settings::NAME } else { ash::ext::validation_features::NAME }
     }
 }
 
-/// The settings for a layer that takes settings. Since 2024 synchronization validation ignores the accesses of shaders unless the second
-/// setting is on. It assumes that a shader accesses every descriptor that it names, which all shaders here do.
+/// The settings for a layer that takes settings. Since 2024 synchronization validation ignores the accesses of shaders unless the second setting is
+/// on. It then assumes that a shader accesses every descriptor that it names, which all shaders here do.
 pub fn settings() -> [vk::LayerSettingEXT<'static>; 2] {
     const ON: &vk::Bool32 = &vk::TRUE;
     [c"validate_sync", c"syncval_shader_accesses_heuristic"].map(|name| {
@@ -59,7 +59,7 @@ pub fn settings() -> [vk::LayerSettingEXT<'static>; 2] {
     })
 }
 
-/// What is asked of a layer that takes none.
+/// The features that are enabled in a layer that takes no settings.
 pub(crate) const FEATURES: &[vk::ValidationFeatureEnableEXT] =
     &[vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
 
@@ -77,6 +77,8 @@ pub(crate) struct Messenger {
 }
 
 impl Messenger {
+    /// Begins to collect messages.
+    ///
     /// # Errors
     /// The instance runs out of memory.
     pub fn new(entry: &ash::Entry, instance: &ash::Instance, layer: Layer) -> Result<Messenger, GpuError> {
@@ -101,12 +103,12 @@ impl Messenger {
         self.messages.lock().unwrap_or_else(|e| e.into_inner()).clone()
     }
 
-    /// The layer is one of those that do not see that a timeline is waited for.
+    /// True if the layer is one of those that do not see waits for timelines.
     pub(super) fn misses_waits(&self) -> bool {
         !self.layer.knows_timelines()
     }
 
-    /// To be called after a wait for a timeline: true if the layer, which did not see it, should be shown an idle queue now.
+    /// True if the layer, which does not see waits for timelines, should be shown an idle queue now. Call it after such a wait.
     pub(super) fn needs_an_idle_queue(&self) -> bool {
         self.misses_waits() && self.unseen_waits.fetch_add(1, Ordering::Relaxed).is_multiple_of(UNSEEN_WAITS)
     }
@@ -119,10 +121,9 @@ impl Drop for Messenger {
     }
 }
 
-/// Passes that write the slices near new frames with a dispatch for each run of slices, and their shaders. Layers from 2024 on assume that
-/// every access through a view is one to the whole image. Such dispatches write different slices of one 3D image without a barrier between
-/// them, because none is needed, and the layer reports a write after a write. Where two of them do write the same slice, the barrier oracle
-/// of the tests notices a missing barrier.
+/// Passes that write the slices near new frames with one dispatch for each run of slices, and their shaders. The layer reports a write after a write
+/// for them: since 2024 it assumes that every access through a view is to the whole image. The dispatches write different slices of one 3D image, so
+/// no barrier is needed between them. Where two of them do write the same slice, the barrier oracle of the tests notices a missing barrier.
 pub const WRITERS_OF_RUNS: [(&str, &str); 6] = [
     ("tile_ranges", "empty_space/tile_ranges"),
     ("gaussian_elevation", "filter/gaussian"),

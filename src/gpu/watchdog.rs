@@ -19,7 +19,7 @@ const GPU_DEADLINE: Duration = Duration::from_secs(5);
 /// Longest time that a device may take for a submission before it is given up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Deadline {
-    /// 5 s on a GPU; none on a software device, which may need minutes for a picture.
+    /// 5 s on a GPU; no limit on a software device, which may need minutes for a picture.
     #[default]
     ByDevice,
     Never,
@@ -27,7 +27,7 @@ pub enum Deadline {
 }
 
 impl Deadline {
-    /// The deadline on a device.
+    /// The longest time on this kind of device. None: no limit.
     pub(super) fn on_device(self, is_software: bool) -> Option<Duration> {
         match self {
             Deadline::ByDevice => (!is_software).then_some(GPU_DEADLINE),
@@ -83,7 +83,7 @@ impl GivenUp {
     }
 }
 
-/// Watches the waits of a context.
+/// Gives up a device that does not finish in time, for all waits of a context.
 pub(crate) struct Watchdog {
     deadline: Option<Duration>,
     /// True once the program is to end.
@@ -111,14 +111,16 @@ impl Watchdog {
         why.error(operation())
     }
 
+    /// Checks that the device was not given up. `operation`: what is about to be done, for the error.
+    ///
     /// # Errors
     /// The device was given up before.
     pub fn check(&self, operation: impl FnOnce() -> String) -> Result<(), GpuError> {
         self.given_up().map_or(Ok(()), |why| Err(why.error(operation())))
     }
 
-    /// Gives the device up if it has been busy since `since` for longer than the deadline. If the program was stopped meanwhile, the time
-    /// begins again when it goes on, once.
+    /// Gives the device up if it has been busy since `since` for longer than the deadline. If the program or its machine was suspended meanwhile, the
+    /// time starts again when it goes on, but only once.
     ///
     /// # Errors
     /// The device is given up.
@@ -130,8 +132,8 @@ impl Watchdog {
         }
     }
 
-    /// Waits by `attempt`, which gets a time-out in ns and returns [`vk::Result::TIMEOUT`] after it. `since` says since when the device
-    /// has been busy without any progress.
+    /// Waits by calling `attempt` repeatedly. It gets a time-out in ns, and returns [`vk::Result::TIMEOUT`] if that passes. `since` returns since
+    /// when the device has been busy without any progress.
     ///
     /// # Errors
     /// The device is given up, because it is late or a stop was requested, or `attempt` fails.
@@ -156,13 +158,13 @@ impl Watchdog {
         }
     }
 
-    /// Fault injection: the device appears not to finish.
+    /// Fault injection: gives the device up as if it had not finished in time, and returns that error.
     pub(crate) fn inject_lateness(&self, operation: impl FnOnce() -> String) -> GpuError {
         self.give_up(GivenUp::Late(self.deadline.unwrap_or_default()), operation)
     }
 }
 
-/// Tells since when a queue has been busy without progress. Submissions finish in their order.
+/// Keeps track of since when a queue has been busy without progress. Submissions finish in their order.
 #[derive(Debug, Default)]
 pub struct Progress {
     /// The number of each submission that was not seen done, and when it was made.

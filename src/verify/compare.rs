@@ -8,19 +8,20 @@ use crate::picture::Picture;
 use crate::report::{Fault, Figure, PictureComparison, Unit, Worst};
 use crate::scene::Scene;
 
-/// Errors of the outputs of one dispatch.
+/// How far the outputs of one dispatch are from those of the reference. "Within tolerance" refers to the tolerance of the pass, the rounding of the
+/// format and the [`ExtraTolerance`] together.
 #[derive(Clone, Debug, Default)]
 pub struct Comparison {
     /// Largest error of the texels within tolerance, in the units of the output.
     pub largest: f64,
-    /// Largest error of the texels within tolerance, as a share of the allowed error.
+    /// Largest error of the texels within tolerance, divided by the error that is allowed there (0..1).
     pub used: f64,
-    /// Share of the texels beyond tolerance, minus the additionally allowed share; the largest of all outputs.
+    /// Share of the texels beyond tolerance, less the share that is allowed additionally; the largest of all outputs.
     pub outliers: f64,
-    /// Mean signed error of the texels within tolerance, as a share of the allowed error. Rounding errors have both signs, so it is small.
-    /// The maximum over all outputs that have enough written texels.
+    /// Mean signed error of the texels within tolerance, divided by the error that is allowed there; the largest of all outputs that have enough
+    /// written texels. It is small if errors are roundings, which have both signs.
     pub bias: f64,
-    /// The worst texel of an output that has more texels beyond tolerance than its pass allows.
+    /// The worst texel of an output that has more texels beyond tolerance than its pass allows; None if no output has.
     pub worst: Option<Worst>,
 }
 
@@ -37,22 +38,22 @@ fn is_float(format: Format) -> bool {
 /// Passes whose outputs differ by no more than their samples: their largest, smallest and mean, and sections.
 const SMOOTH: [&str; 3] = ["raycast_projection", "raycast_planes", "raycast_planes_toned"];
 
-/// Tolerance in addition to that of the pass.
+/// What is tolerated in addition to the tolerance that a pass declares.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ExtraTolerance {
-    /// For values from 0 to 1.
+    /// Largest additional error of values from 0 to 1.
     pub value: f64,
-    /// For distances, mm.
+    /// Largest additional error of distances, mm.
     pub distance: f64,
-    /// Share of texels.
+    /// Additional share (0..1) of texels that may have a larger error.
     pub outliers: f64,
 }
 
 impl ExtraTolerance {
-    /// The extra tolerance of a pass that samples with the device's texture filter: weights of `bits` bits, possibly truncated, along three
-    /// axes, between neighbours that differ by at most 1. If a pass compares samples with a threshold or looks them up in a transfer
-    /// function, a small difference may become a large one. Then a share of the texels may be wrong: a threshold is reached a step earlier
-    /// or later, and rarely in another voxel. The group "sampling" judges single samples.
+    /// The extra tolerance for a dispatch that samples through the device's texture filter, whose weights have `bits` bits and may be truncated along
+    /// three axes; zero for others. Neighbours differ by at most 1. If a pass compares samples with a threshold or looks them up in a transfer
+    /// function, a small difference may become a large one. Then a share of the texels may be wrong: a threshold is reached a step earlier or later,
+    /// and rarely in another voxel. The group "sampling" judges single samples.
     pub fn of(pass: &Pass, scene: &Scene, args: &DispatchArgs, bits: u32) -> ExtraTolerance {
         if !pass.reads(scene, args).iter().any(|bind| bind.filtered) {
             return ExtraTolerance::default();
@@ -70,8 +71,8 @@ impl ExtraTolerance {
     }
 }
 
-/// The largest error that is allowed of a value of an output, in its units: the tolerance of the pass, the rounding of the format, and
-/// what the device's filter may add.
+/// The largest error that is allowed of a value of an output whose expected value is `expected`, in its units: the tolerance of the pass, the
+/// rounding of the format, and what `extra` allows.
 pub(super) fn tolerance_of(pass: &Pass, extra: ExtraTolerance, slot: Slot, format: Format, expected: f64) -> f64 {
     let tolerance = pass.tolerance.absolute.max(pass.tolerance.relative * expected.abs());
     tolerance + 1.01 * Texels::spacing(format, expected) + extra.at(slot)
@@ -155,7 +156,8 @@ pub fn compare_outputs(
 const MAX_MEAN: f64 = 0.2;
 /// Difference above which a value is far off, levels.
 const FAR_LEVELS: u8 = 8;
-/// Maximum share of values that are far off: edges may move by a pixel where a threshold of a detector or shadow is met.
+/// Largest share (0..1) of channel values of a picture that may be far off (by more than 8 levels): edges may move by a pixel where the threshold of
+/// a detector or shadow is met.
 pub(crate) const MAX_FAR_SHARE: f64 = 0.02;
 
 /// Edge of a tile, which one workgroup renders, pixels.
@@ -164,14 +166,14 @@ const TILE: u32 = 8;
 /// affects all pixels.
 const MAX_TILE_SHARE: f64 = 0.5;
 
-/// Difference of two pictures, levels of 255.
+/// How far two pictures of 8 bits are apart. A channel value is far off if it differs by more than 8 levels.
 pub(crate) struct PictureDifference {
-    /// Mean over the values that are not far off.
+    /// Mean difference of the values that are not far off, levels.
     pub mean: f64,
-    /// Share of values that are far off.
+    /// Share (0..1) of the values that are far off.
     pub far: f64,
     pub largest: u8,
-    /// Largest share of far-off pixels in a tile.
+    /// Largest share (0..1) of pixels with a value that is far off, in any tile of 8 x 8 pixels.
     pub tile: f64,
     pub worst: Worst,
 }
@@ -215,7 +217,7 @@ fn worst_tile(expected: &Picture, got: &Picture) -> f64 {
     tiles.iter().map(|[far, all]| f64::from(*far) / f64::from((*all).max(1))).fold(0.0, f64::max)
 }
 
-/// Records the difference of a picture from the expected one, and adds a fault if it is too large.
+/// Records how far a picture is from the expected one, and adds a fault if that is too much. `input`: description of the scene, for the report.
 pub fn compare_picture(findings: &mut Findings, input: &str, expected: &Picture, got: &Picture) {
     if (expected.width, expected.height, expected.rgba.len()) != (got.width, got.height, got.rgba.len()) {
         return findings.expect(false, || {
@@ -239,7 +241,7 @@ pub fn compare_picture(findings: &mut Findings, input: &str, expected: &Picture,
     findings.figures.push(Figure { allowed: None, ..largest });
 }
 
-/// Adds a fault unless two pictures are identical, byte for byte. Returns true if they are.
+/// Adds a fault unless two pictures are identical byte for byte. Returns true if they are. `what`: name of the comparison.
 pub fn expect_same_picture(findings: &mut Findings, what: &str, expected: &Picture, got: &Picture) -> bool {
     if expected == got {
         return true;
@@ -259,7 +261,7 @@ pub fn expect_same_picture(findings: &mut Findings, what: &str, expected: &Pictu
     false
 }
 
-/// Records how many pictures were compared, and how many differ.
+/// Records as figures how many pictures were compared, and how many of them differ; any that differs is above the limit.
 pub(crate) fn add_picture_counts(findings: &mut Findings, compared: usize, differ: usize) {
     let figure =
         |what: &str, value: usize, allowed| Figure { allowed, ..Figure::error(what, value as f64, 0.0, Unit::Count) };
@@ -267,9 +269,9 @@ pub(crate) fn add_picture_counts(findings: &mut Findings, compared: usize, diffe
     findings.figures.push(figure("pictures that differ", differ, Some(0.0)));
 }
 
-/// A comparison picture of one slice of two arrays, both with the same grey scale: the minimum and maximum expected value are black and
-/// white. Of four channels the first three are red, green and blue; of two channels the first is drawn. Misses and unwritten texels
-/// are black.
+/// A comparison picture of one slice of two arrays, with the same grey scale: values of 0..1 as they are, others from the smallest to the largest
+/// expected value. Of four channels the first three are red, green and blue; of two channels the first is drawn. Misses and unwritten texels are
+/// black.
 pub(crate) fn texel_comparison(what: &str, expected: &Texels, got: &Texels, slice: usize) -> PictureComparison {
     let visible = |v: f64| v.is_finite() && is_hit(v.abs());
     let plane = expected.size[0] * expected.size[1] * expected.channels;
@@ -321,7 +323,7 @@ pub(crate) fn picture_comparison(what: &str, expected: &Picture, got: &Picture) 
     PictureComparison { what: what.into(), actual, expected, difference, gain, fault: None }
 }
 
-/// An informative count without limit.
+/// A count that is reported without a limit.
 pub(crate) fn count_figure(what: &str, value: usize) -> Figure {
     Figure { allowed: None, ..Figure::error(what, value as f64, 0.0, Unit::Count) }
 }

@@ -10,17 +10,17 @@ use crate::spirv;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
-/// The coverage of one pass by its check.
+/// What of one pass its check in the group "passes" covers.
 #[derive(Default)]
 pub struct PassCoverage {
     pub shaders: BTreeSet<&'static str>,
-    /// Specialization constants with the values that they have in the checks.
+    /// For each specialization constant the values that it has in the check.
     pub constants: BTreeMap<&'static str, BTreeSet<i32>>,
-    /// Sets of values of all constants of a shader.
+    /// Pipelines of the check: each is a shader with the values of all its constants.
     pub pipelines: BTreeSet<(&'static str, Vec<(&'static str, i32)>)>,
-    /// Largest number of workgroups along each axis.
+    /// Largest number of workgroups along x, y and z.
     pub groups: [u32; 3],
-    /// Classes of instructions of its shaders.
+    /// Classes of instructions that occur in its shaders.
     pub classes: BTreeSet<&'static str>,
 }
 
@@ -92,7 +92,7 @@ const COMMANDS: [(&str, &str); 21] = [
     ("vkWaitSemaphores", "determinism, failures"),
 ];
 
-/// The coverage as text, a line for each pass, class, unused shader and command.
+/// The coverage as text: a line for each pass, for each class of instructions, unused shader, and Vulkan command.
 pub fn text(scenes: &[(String, Scene)]) -> String {
     let (of_passes, mut text) = (passes(scenes), String::new());
     let mut by_class: BTreeMap<&str, Vec<&str>> = BTreeMap::new();

@@ -163,7 +163,7 @@ const VARIABLE: &str = "LP_NUM_THREADS";
 /// Maximum time of one child process; a busy machine needs seconds.
 const MAX_CHILD_TIME: Duration = Duration::from_secs(120);
 
-/// Arguments with which the program prints the [`digest`] of a device.
+/// Arguments of a child process of this program that prints the [`digest`] of the context's device.
 pub fn arguments(context: &Context) -> Vec<String> {
     ["verify", "--digest", "--device", &context.candidate.name].map(String::from).into()
 }

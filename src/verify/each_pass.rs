@@ -17,7 +17,8 @@ use crate::spirv;
 use std::collections::HashSet;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
-/// Value of outputs before a pass. No pass computes it by chance, and every format stores it almost exactly.
+/// The value of all outputs before a dispatch, to recognise texels that it does not write. No pass computes it by chance, and every format stores it
+/// almost exactly.
 pub const POISON: f64 = 0.654_321;
 
 /// Maximum mean signed error of a dispatch, as a share of the allowed error of a texel. Rounding errors have both signs.
@@ -29,7 +30,7 @@ const BANDS: u64 = 3;
 /// Maximum number of faults of one pass that are listed.
 const MAX_FAULTS: usize = 8;
 
-/// The inputs and outputs of one dispatch, with those of its reference.
+/// One dispatch with its inputs, its outputs, and the outputs of the reference.
 pub struct DispatchComparison {
     pub inputs: Arrays,
     pub expected: Arrays,
@@ -38,7 +39,7 @@ pub struct DispatchComparison {
     pub comparison: Comparison,
 }
 
-/// Dispatches one pass alone on inputs of a kind (one of [`KINDS`]), and compares it with its reference.
+/// Dispatches one pass alone on inputs of a kind (one of [`KINDS`]), and computes its reference. `seed`: of the random numbers in the inputs.
 ///
 /// # Errors
 /// The device fails.
@@ -65,12 +66,13 @@ pub fn run_with_reference(
     Ok(DispatchComparison { inputs, expected, got, writes, comparison })
 }
 
-/// One check for each pass.
+/// The checks of the group "passes": one for each pass.
 pub fn checks(_: Level) -> Vec<Check> {
     PASSES.iter().map(|pass| Check::new("passes", pass.name, move |dut| check(dut, pass))).collect()
 }
 
-/// The seed of a pass's inputs. It follows from the name, so that another pass in the list changes no input.
+/// The seed of the inputs of a pass, for the kind with this index in [`KINDS`]. It follows from the pass's name, so that a further pass changes the
+/// inputs of no other.
 pub(super) fn seed_of(pass: &Pass, kind: usize) -> u64 {
     let hashed =
         pass.name.bytes().fold(0xcbf2_9ce4_8422_2325u64, |h, b| (h ^ u64::from(b)).wrapping_mul(0x100_0000_01b3));
@@ -105,8 +107,8 @@ fn votes(scene: &Scene, pass: &Pass) -> bool {
     spirv::embedded(name).is_some_and(|bytes| spirv::has_votes(&spirv::words(bytes)))
 }
 
-/// Identifies what a dispatch exercises: its shader, its constants, the formats of its bindings, and the axes along which it has more than
-/// eight workgroups.
+/// A key of what a dispatch exercises: its shader, its constants, the formats of its bindings, and the axes along which it has more than eight
+/// workgroups.
 pub fn variant(scene: &Scene, pass: &Pass) -> Variant {
     let args = dispatch_args_of(scene, pass, 0);
     let bound = pass.reads(scene, &args).into_iter().chain(pass.writes(scene, &args));
@@ -131,7 +133,7 @@ fn check(dut: &mut DeviceUnderTest, pass: &'static Pass) -> Result<Findings, Gpu
     Ok(sum.into_findings(pass))
 }
 
-/// Checks one pass in one scene, by their indices in [`PASSES`] and [`DeviceUnderTest::scenes`].
+/// Checks one pass in one scene. `n`: index in [`PASSES`]; `scene`: index in [`DeviceUnderTest::scenes`].
 ///
 /// # Errors
 /// The device fails.
@@ -141,7 +143,7 @@ pub(crate) fn in_scene(dut: &mut DeviceUnderTest, n: usize, scene: usize) -> Res
     Ok(sum.into_findings(&PASSES[n]))
 }
 
-/// Results of many dispatches of a pass.
+/// The results of many dispatches of one pass, for the outcome of its check.
 #[derive(Default)]
 pub(super) struct PassSummary {
     findings: Findings,
@@ -200,7 +202,7 @@ impl PassSummary {
         Ok(())
     }
 
-    /// Adds one dispatch. `name`: of its scene; `kind`: of its inputs.
+    /// Adds the result of one dispatch. `name`: name of its scene; `kind`: kind of its inputs.
     pub(super) fn record(&mut self, pass: &Pass, name: &str, iteration: u32, kind: &str, result: &DispatchComparison) {
         let of = &result.comparison;
         (self.largest, self.used) = (self.largest.max(of.largest), self.used.max(of.used));
@@ -253,8 +255,8 @@ impl PassSummary {
     }
 }
 
-/// Kinds of inputs: noise, all zero, all one, a single bright texel, and noise beside empty texels. Noise of distances is a smooth surface
-/// with cliffs and misses. Noise of volumes is blurred, so that it resembles tissue.
+/// Kinds of inputs of single passes: noise, all zero, all one, a single bright texel, and noise beside empty texels. For distances noise is a smooth
+/// surface with cliffs and misses; for volumes it is blurred, so that it resembles tissue.
 pub const KINDS: [&str; 5] = ["noise", "zero", "one", "hot", SPLIT];
 
 /// Noise to one side of a column, and nothing to the other, so that some invocations of a subgroup are done before the others: only then do its
@@ -383,7 +385,7 @@ fn empty_space_of(scene: &Scene, slot: Slot, volume: &Texels) -> Texels {
     slots.remove(&slot).unwrap_or_else(|| Texels::untouched([0; 3], 1))
 }
 
-/// Arguments of a dispatch that is not the first one, for a part of the visible slices, which are stored. Frames come in a batch.
+/// Dispatch arguments for a part of the visible slices of a scene. It is not the first slice, and frames come in a batch.
 pub fn dispatch_args_of(scene: &Scene, pass: &Pass, iteration: u32) -> DispatchArgs {
     let visible = scene.visible_bounds.slices();
     let slice = (visible.start + visible.end) / 2;
@@ -394,7 +396,7 @@ pub fn dispatch_args_of(scene: &Scene, pass: &Pass, iteration: u32) -> DispatchA
     DispatchArgs { layer, slice, slices, iteration, image: 0 }
 }
 
-/// Inputs of a pass, of a kind in [`KINDS`]. Arrays that an earlier pass computes are derived from the others.
+/// Inputs of a dispatch, of a kind in [`KINDS`]. Arrays that an earlier pass computes are derived from the other inputs.
 pub fn inputs_of(scene: &Scene, pass: &Pass, args: &DispatchArgs, kind: &str, seed: u64) -> Arrays {
     let mut noise = Noise(seed);
     let mut inputs = Arrays::default();

@@ -49,7 +49,7 @@ fn case(context: &Arc<Context>, toml: &str) -> Result<RenderCase, GpuError> {
     Ok(RenderCase { scene, frames, picture })
 }
 
-/// Adds a fault if more device memory is allocated than the `before` bytes.
+/// Adds a fault if the context has more device memory allocated than `before`, bytes. `after_what`: what was done since then.
 pub fn expect_memory_returned(findings: &mut Findings, context: &Context, before: u64, after_what: &str) {
     let now = context.allocated();
     findings.expect(now <= before, || format!("{after_what}: {} bytes of device memory are still held", now - before));

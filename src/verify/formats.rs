@@ -77,7 +77,7 @@ fn difference(a: &Picture, b: &Picture) -> [f64; 2] {
     [mean, most]
 }
 
-/// Largest differences so far.
+/// The largest differences of all pictures that were compared.
 #[derive(Default)]
 pub struct LargestDifference {
     pictures: usize,
@@ -85,7 +85,8 @@ pub struct LargestDifference {
 }
 
 impl LargestDifference {
-    /// Compares a picture and adds a fault if it differs by more than allowed.
+    /// Compares a picture with the expected one, and adds a fault if it differs by more than `allowed`: mean difference, and the difference that one
+    /// per cent of the values exceed; levels of 8 bits.
     pub fn add(&mut self, findings: &mut Findings, what: &str, expected: &Picture, got: &Picture, allowed: [f64; 2]) {
         let is = difference(expected, got);
         self.pictures += 1;

@@ -68,12 +68,12 @@ fn identifier(title: &str) -> String {
     name.trim_end_matches('_').to_string()
 }
 
-/// The full name of a check, `suite.case`. It changes only with the name of the check.
+/// The name of a check as GoogleTest has it, `suite.case`. It changes only if the check is renamed.
 pub fn full_name(check: &CheckName) -> String {
     format!("{}.{}", identifier(&check.group), identifier(&check.name))
 }
 
-/// The output of `--gtest_list_tests`: each suite with a dot, and its cases below it, indented by two spaces.
+/// The output for `--gtest_list_tests`: each suite followed by a dot, and its cases below it, indented by two spaces.
 pub fn list(checks: &[CheckName]) -> String {
     let (mut text, mut group) = (String::new(), None);
     for check in checks {
@@ -86,25 +86,25 @@ pub fn list(checks: &[CheckName]) -> String {
     text
 }
 
-/// The first lines of a run.
+/// The lines that are printed before a run.
 pub fn begins_run(checks: &[CheckName]) -> String {
     let suites = checks.chunk_by(|a, b| a.group == b.group).count();
     let lines = format!("[==========] Running {} from {}.", tests(checks.len()), test_suites(suites));
     lines + "\n[----------] Global test environment set-up."
 }
 
-/// The line before the first check of a group of so many.
+/// The line before the first check of a group, which has `checks` checks.
 pub(crate) fn begins_group(group: &str, checks: usize) -> String {
     format!("[----------] {} from {}", tests(checks), identifier(group))
 }
 
-/// The line before a check.
+/// The line that is printed before a check.
 pub fn begins(check: &CheckName) -> String {
     format!("[ RUN      ] {}", full_name(check))
 }
 
-/// The lines after a check, with its faults if it did not pass. Brackets in a message become parentheses, because runners search every line
-/// for the verdict.
+/// The lines that are printed after a check, with its faults if it did not pass. Brackets in a message become parentheses, because runners search
+/// every line for the verdict.
 pub fn ends(outcome: &Outcome) -> String {
     let name = full_name(&outcome.check());
     let ms = milliseconds(outcome.seconds);
@@ -120,14 +120,14 @@ pub fn ends(outcome: &Outcome) -> String {
     }
 }
 
-/// The line after the last check of a group.
+/// The line that is printed after the last check of a group.
 pub(crate) fn ends_group(outcomes: &[Outcome]) -> String {
     let suite = outcomes.first().map_or(String::new(), |first| identifier(&first.group));
     let ms = milliseconds(outcomes.iter().map(|o| o.seconds).sum());
     format!("[----------] {} from {suite} ({ms} ms total)", tests(outcomes.len()))
 }
 
-/// The last lines of a run: the counts, and the names of the checks that were skipped or failed.
+/// The lines at the end of a run: the counts, and the names of the checks that were skipped or failed.
 pub fn ends_run(run: &Run) -> String {
     let mut text = "[----------] Global test environment tear-down\n".to_string();
     let suites = run.groups().len();

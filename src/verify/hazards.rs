@@ -31,8 +31,8 @@ pub fn checks(_: Level) -> Vec<Check> {
     ]
 }
 
-/// True if the validation layer notices that a barrier is missing. A layer may be active and see nothing: since 2024 it ignores what
-/// shaders access, unless it is told otherwise.
+/// True if the validation layer reports a barrier that is left out on purpose. A layer may be active and report nothing: since 2024 it ignores what
+/// shaders access, unless a setting says otherwise.
 ///
 /// # Errors
 /// As [`DeviceUnderTest::another`].
@@ -121,8 +121,12 @@ fn volume_waited_for(
     Ok((renderer.picture()?, renderer.read(Slot::Volume)?))
 }
 
-/// Sends volumes one after the other, each into the image that `into` returns, while the previous one is rendered. With alternating images
-/// they do not mix. If they are sent into the image that is being rendered, they would.
+/// Sends volumes one after the other, each into the volume image that `into` returns for its number, while the previous volume is rendered. If the
+/// images alternate, the volumes do not mix; sent into the image that is being rendered, they would. Returns the numbers of pictures that were
+/// compared and that differ.
+///
+/// # Errors
+/// The device fails.
 pub fn alternating_images(
     findings: &mut Findings,
     context: &Arc<Context>,

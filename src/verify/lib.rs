@@ -52,7 +52,7 @@ use std::rc::Rc;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// All checks of a level, in running order.
+/// All checks of a level, in the order in which they run.
 pub fn checks(level: Level) -> Vec<Check> {
     let groups = [
         each_pass::checks,
@@ -72,8 +72,8 @@ pub fn checks(level: Level) -> Vec<Check> {
     groups.into_iter().flat_map(|group| group(level)).collect()
 }
 
-/// Runs checks one after the other in this process and calls `tell` after each. Once `stop` returns a reason, the remaining checks are
-/// interrupted.
+/// Runs checks one after the other in this process, and calls `tell` with the outcome of each. Once `stop` returns a signal's name, the remaining
+/// checks get the verdict interrupted.
 pub fn run(
     dut: &mut DeviceUnderTest,
     checks: &[Check],
@@ -87,8 +87,8 @@ pub fn run(
     dut.run_of(outcomes, begun)
 }
 
-/// Runs checks one after the other by `one`, which receives their indices, and calls `tell` after each. Once `stop` returns a reason, the
-/// remaining checks are interrupted, so that there is one outcome for each name.
+/// Runs checks one after the other by `one`, which gets their indices in `names`, and calls `tell` with the outcome of each. Once `stop` returns a
+/// signal's name, the remaining checks get the verdict interrupted, so that there is one outcome for each name.
 pub fn run_each(
     names: &[CheckName],
     stop: impl Fn() -> Option<&'static str>,
@@ -110,7 +110,7 @@ pub fn run_each(
     outcomes
 }
 
-/// A run with these outcomes that ends now. `device`: the tested device; `validation`: true if the validation layer was active.
+/// The run with these outcomes; it began at `begun` and ends now. `device`: the tested device; `validation`: true if the validation layer was active.
 pub fn run_on(device: machine::Device, validation: bool, level: Level, outcomes: Vec<Outcome>, begun: Instant) -> Run {
     Run {
         format: Run::FORMAT.into(),
@@ -124,14 +124,14 @@ pub fn run_on(device: machine::Device, validation: bool, level: Level, outcomes:
     }
 }
 
-/// The run of a device that could not be started: one failed check with the reason.
+/// The run of a device that could not be started: a single failed check with the reason `why`.
 pub fn unstarted(level: Level, why: String, begun: Instant) -> Run {
     let check = CheckName { group: report::START.into(), name: "start of the device".into() };
     let outcome = Outcome { seconds: begun.elapsed().as_secs_f64(), ..Outcome::unrun(&check, Verdict::Failed, why) };
     run_on(machine::Device::unknown(), false, level, vec![outcome], begun)
 }
 
-/// The measurements and faults of a check.
+/// What a check measured and found.
 #[derive(Default)]
 pub struct Findings {
     pub figures: Vec<Figure>,
@@ -140,24 +140,24 @@ pub struct Findings {
     pub pictures: Vec<PictureComparison>,
     /// The reason why the check was skipped: what this device or system lacks. None if it was not skipped.
     pub left_out: Option<String>,
-    /// The signal that ended the check before it was complete. None if it was complete.
+    /// The signal that ended the check before it was complete. None if it ran to its end.
     pub interrupted: Option<&'static str>,
 }
 
 impl Findings {
-    /// A skipped check.
+    /// The findings of a check that was skipped. `why`: what this device or system lacks.
     pub fn left_out(why: impl Into<String>) -> Findings {
         Findings { left_out: Some(why.into()), ..Findings::default() }
     }
 
-    /// Adds a fault with this text unless the condition holds.
+    /// Adds a fault with the text `what` unless the condition holds.
     pub fn expect(&mut self, holds: bool, what: impl FnOnce() -> String) {
         if !holds {
             self.faults.push(Fault::new(what()));
         }
     }
 
-    /// Records a figure, and adds a fault if it exceeds its limit. NaN exceeds any limit.
+    /// Records a figure, and adds a fault with the text `what` if its value exceeds its limit. NaN exceeds any limit.
     pub fn error(&mut self, figure: Figure, what: impl FnOnce() -> String) {
         let within = figure.allowed.is_none_or(|allowed| figure.value <= allowed);
         self.expect(within, what);
@@ -167,10 +167,10 @@ impl Findings {
 
 type Work = Box<dyn Fn(&mut DeviceUnderTest) -> Result<Findings, GpuError>>;
 
-/// A single check.
+/// A single check of a device.
 pub struct Check {
     pub group: &'static str,
-    /// Unique in its group.
+    /// Name, unique in its group.
     pub name: String,
     work: Work,
 }
@@ -184,7 +184,7 @@ impl Check {
         Check { group, name: name.into(), work: Box::new(work) }
     }
 
-    /// Runs the check. If it fails, it is repeated as described at `Outcome::explained`. An error of the device is a fault. After a lost
+    /// Runs the check. A check that fails is run again as described at `Outcome::explained`. An error of the device is a fault. After the loss of the
     /// device the next check gets a new context.
     pub fn run(&self, dut: &mut DeviceUnderTest) -> Outcome {
         let first = self.run_once(dut);
@@ -195,7 +195,7 @@ impl Check {
         first.explained(|| self.run_once(&mut dut.borrow_mut()), || self.run_waiting(&mut dut.borrow_mut()))
     }
 
-    /// Runs the check once while the host waits for each submission before the next.
+    /// Runs the check once, while the host waits for each submission before it makes the next one.
     pub(crate) fn run_waiting(&self, dut: &mut DeviceUnderTest) -> Outcome {
         let renew = |dut: &mut DeviceUnderTest, waits| {
             dut.waits = waits;
@@ -238,7 +238,8 @@ impl Check {
         (self.work)(dut)
     }
 
-    /// Runs the check after one of `group`, which is then set to this check's group. None: no check was run before.
+    /// Runs the check. `group`: the group of the check that was run before, None for the first; it is set to this check's group. With validation, the
+    /// first check of another group gets a new context.
     pub fn run_after(&self, group: &mut Option<&'static str>, dut: &mut DeviceUnderTest) -> Outcome {
         // State that the validation layer keeps of one group must not affect the next: see `IsolatedContext`.
         let is_other = group.replace(self.group).is_some_and(|before| before != self.group);
@@ -249,7 +250,7 @@ impl Check {
         self.run(dut)
     }
 
-    /// Group and name.
+    /// Group and name of the check.
     pub fn title(&self) -> CheckName {
         CheckName { group: self.group.into(), name: self.name.clone() }
     }
@@ -269,7 +270,7 @@ impl Check {
     }
 }
 
-/// The device under test, with the built-in scenes.
+/// The device under test, with the built-in scenes and what checks share.
 pub struct DeviceUnderTest {
     pub context: Arc<Context>,
     pub level: Level,
@@ -279,7 +280,7 @@ pub struct DeviceUnderTest {
     scenes: Rc<Vec<(String, Scene)>>,
     /// Called on every new context.
     prepare: Option<fn(&Context)>,
-    /// The program that checks start as a child process. None if this process is not the `echolume` program.
+    /// The `echolume` program, which checks start as a child process. None if this process is another program.
     pub program: Option<PathBuf>,
     modes: Option<Rc<Vec<Drawn>>>,
     /// Fault injected into every new context.
@@ -293,13 +294,15 @@ pub struct DeviceUnderTest {
 }
 
 impl DeviceUnderTest {
+    /// Opens the device.
+    ///
     /// # Errors
     /// There is no device, or no validation layer although it is requested.
     pub fn new(options: &ContextOptions, level: Level) -> Result<DeviceUnderTest, GpuError> {
         DeviceUnderTest::prepared(options, level, None)
     }
 
-    /// As [`DeviceUnderTest::new`], but calls `prepare` on every context before anything is created from it.
+    /// As [`DeviceUnderTest::new`], but calls `prepare` on every context before anything is made from it.
     ///
     /// # Errors
     /// As [`DeviceUnderTest::new`].
@@ -330,7 +333,7 @@ impl DeviceUnderTest {
         })
     }
 
-    /// A device under test with the same device and scenes, and an injected fault.
+    /// Opens the same device again, with the same scenes and with an injected fault.
     ///
     /// # Errors
     /// As [`DeviceUnderTest::new`].
@@ -349,13 +352,13 @@ impl DeviceUnderTest {
         Ok(dut)
     }
 
-    /// The built-in scenes by name. Together they need every pass.
+    /// The built-in scenes with their names. Together they need every pass.
     pub fn scenes(&self) -> Rc<Vec<(String, Scene)>> {
         self.scenes.clone()
     }
 
-    /// Every mode with filters of every stage, rendered in the simplest way. Other checks use them as expected pictures. They are rendered
-    /// once.
+    /// The scenes of [`built_in::modes`], rendered in the simplest way. Other checks take them as expected pictures. They are rendered at the first
+    /// call.
     ///
     /// # Errors
     /// The device fails.
@@ -368,12 +371,12 @@ impl DeviceUnderTest {
         Ok(modes)
     }
 
-    /// The runner of single passes.
+    /// The runner of single passes on this device.
     pub fn pass_runner(&mut self) -> &mut PassRunner {
         &mut self.pass_runner
     }
 
-    /// Another context on the same device, because the previous one was lost or will be.
+    /// Opens another context on the same device, because the present one was lost or will be.
     ///
     /// # Errors
     /// As [`DeviceUnderTest::new`].
@@ -392,7 +395,7 @@ impl DeviceUnderTest {
         Ok(context)
     }
 
-    /// Options of new contexts.
+    /// The options with which contexts are opened.
     pub fn options(&self) -> &ContextOptions {
         &self.options
     }
@@ -402,7 +405,7 @@ impl DeviceUnderTest {
         self.options.validation && !self.validation_is_blind
     }
 
-    /// Determines whether validation detects a missing barrier, and stores the result. If it does not, its silence proves nothing, and no
+    /// Finds out whether the validation layer detects a missing barrier; the result is stored. If it does not, its silence proves nothing, and no
     /// report states that it was active. Without validation the result is false.
     ///
     /// # Errors
@@ -413,7 +416,7 @@ impl DeviceUnderTest {
         Ok(notices)
     }
 
-    /// A run of these outcomes that ends now.
+    /// The run with these outcomes on this device; it began at `begun` and ends now.
     pub fn run_of(&self, outcomes: Vec<Outcome>, begun: Instant) -> Run {
         run_on(machine::device(&self.context), self.watched(), self.level, outcomes, begun)
     }
@@ -445,13 +448,15 @@ struct IsolatedContext {
 }
 
 impl IsolatedContext {
+    /// Opens a context for a check that uses one queue.
+    ///
     /// # Errors
     /// As [`DeviceUnderTest::another`].
     pub fn new(dut: &DeviceUnderTest) -> Result<IsolatedContext, GpuError> {
         IsolatedContext::of_queues(dut, 1)
     }
 
-    /// A context that is used as if it had this many queues.
+    /// Opens a context for a check with `queues` queues; on a device with fewer, one queue acts as several.
     ///
     /// # Errors
     /// As [`DeviceUnderTest::another`].
@@ -460,7 +465,7 @@ impl IsolatedContext {
         Ok(IsolatedContext { hears_submissions: context.queue_count() >= queues, context })
     }
 
-    /// A context whose renderers change often, or are created again after slots were read back.
+    /// Opens a context for a check whose renderers change often, or are made again after slots were read back.
     ///
     /// # Errors
     /// As [`DeviceUnderTest::another`].
@@ -468,7 +473,7 @@ impl IsolatedContext {
         Ok(IsolatedContext { hears_submissions: false, context: dut.another()? })
     }
 
-    /// A context that lacks features: `change` edits its known capabilities before anything is created from it.
+    /// Opens a context of a device that lacks features: `change` edits the known capabilities before anything is made from the context.
     ///
     /// # Errors
     /// As [`DeviceUnderTest::another`].
@@ -482,7 +487,7 @@ impl IsolatedContext {
         Ok(isolated)
     }
 
-    /// Adds the validation messages as faults.
+    /// Adds the validation messages that can be believed as faults.
     pub(crate) fn report_validation(&self, findings: &mut Findings) {
         let messages = self.credible_messages();
         findings.faults.extend(messages.iter().map(|message| Fault::new(format!("validation: {message}"))));

@@ -19,11 +19,11 @@ use std::sync::Arc;
 /// the other one everywhere, except its alpha.
 const MAX_MEAN_ANY_SCENE: f64 = 0.75;
 
-/// A scene with its frames.
+/// A scene to render, with its frames.
 pub struct View {
     pub name: String,
     pub scene: Scene,
-    /// One array for each slice in geometric order, with the values that the texture of a frame returns.
+    /// The frames, one for each slice in geometric order, with the values that a shader reads (0..1).
     pub frames: Vec<Texels>,
 }
 
@@ -208,7 +208,7 @@ fn every_scene(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     Ok(findings)
 }
 
-/// Checks that render every view on the device under test and on `other`, and compare the pictures.
+/// Checks that render every view on the device under test and on the device of `other`, and compare the pictures.
 ///
 /// # Errors
 /// One line: a built-in scene is invalid.

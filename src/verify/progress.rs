@@ -8,18 +8,18 @@ use std::io::Write;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// The bar of a run. It draws nothing unless standard error is a terminal.
+/// The progress bar of a run. It draws nothing unless standard error is a terminal.
 pub fn bar() -> ProgressBar {
     terminal::progress_bar(0)
 }
 
-/// Prints lines of other processes on standard error without disturbing the bar.
+/// A function that prints a line of another process on standard error, above the bar.
 pub fn echo(bar: &ProgressBar) -> Arc<dyn Fn(&str) + Send + Sync> {
     let bar = bar.clone();
     Arc::new(move |line| bar.suspend(|| drop(writeln!(std::io::stderr(), "{line}"))))
 }
 
-/// Follows a run: [`Progress::begins`] before each check, [`Progress::ends`] after it.
+/// Prints the progress of a run. Call [`Progress::begins`] before each check and [`Progress::ends`] after it.
 pub struct Progress {
     style: Style,
     bar: ProgressBar,
@@ -29,12 +29,12 @@ pub struct Progress {
     group: Vec<Outcome>,
 }
 
-/// The form of the output.
+/// In which form the progress is printed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Style {
     /// One line for each group, and each failure in full.
     Groups,
-    /// The lines of a GoogleTest program.
+    /// The lines that a GoogleTest program prints.
     GoogleTest,
 }
 
@@ -81,7 +81,7 @@ impl Progress {
         self.group.push(Outcome { pictures: Vec::new(), ..outcome.clone() });
     }
 
-    /// Ends the messages after the last check.
+    /// Prints what is left after the last check, and removes the bar.
     pub fn finish(mut self) {
         self.end_group();
         self.bar.finish_and_clear();

@@ -9,8 +9,10 @@ use crate::reference;
 use crate::scene::Scene;
 use std::sync::Arc;
 
-/// A renderer that holds a volume. `frames`: one array for each slice in geometric order, with the values that the texture of a frame
-/// returns.
+/// Makes a renderer and sends it a volume. `frames`: one array for each slice in geometric order, with the values that a shader reads (0..1).
+///
+/// # Errors
+/// The device fails.
 pub fn sent(
     context: &Arc<Context>,
     scene: &Scene,
@@ -22,8 +24,10 @@ pub fn sent(
     Ok(renderer)
 }
 
-/// Sends the frames of a volume into one of the volume images, alone and in batches of two and three, and selects it for the next
-/// picture.
+/// Sends the frames of a volume into volume image `image`, alone and in batches of two and three, and selects that image for the next picture.
+///
+/// # Errors
+/// The device fails.
 pub fn send(renderer: &mut Renderer, frames: &[Texels], image: u32) -> Result<(), GpuError> {
     let format = Slot::Frames.format(renderer.scene());
     for (k, frame) in frames.iter().enumerate() {
@@ -36,11 +40,17 @@ pub fn send(renderer: &mut Renderer, frames: &[Texels], image: u32) -> Result<()
 }
 
 /// Renders one picture with a new renderer.
+///
+/// # Errors
+/// The device fails.
 pub fn picture(context: &Arc<Context>, scene: &Scene, frames: &[Texels]) -> Result<Picture, GpuError> {
     sent(context, scene, frames, &RendererOptions::default())?.picture()
 }
 
-/// Contents of a slot after a picture.
+/// The content of a slot after a new renderer has drawn a picture.
+///
+/// # Errors
+/// The device fails, or no pass writes the slot.
 pub fn slot(context: &Arc<Context>, scene: &Scene, frames: &[Texels], slot: Slot) -> Result<Texels, GpuError> {
     let mut renderer = sent(context, scene, frames, &RendererOptions::default())?;
     renderer.picture()?;
@@ -48,16 +58,19 @@ pub fn slot(context: &Arc<Context>, scene: &Scene, frames: &[Texels], slot: Slot
     renderer.read(slot)?.ok_or_else(missing)
 }
 
-/// A rendered scene, with its frames.
+/// A rendered picture, with its scene and frames.
 pub struct Drawn {
     pub name: String,
     pub scene: Scene,
-    /// One array for each slice, with the values that the texture of a frame returns.
+    /// The frames, one for each slice in geometric order, with the values that a shader reads (0..1).
     pub frames: Vec<Texels>,
     pub picture: Picture,
 }
 
 /// Renders every mode, one after the other in one renderer, in the simplest way: one volume image, one queue, frames in order.
+///
+/// # Errors
+/// The device fails.
 pub fn modes(context: &Arc<Context>) -> Result<Vec<Drawn>, GpuError> {
     let mut renderer: Option<Renderer> = None;
     let options = RendererOptions { queues: Some(1), ..RendererOptions::default() };
@@ -77,14 +90,14 @@ pub fn modes(context: &Arc<Context>) -> Result<Vec<Drawn>, GpuError> {
     built_in::modes().into_iter().map(draw).collect()
 }
 
-/// The picture by the f64 reference.
+/// Renders the picture by the reference renderer (f64).
 pub(crate) fn reference_picture(scene: &Scene, frames: &[Texels]) -> Picture {
     let mut slots = reference::render(scene, frames);
     let screen = slots.remove(&Slot::Screen).unwrap_or_else(|| Texels::untouched([0; 3], 4));
     Picture { width: screen.size[0] as u32, height: screen.size[1] as u32, rgba: screen.encode(Format::Rgba8) }
 }
 
-/// The picture by the f64 reference, from frames that are rounded to the format in which the device stores them.
+/// Renders the picture by the reference renderer (f64), from frames that are rounded to the format in which the device stores them.
 pub fn stored_reference_picture(scene: &Scene, frames: &[Texels]) -> Picture {
     let format = Slot::Frames.format(scene);
     let stored: Vec<_> = frames.iter().map(|f| Texels::decode(f.size, format, &f.encode(format))).collect();

@@ -38,18 +38,18 @@ pub fn checks(_: Level) -> Vec<Check> {
     FORMATS.into_iter().map(check).collect()
 }
 
-/// The precision of a device's filter.
+/// The precision that a device's linear filter has to have.
 #[derive(Clone, Copy, Debug)]
 pub struct FilterPrecision {
-    /// Number of fractional bits of a position (`subTexelPrecisionBits`).
+    /// Number of fractional bits of a sample's position (`subTexelPrecisionBits`).
     pub bits: u32,
     /// Format of the texels and of the result.
     pub format: Format,
 }
 
 impl FilterPrecision {
-    /// The smallest and largest result of exact weights at a position, which is given as shares of the volume's size and clamped to the
-    /// edge.
+    /// The smallest and the largest result that exact weights give within the precision of the position. `share`: position as shares of the volume's
+    /// size, clamped to the edge.
     pub fn bounds(self, volume: &Texels, share: [f64; 3]) -> [f64; 2] {
         let [[low, high], _] = self.both_bounds(volume, share);
         [low, high]
@@ -122,19 +122,19 @@ fn blend(volume: &Texels, low: [i64; 3], at: [f64; 3]) -> f64 {
     sum
 }
 
-/// Judgement of samples: the number of those outside their interval, the worst of them, and the largest share of half the allowed interval
-/// that the others use.
+/// The judgement of many samples. `outside`: how many are outside the interval of their allowed values; `used`: of the others, the largest distance
+/// from the middle of that interval, as a share of half of it.
 #[derive(Debug, Default)]
 pub struct Judged {
     pub outside: usize,
-    /// Number of samples inside that only rounded weights explain.
+    /// Number of samples in the interval that are only explained by rounded weights.
     pub rounded: usize,
     pub used: f64,
-    /// Position in the output, nearest allowed value, and actual value.
+    /// The worst sample: position in the output, nearest allowed value, and actual value. None if none is outside.
     pub worst: Option<([usize; 2], f64, f64)>,
 }
 
-/// Judges every sample of an output of [`POSITIONS`].
+/// Judges every sample in an output of the pass [`POSITIONS`].
 pub fn judge(precision: FilterPrecision, volume: &Texels, got: &Texels) -> Judged {
     let [width, height, _] = got.size;
     let mut used_most = 0.0f64;

@@ -33,12 +33,12 @@ pub fn checks(level: Level) -> Vec<Check> {
     vec![check(SECONDS[usize::from(level == Level::Full)])]
 }
 
-/// A stress test of this duration, s.
+/// The check that runs a stress test of `seconds` s.
 pub fn check(seconds: f64) -> Check {
     Check::new("stress", "everything at once", move |dut: &mut DeviceUnderTest| stress(dut, seconds, &|_, _| Ok(())))
 }
 
-/// A hook called with the renderer and the volume image before each picture; tests use it to cause errors.
+/// A function that is called with the renderer and the index of the volume image before each picture; tests use it to cause errors.
 pub(crate) type BeforePicture = dyn Fn(&mut Renderer, u32) -> Result<(), GpuError>;
 
 /// Every mode in several sizes, with all filters and with few. All take the same frames.
@@ -86,7 +86,7 @@ struct Stress<'a> {
     pipelines: usize,
 }
 
-/// Runs the stress test for `seconds`.
+/// Runs the stress test for `seconds` s.
 ///
 /// # Errors
 /// The device fails.

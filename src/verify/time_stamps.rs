@@ -70,11 +70,11 @@ fn bits_and_period(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     Ok(findings)
 }
 
-/// Checks the spans of one picture: host spans `submit` and `wait`, and the device spans in running order. Returns two shares of the time
-/// from submission to the end of the wait: the share that device spans cover, and the share by which they lie outside.
+/// Checks the spans of one picture: the host spans `submit` and `wait`, and the device spans in running order. Returns two shares (0..1) of the time
+/// from submission to the end of the wait: how much of it device spans cover, and how much of their length lies outside of it.
 ///
 /// # Errors
-/// One line that describes the fault of the spans.
+/// One line: what is wrong with the spans.
 pub fn check_spans(spans: &[Span]) -> Result<[f64; 2], String> {
     let host = |name: &str| spans.iter().find(|s| s.name == name && !s.on_device).ok_or(format!("no '{name}'"));
     let (from, to) = (host("submit")?.begin, host("wait")?.end);

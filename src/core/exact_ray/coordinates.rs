@@ -14,7 +14,7 @@ pub struct Line<'a> {
     pub scene: &'a Scene,
     /// A point of the line, mm. Rounding errors are smallest if it lies near the volume.
     pub base: DVec3,
-    /// Unit length.
+    /// Direction in which s grows; a unit vector.
     pub direction: DVec3,
 }
 
@@ -23,7 +23,7 @@ impl Line<'_> {
         self.base + self.direction * s
     }
 
-    /// Column, row and slice at s, whether it is inside the insonified region or not.
+    /// Fractional column, row and slice of the volume at s, also outside the insonified region.
     pub fn coordinates(&self, s: f64) -> [f64; 3] {
         let grid = &self.scene.grid;
         let place = self.place(s);
@@ -47,8 +47,8 @@ impl Line<'_> {
         crate::passes::raycast::ray::texel(self.scene, self.place(s)).is_some()
     }
 
-    /// `low`, `high` and between them, in rising order, every place at which a coordinate is that of a texel or the line crosses
-    /// the border of the insonified region.
+    /// Returns `low`, `high` and, between them in rising order, every s at which a column, row or slice coordinate is a whole number or the line
+    /// crosses the border of the insonified region.
     pub fn breakpoints(&self, [low, high]: [f64; 2]) -> Vec<f64> {
         let mut found = Vec::new();
         let size = self.scene.volume_size().map(|n| n as usize);
@@ -109,7 +109,7 @@ impl Line<'_> {
     }
 }
 
-/// The places within the ends, and the ends, in rising order. Places closer than rounding are one.
+/// Returns both ends and those of `found` that lie between them, in rising order. Values closer than rounding errors are merged.
 pub(super) fn sorted(mut found: Vec<f64>, [low, high]: [f64; 2]) -> Vec<f64> {
     found.retain(|s| *s > low && *s < high);
     found.extend([low, high]);
@@ -119,7 +119,7 @@ pub(super) fn sorted(mut found: Vec<f64>, [low, high]: [f64; 2]) -> Vec<f64> {
     found
 }
 
-/// Where start + rate s has one of the values.
+/// Appends to `found` each s at which start + rate s equals one of the values.
 pub(super) fn crossings_of_a_line(start: f64, rate: f64, values: impl Iterator<Item = f64>, found: &mut Vec<f64>) {
     if rate != 0.0 {
         found.extend(values.map(|v| (v - start) / rate));

@@ -8,7 +8,7 @@
 use super::coordinates::{Line, crossings_of_a_line, quadratic, sorted};
 use glam::DVec3;
 
-/// The share of matter that `region.fade` leaves along a line.
+/// The factor 0..1 by which `region.fade` scales the absorption of the medium along a line, as a function of s, mm along that line.
 #[derive(Clone, Copy, Debug)]
 pub struct Fade<'a> {
     line: Line<'a>,
@@ -26,7 +26,7 @@ impl<'a> Fade<'a> {
         line.scene.region_fade().map(|length| Fade { line: *line, low, high, length })
     }
 
-    /// The share of the matter that is left at s, mm.
+    /// The factor at s, mm: 1 where nothing fades, 0 where all matter has faded.
     pub fn at(&self, s: f64) -> f64 {
         self.line.scene.faded(self.line.place(s))
     }
@@ -39,7 +39,7 @@ impl<'a> Fade<'a> {
         (1.0 - to_faces / self.length).max(DVec3::ZERO)
     }
 
-    /// Both ends and the kinks between them, mm, in rising order.
+    /// Returns both ends and every s between them at which the factor has a kink, mm, in rising order.
     pub fn kinks(&self, ends: [f64; 2]) -> Vec<f64> {
         let mut found = Vec::new();
         for axis in 0..3 {

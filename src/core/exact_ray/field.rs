@@ -16,15 +16,15 @@ const AGREEMENT: f64 = 2e-13;
 /// Times that a part of a cell may be halved.
 const HALVINGS: u32 = 6;
 
-/// A part of a ray on which the field is one polynomial.
+/// A part of a ray on which the interpolated sample value (the field) is one polynomial.
 #[derive(Clone, Copy, Debug)]
 pub struct Segment {
-    /// Begin of the segment, mm along the ray.
+    /// Start of the segment, mm along the ray; `to` is its end.
     pub from: f64,
     pub to: f64,
-    /// The field after the grey window, not clamped, on -1..1.
+    /// The sample value after the grey window, not clamped, with the segment mapped to -1..1.
     pub field: Polynomial,
-    /// Largest difference between the polynomial and the field at positions between the nodes: an estimate of its error.
+    /// Estimated error of the polynomial: its largest difference from the interpolated samples at positions between its nodes.
     pub off: f64,
 }
 
@@ -43,8 +43,8 @@ impl Segment {
     }
 }
 
-/// The field between two places of a line, with gaps where the line is outside the insonified region. `window`: the grey values that
-/// become 0 and 1.
+/// Returns the interpolated samples of the volume between two positions of a line, `ends` in mm, as polynomials. There are gaps where the line is
+/// outside the insonified region. `window`: the grey values that become 0 and 1.
 pub fn segments(line: &Line, volume: &Texels, window: [f64; 2], ends: [f64; 2]) -> Vec<Segment> {
     let mut found = Vec::new();
     if ends[1] <= ends[0] {
@@ -72,7 +72,8 @@ fn spline(t: f64) -> [f64; 4] {
     [left * left * left / 6.0, inner(t), inner(left), t * t * t / 6.0]
 }
 
-/// A cell of the texture: between the texels of two slices, or of four of a B-spline, or fewer beyond its border.
+/// The texels that one cell of the volume is interpolated from: those of the two slices around it, or of four slices for a B-spline. Beyond the
+/// border the nearest texel counts.
 pub struct Cell<'a> {
     line: &'a Line<'a>,
     size: [usize; 3],

@@ -5,7 +5,7 @@
 
 use std::sync::LazyLock;
 
-/// Number of nodes.
+/// Number of nodes of the Kronrod rule.
 pub const COUNT: usize = 15;
 
 const POSITIVE: [f64; 8] = [
@@ -31,18 +31,18 @@ const KRONROD: [f64; 8] = [
 const GAUSS: [f64; 4] =
     [0.129_484_966_168_869_7, 0.279_705_391_489_276_64, 0.381_830_050_505_118_9, 0.417_959_183_673_469_4];
 
-/// A rule: nodes in rising order with their weights.
+/// A quadrature rule on -1..1: nodes in rising order with their weights.
 #[derive(Debug)]
 pub struct Rule {
     pub nodes: [f64; COUNT],
     pub(crate) kronrod: [f64; COUNT],
-    /// 0 at the nodes that only the larger rule has.
+    /// Weights of the 7-point Gauss rule; 0 at the nodes that only the 15-point rule has.
     pub(crate) gauss: [f64; COUNT],
-    /// `inner[i][j]`: weight of the value at node j in the integral from -1 to node i of the polynomial of degree 14 through all values.
+    /// `inner[i][j]`: weight of the value at node j in the integral from -1 to node i of the polynomial of degree 14 through the values at all nodes.
     pub inner: [[f64; COUNT]; COUNT],
 }
 
-/// The Gauss-Kronrod rule.
+/// The 15-point Gauss-Kronrod rule with its embedded 7-point Gauss rule.
 pub static RULE: LazyLock<Rule> = LazyLock::new(|| {
     let positive = |i: usize| if i < 8 { i } else { COUNT - 1 - i };
     let nodes: [f64; COUNT] = std::array::from_fn(|i| if i < 8 { -POSITIVE[i] } else { POSITIVE[positive(i)] });
@@ -56,13 +56,13 @@ pub static RULE: LazyLock<Rule> = LazyLock::new(|| {
 });
 
 impl Rule {
-    /// Integrals over -1..1 by 15 and by 7 nodes.
+    /// Integrals over -1..1 by the 15-point and by the 7-point rule, of a function with these values at the nodes.
     pub fn integrals(&self, values: &[f64; COUNT]) -> [f64; 2] {
         let sum = |weights: &[f64; COUNT]| weights.iter().zip(values).map(|(w, v)| w * v).sum();
         [sum(&self.kronrod), sum(&self.gauss)]
     }
 
-    /// Integrals from -1 to every node.
+    /// Integrals from -1 to every node, of the polynomial through these values at the nodes.
     pub fn running(&self, values: &[f64; COUNT]) -> [f64; COUNT] {
         std::array::from_fn(|i| self.inner[i].iter().zip(values).map(|(w, v)| w * v).sum())
     }

@@ -11,7 +11,7 @@ use crate::passes::{Arrays, MISS, Texels, is_hit};
 use crate::scene::{Mode, Scene, SurfaceColour, View};
 use rayon::prelude::*;
 
-/// Largest difference of two quadrature rules on one piece of a ray, in light of 0..1.
+/// Largest difference that the 7-point and the 15-point rule may have on one piece of a ray; light is 0..1.
 pub const TOLERANCE: f64 = 1e-12;
 
 /// The cost of the exact rays of a picture, and their estimated error.
@@ -20,7 +20,7 @@ pub struct Effort {
     /// Root mean square over the rays of the estimated error of a ray, which is no bound. For pictures it is the error of a channel, for
     /// surfaces that of the distance in mm.
     pub estimate: f64,
-    /// Parts of rays that were integrated or searched.
+    /// Number of pieces of rays that were integrated or searched.
     pub pieces: u64,
     pub rays: u64,
 }
@@ -60,7 +60,8 @@ pub fn cost(scene: &Scene) -> f64 {
     rays * 2.0 * across / pitch
 }
 
-/// Replaces the reference of a pass of stage 2 and writes the outputs of that pass. False if the pass casts no ray through the volume.
+/// Computes the outputs of a pass of stage 2 by exact rays, in place of the pass's own reference. Returns false, with `writes` unchanged, if the pass
+/// casts no ray through the volume.
 pub fn replace(scene: &Scene, pass: &str, reads: &Arrays, writes: &mut Arrays, effort: &mut Effort) -> bool {
     match pass {
         "raycast_volume" => {

@@ -87,7 +87,7 @@ impl Polynomial {
         self.chebyshev[0] + x * b1 - b2
     }
 
-    /// The derivative by x.
+    /// The derivative with respect to x.
     pub fn slope(&self) -> Polynomial {
         // c'_(k-1) = c'_(k+1) + 2 k c_k, and half of it for k = 1.
         let mut slope = Polynomial { count: (self.count - 1).max(1), chebyshev: [0.0; MOST] };

@@ -9,8 +9,8 @@ use crate::scene::Mode;
 const GAUSS_4: [[f64; 2]; 2] =
     [[0.339_981_043_584_856_26, 0.652_145_154_862_546_1], [0.861_136_311_594_052_6, 0.347_854_845_137_453_85]];
 
-/// The value of a ray in a projection, clamped to 0..1. None if the ray meets nothing. `mode`: MinIP takes the smallest value, the mean is
-/// taken over the length inside the insonified region, all other modes take the largest value.
+/// The value of a ray in a projection, clamped to 0..1. None if `segments` is empty. MinIP takes the smallest value, the mean is taken over the
+/// length inside the insonified region, and every other mode takes the largest value.
 pub fn projected(segments: &[Segment], mode: Mode) -> Option<f64> {
     if segments.is_empty() {
         return None;
@@ -42,14 +42,14 @@ fn largest(segments: &[Segment], sign: f64, offset: f64) -> f64 {
     best.clamp(0.0, 1.0)
 }
 
-/// The integral of the clamped field over a segment, in units of mm.
+/// Integral over a segment of its field clamped to 0..1, mm.
 pub(super) fn integral(segment: &Segment) -> f64 {
     let mut cuts = Vec::new();
     cut(segment, &[0.0, 1.0], &mut cuts);
     cuts.windows(2).map(|pair| integral_between(segment, pair[0], pair[1])).sum()
 }
 
-/// The integral between two places in -1..1 of the segment, between which the field does not cross 0 or 1, in units of mm.
+/// Integral of the clamped field between two positions (-1..1) of a segment, mm. The field must not cross 0 or 1 between them.
 pub(super) fn integral_between(segment: &Segment, from: f64, to: f64) -> f64 {
     let half = (to - from) / 2.0;
     let value = |x: f64| segment.field.at(from + half * (1.0 + x)).clamp(0.0, 1.0);

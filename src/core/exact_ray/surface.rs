@@ -26,15 +26,16 @@ const FOLLOW_LEVEL: f64 = 0.7;
 pub struct Found {
     /// Position of the surface, mm along the line.
     pub place: f64,
-    /// Mean field over an edge's length behind the largest difference.
+    /// Mean field behind the surface: over the length of an edge (`surface.edge`) from the place with the largest difference.
     pub echo: f64,
-    /// Mean field over the depth of skin shading behind the surface. 0 outside the insonified region.
+    /// Mean field over the depth behind the surface that skin shading averages. 0 outside the insonified region.
     pub behind: f64,
-    /// Estimated error of the position, mm: the effect of the error of the difference on its crossing or its maximum.
+    /// Estimated error of the position, mm. It follows from the error of the detector's difference where that crosses the threshold or has its
+    /// maximum.
     pub off: f64,
 }
 
-/// Why the scene's detector has no definition without samples, and what to set instead. None if it has one.
+/// Why the scene's detector is not defined without discrete samples, and what to set instead. None if it is.
 pub fn fault(scene: &Scene) -> Option<&'static str> {
     let surface = &scene.settings.surface;
     match surface {
@@ -52,8 +53,8 @@ pub fn fault(scene: &Scene) -> Option<&'static str> {
     }
 }
 
-/// The scene's surface on a line from 0 to `path` mm. `before`: how far the line may be followed in front of 0, mm. Adds the parts of the line
-/// that were integrated to `pieces`.
+/// Finds the scene's surface on a line from 0 to `path` mm. None if there is none. `before`: how far the line may be followed in front of 0, mm. Adds
+/// the number of pieces that were integrated to `pieces`.
 pub fn surface(line: &Line, volume: &Texels, path: f64, before: f64, pieces: &mut u64) -> Option<Found> {
     let scene = line.scene;
     let edge = scene.ring.step * f64::from(scene.ring.half);

@@ -20,16 +20,17 @@ use crate::passes::raycast::volume::{depth_axis, reference_length};
 use crate::scene::transfer::{self, Absorption};
 use crate::scene::{Scene, Shading, TransferPoint};
 
-/// The light of a ray.
+/// The composited light of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Light {
-    /// Red, green, blue, opacity.
+    /// Red, green and blue, premultiplied, and opacity.
     pub rgba: [f64; 4],
-    /// Distance along the ray at which the opacity reaches `volume.hit`, mm. None if it does not.
+    /// Distance along the ray at which the opacity reaches `volume.hit`, mm. None if it never does.
     pub hit: Option<f64>,
-    /// Sum of the differences between the rules of 7 and 15 nodes: an estimate of the error of each channel, usually much too large.
+    /// Sum over all pieces of the difference between the 7-point and the 15-point rule: an estimate of the error of each channel, usually much too
+    /// large.
     pub estimate: f64,
-    /// Pieces that were integrated.
+    /// Number of pieces that were integrated.
     pub pieces: u64,
 }
 
@@ -44,7 +45,7 @@ struct Linear {
     transparent: bool,
 }
 
-/// Colour and absorption along rays as a function of the field.
+/// Colour and absorption of the matter on a ray, as a function of the field (the windowed sample value).
 #[derive(Clone, Debug)]
 pub struct Medium<'a> {
     /// Values at which colour or opacity have a kink or a step, in rising order.
@@ -62,8 +63,8 @@ pub struct Medium<'a> {
 }
 
 impl<'a> Medium<'a> {
-    /// A transfer function. `points` as in [`transfer::resolved`], at least one; samples below `threshold` are transparent; a piece is halved
-    /// until its rules differ by no more than `tolerance`.
+    /// The medium of a transfer function without fade or tint. `points` as in [`transfer::resolved`], at least one; samples below `threshold` are
+    /// transparent; a piece is halved until both quadrature rules differ by no more than `tolerance`.
     pub fn new(points: &[TransferPoint], threshold: f64, absorption: Absorption, tolerance: f64) -> Medium<'a> {
         let mut levels: Vec<f64> = [0.0, 1.0].into_iter().chain(points.iter().map(|p| p.at)).collect();
         levels.extend((threshold > 0.0).then_some(threshold));
@@ -94,7 +95,7 @@ impl<'a> Medium<'a> {
         Medium { levels, linear, absorption, fade: None, tint: None, hit_depth: f64::INFINITY, tolerance }
     }
 
-    /// The medium of a scene's ray that begins at `line.base`.
+    /// The medium that a scene's ray along `line` meets; the ray begins at `line.base`. `tolerance` as in [`Medium::new`].
     pub fn of(scene: &'a Scene, line: &super::Line<'a>, tolerance: f64) -> Medium<'a> {
         let volume = &scene.settings.volume;
         let points = transfer::of(volume);
@@ -114,7 +115,7 @@ impl<'a> Medium<'a> {
         medium
     }
 
-    /// The levels, in rising order.
+    /// The field values at which the transfer function has a kink or a jump, in rising order.
     pub fn levels(&self) -> &[f64] {
         &self.levels
     }
@@ -130,7 +131,7 @@ impl<'a> Medium<'a> {
         }
     }
 
-    /// The light that a ray collects along its segments, nearest first.
+    /// Composites the segments of a ray, which are in order from the nearest on.
     pub fn light(&self, segments: &[Segment]) -> Light {
         let mut sum = Sum::default();
         let mut cuts = Vec::new();
@@ -216,7 +217,7 @@ impl<'a> Medium<'a> {
     }
 }
 
-/// -1, 1 and between them, in rising order, where a segment's field has one of the levels.
+/// Fills `cuts` with -1, 1 and, between them in rising order, every position at which the segment's field has one of the levels.
 pub fn cut(segment: &Segment, levels: &[f64], cuts: &mut Vec<f64>) {
     cuts.clear();
     cuts.push(-1.0);

@@ -3,7 +3,8 @@
 //! Rows of a slice run into the body. In each column the first crossing of the threshold stays where it is, and from there on everything is
 //! inside, up to one plane for all columns. A column that crosses nowhere stays empty.
 
-/// Fills slices in two readings: the first finds the depth of the surface, the second fills.
+/// Fills everything behind the surface, as seen from the probe, down to a flat base, so that the mesh can be printed. It reads all slices twice:
+/// [`Base::survey`] finds the deepest point of the surface, [`Base::fill`] fills.
 #[derive(Clone, Debug)]
 pub struct Base {
     width: usize,
@@ -13,12 +14,12 @@ pub struct Base {
 }
 
 impl Base {
-    /// For slices of `width` columns. Values from `threshold` on are inside.
+    /// For slices of `width` columns. Values of at least `threshold` are solid.
     pub fn new(width: usize, threshold: f64) -> Base {
         Base { width, threshold, deepest: None }
     }
 
-    /// Takes a slice in the first reading.
+    /// First reading: takes the values of one slice, row by row.
     pub fn survey(&mut self, slice: &[f64]) {
         for column in 0..self.width {
             let mut values = slice.iter().skip(column).step_by(self.width);
@@ -26,13 +27,13 @@ impl Base {
         }
     }
 
-    /// The deepest of the rows at which the columns first reach the threshold. None if no column reaches it.
+    /// The largest row at which any column first reaches the threshold, over all slices that were surveyed. None if no column reaches it.
     pub fn deepest(&self) -> Option<usize> {
         self.deepest
     }
 
-    /// Copies a slice to `out`, which may have more rows. From where a column first reaches the threshold, each row has the column's largest value so
-    /// far. NaN before that where the value is not known.
+    /// Second reading: copies a slice to `out` and fills each column from its first value of at least the threshold down to the last row of `out`.
+    /// `out` may have more rows than `slice`; their values are NaN in columns that are not filled.
     pub fn fill(&self, slice: &[f64], out: &mut [f64]) {
         for column in 0..self.width {
             let mut values = slice.iter().skip(column).step_by(self.width);

@@ -7,12 +7,12 @@
 
 use std::sync::OnceLock;
 
-/// The patches of a cell.
+/// The patches of surface in one cell, for one set of corners that are inside.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Patches {
     /// Number of patches, 0 to 4.
     pub count: u8,
-    /// The patch of each edge that is crossed.
+    /// For each edge that the surface crosses, the number of its patch; 0 for the other edges.
     pub of_edge: [u8; 12],
 }
 
@@ -23,19 +23,19 @@ pub(crate) fn corners_of(edge: usize) -> [usize; 2] {
     [low, low | 1 << axis]
 }
 
-/// The edge of a cell along `axis`, at these places along the next axis and the one after it, 0 or 1.
+/// The number of the cell edge along `axis` whose coordinates (0 or 1) along the following two axes, cyclically, are `next` and `after`.
 pub(crate) fn edge_at(axis: usize, next: usize, after: usize) -> usize {
     4 * axis + next + 2 * after
 }
 
-/// The edges of a face: `axis` is its normal, `side` 0 or 1. In cyclic order: each shares a corner with the next.
+/// The four edges of the face with the normal `axis` at the coordinate `side` (0 or 1), in cyclic order: each shares a corner with the next.
 pub(crate) fn edges_of_face(axis: usize, side: usize) -> [usize; 4] {
     let (next, after) = ((axis + 1) % 3, (axis + 2) % 3);
     // An edge along `next` has (after, axis) as its places, one along `after` has (axis, next).
     [edge_at(next, 0, side), edge_at(after, side, 1), edge_at(next, 1, side), edge_at(after, side, 0)]
 }
 
-/// True if the corners of an edge differ. `inside`: a bit for each corner.
+/// True if the surface crosses an edge: exactly one of its corners is inside. `inside`: bit n is set if corner n is inside.
 pub(crate) fn is_crossed(inside: u8, edge: usize) -> bool {
     let [a, b] = corners_of(edge);
     (inside >> a ^ inside >> b) & 1 == 1
@@ -46,7 +46,7 @@ pub(crate) fn is_ambiguous(inside: u8, axis: usize, side: usize) -> bool {
     edges_of_face(axis, side).iter().all(|edge| is_crossed(inside, *edge))
 }
 
-/// The edge that an edge is joined with on a face. Both are crossed.
+/// The other crossed edge with which a crossed edge is joined on a face.
 pub(crate) fn partner(inside: u8, axis: usize, side: usize, edge: usize) -> usize {
     let crossed = |other: &usize| *other != edge && is_crossed(inside, *other);
     let edges = edges_of_face(axis, side);
@@ -59,7 +59,7 @@ pub(crate) fn partner(inside: u8, axis: usize, side: usize, edge: usize) -> usiz
     edges.into_iter().filter(crossed).find(shares).unwrap_or(edge)
 }
 
-/// The patches for every set of signs.
+/// The patches for every set of inside corners: the index has a bit for each corner.
 pub(crate) fn patches() -> &'static [Patches; 256] {
     static TABLE: OnceLock<[Patches; 256]> = OnceLock::new();
     TABLE.get_or_init(|| std::array::from_fn(|inside| of_signs(inside as u8)))

@@ -40,10 +40,10 @@ impl Colours<'_> {
 const ENDINGS: [(&str, MeshFile); 3] = [("stl", MeshFile::Stl), ("ply", MeshFile::Ply), ("glb", MeshFile::Glb)];
 
 impl MeshFile {
-    /// The format for the ending of a file name.
+    /// Chooses the format by the ending of a file name.
     ///
     /// # Errors
-    /// Another ending.
+    /// The ending is not that of a format.
     pub fn of(path: &Path) -> Result<MeshFile, InputError> {
         let ending = path.extension().unwrap_or_default();
         match ENDINGS.iter().find(|(known, _)| ending.eq_ignore_ascii_case(known)) {
@@ -52,10 +52,10 @@ impl MeshFile {
         }
     }
 
-    /// Writes a mesh.
+    /// Writes a mesh to a file.
     ///
     /// # Errors
-    /// A mesh that is too large for the format, a full disk. No file is left then.
+    /// The mesh is too large for the format, or the file cannot be written. No file is left then.
     pub fn write(self, mesh: &Mesh, colours: Colours, path: &Path) -> Result<(), InputError> {
         let write = || {
             let mut file = Unfinished::create(path)?;

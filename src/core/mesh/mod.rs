@@ -16,14 +16,15 @@ pub mod smooth;
 
 use glam::DVec3;
 
-/// Triangles of a surface, mm.
+/// A surface as triangles; vertices in mm.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
     pub vertices: Vec<DVec3>,
-    /// Indices of vertices; anticlockwise as seen from outside, where the values are below the threshold.
+    /// Indices of vertices. A triangle is anticlockwise as seen from outside, which is where the values are below the threshold.
     pub triangles: Vec<[u32; 3]>,
-    /// Number of lattice edges at which the surface continues without a triangle, at the border of the known values; of [`quadrics`] edges
-    /// of the triangles. 0 for a closed surface.
+    /// How far the mesh is from closed; 0 for a closed surface. For [`nets`] it is the number of lattice edges at which the surface continues without
+    /// a triangle, at the border of the known values; for [`quadrics`] and [`sheet`] the number of triangle edges that do not belong to two
+    /// triangles.
     pub open_edges: u64,
 }
 
@@ -33,7 +34,8 @@ impl Mesh {
         self.triangles.iter().map(|t| self.normal_area(t).length()).sum()
     }
 
-    /// Volume inside, mm^3, by the divergence theorem; meaningful for a closed surface only, and negative if it is inside out.
+    /// Volume enclosed by the surface, mm^3, by the divergence theorem. It is meaningful only for a closed surface, and negative if the triangles
+    /// face inwards.
     pub fn volume(&self) -> f64 {
         // Around a point of the mesh, so that a place far from the origin costs no digits.
         let about = self.vertices.first().copied().unwrap_or_default();
@@ -41,7 +43,7 @@ impl Mesh {
         self.triangles.iter().map(|t| of(self.corners(t))).sum()
     }
 
-    /// Unit normal of every vertex: the mean of those of its triangles, weighted by their areas. Zero where there is none.
+    /// Unit normal of every vertex: the mean of the normals of its triangles, weighted by their areas. The zero vector for a vertex without area.
     pub fn normals(&self) -> Vec<DVec3> {
         let mut sums = vec![DVec3::ZERO; self.vertices.len()];
         for triangle in &self.triangles {

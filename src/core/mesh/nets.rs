@@ -19,7 +19,7 @@ use std::sync::{Arc, mpsc};
 /// Layers that are found before polygons are made of them.
 const LAYERS_AHEAD: usize = 2;
 
-/// The surface to find.
+/// Which surface of a lattice of values to find.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surface {
     /// Values of at least this are inside.
@@ -29,12 +29,12 @@ pub struct Surface {
     pub closed: bool,
 }
 
-/// The surface of the values of a lattice of `size` voxels. `slice` fills a slice with values, NaN where they are not known; slices are asked
-/// for once, in order. `place`: fractional voxel indices to mm; a map that mirrors turns the triangles round, so that they are still
+/// The isosurface of a lattice of `size` voxels. `slice` fills a slice with values, NaN where they are not known; slices are requested once each, in
+/// order. `place` maps fractional voxel indices to mm; if it mirrors, the order of the vertices is reversed, so that triangles are still
 /// anticlockwise as seen from outside.
 ///
 /// # Errors
-/// An error of `slice`, or in words more triangles than are made.
+/// An error of `slice`, or a message that the surface has too many triangles.
 pub fn surface_net<E: From<String> + Send>(
     size: [usize; 3],
     surface: Surface,
@@ -154,7 +154,7 @@ pub(super) mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// The net of a function of the voxel, with voxels `h` apart.
+    /// Test helper: the mesh of a function of the voxel index, on a lattice with a spacing of `h`.
     pub fn net(size: [usize; 3], threshold: f64, closed: bool, h: f64, value: impl Fn(DVec3) -> f64 + Sync) -> Mesh {
         let slice = |z: usize, out: &mut [f64]| {
             for (n, out) in out.iter_mut().enumerate() {
@@ -222,7 +222,7 @@ pub(super) mod tests {
         }
     }
 
-    /// Distances from the surface of a ball, positive within, of a lattice of n^3 voxels.
+    /// Test helper: the mesh of a ball from its signed distances (positive inside) on n^3 voxels.
     pub fn ball(n: usize, radius: f64) -> (Mesh, f64, DVec3) {
         let h = 2.0 / (n - 1) as f64;
         let centre = DVec3::new(0.97, 1.02, 1.01);

@@ -11,29 +11,30 @@ use std::collections::HashMap;
 /// Most triangles of a mesh: 5 GB as STL.
 const MAX_TRIANGLES: usize = 100_000_000;
 
-/// A cell with corners inside and others outside.
+/// A cell of the lattice that the surface crosses: some of its corners are inside, others outside.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Cell {
     pub x: u32,
     pub y: u32,
-    /// A bit for each corner that is inside.
+    /// Bit n is set if corner n is inside.
     pub inside: u8,
-    /// All corners are known, or the surface is closed where they are not.
+    /// True if the values at all corners are known, or if the surface is to be closed where they are not.
     pub is_known: bool,
 }
 
-/// Where a vertex is: the mean of the points at which the surface crosses some edges of a cell.
+/// Identifies a vertex: it is the mean of the points at which the surface crosses these edges of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Vertex {
     pub cell: [u32; 3],
-    /// A bit for each of the edges, which are crossed.
+    /// Bit n is set for each crossed edge n that the mean is taken over.
     pub edges: u16,
 }
 
 /// A layer of cells: each with its first vertex, in the order of rows and of columns within them.
 type Layer = Vec<(Cell, u32)>;
 
-/// Builds the mesh of a lattice from its crossed cells. Cells of a closed surface begin one voxel before the lattice, along each axis.
+/// Builds the mesh of a lattice from the cells that the surface crosses, layer by layer. The cells of a closed surface begin one voxel before the
+/// lattice along each axis.
 pub struct Builder<P> {
     /// Voxels before the lattice.
     pad: usize,
@@ -58,7 +59,7 @@ struct Arc {
     inside: [usize; 3],
 }
 
-/// Cells along each axis of a lattice of `size` voxels.
+/// Number of cells along each axis, for a lattice of `size` voxels.
 pub(crate) fn cells_of(size: [usize; 3], closed: bool) -> [usize; 3] {
     let pad = usize::from(closed);
     match size.contains(&0) {
@@ -68,8 +69,8 @@ pub(crate) fn cells_of(size: [usize; 3], closed: bool) -> [usize; 3] {
 }
 
 impl<P: Fn(DVec3) -> DVec3> Builder<P> {
-    /// `place`: fractional voxel indices to mm; a map that mirrors turns the triangles round, so that they are
-    /// still anticlockwise as seen from outside.
+    /// `place` maps fractional voxel indices to mm. If it mirrors, the order of the vertices is reversed, so that triangles are still anticlockwise
+    /// as seen from outside.
     pub fn new(closed: bool, place: P) -> Builder<P> {
         let turned = place(DVec3::X) - place(DVec3::ZERO);
         let turned = turned.cross(place(DVec3::Y) - place(DVec3::ZERO)).dot(place(DVec3::Z) - place(DVec3::ZERO));
@@ -85,10 +86,11 @@ impl<P: Fn(DVec3) -> DVec3> Builder<P> {
         }
     }
 
-    /// Takes the crossed cells of the next layer, in order. `offset`: of a vertex from the first corner of its cell, voxels.
+    /// Takes the crossed cells of the next layer, ordered by row and column. `offset`: position of a vertex relative to the first corner of its cell,
+    /// voxels.
     ///
     /// # Errors
-    /// One line: more triangles than are made.
+    /// One line: the mesh would have too many triangles.
     pub fn take(&mut self, cells: Vec<Cell>, offset: impl Fn(&Vertex) -> DVec3) -> Result<(), String> {
         let (z, begin) = (self.taken, self.mesh.vertices.len());
         // Those of the layer before are still needed.
@@ -111,7 +113,7 @@ impl<P: Fn(DVec3) -> DVec3> Builder<P> {
         Ok(())
     }
 
-    /// The mesh, after the last layer.
+    /// Returns the mesh, after the last layer was taken.
     pub fn finish(mut self) -> Mesh {
         // Beyond the last layer there are no cells, only the edges within its slice.
         let last = std::mem::take(&mut self.last);

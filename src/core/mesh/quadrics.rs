@@ -5,9 +5,9 @@ use glam::DVec3;
 use meshopt_rs::simplify::simplify;
 use std::collections::HashMap;
 
-/// A mesh with as few triangles as meshoptimizer finds for an error of `tolerance` mm: of its quadrics, which is no bound of the distance. It may be open
-/// where `mesh` is closed: [`Mesh::open_edges`] counts the edges that do not belong to two triangles of opposite directions. The vertices are some of those
-/// of `mesh`.
+/// Simplifies a mesh with meshoptimizer: as few triangles as it finds for an error of `tolerance` mm. The error is that of its quadrics and no bound
+/// of the distance. The result may be open where `mesh` is closed: [`Mesh::open_edges`] counts the edges that do not belong to two triangles of
+/// opposite directions. Its vertices are some of those of `mesh`.
 pub fn simplified(mesh: &Mesh, tolerance: f64) -> Mesh {
     let low = mesh.vertices.iter().copied().fold(DVec3::INFINITY, DVec3::min);
     let high = mesh.vertices.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);

@@ -5,11 +5,13 @@ use super::Mesh;
 use glam::DVec3;
 use std::collections::HashSet;
 
-/// Steepest surface between rays that is one surface: its slope across a ray, tan 80 deg. A surface that is seen more edge-on than that is hardly seen.
+/// Largest slope of a surface across a ray, tan 80 deg. Neighbouring hits that differ by more are taken as two surfaces, with a gap between them; a
+/// steeper surface would hardly be seen.
 pub const STEEPEST: f64 = 5.67;
 
-/// The sheet of a distance map of `size` rays. `ray`: origin and unit direction of the ray in a column and row, mm. `distances`: along the
-/// rays in rows, mm; none where nothing was hit. Returns the mesh, anticlockwise as seen along the rays, and the ray of each vertex.
+/// The distance map of `size` rays as an open mesh. `ray`: origin (mm) and unit direction of the ray of a column and row. `distances`: along the
+/// rays, row by row, mm; None where a ray hit nothing. Returns the mesh, whose triangles are anticlockwise as seen along the rays, and for each
+/// vertex the index of its ray.
 pub fn sheet(
     size: [usize; 2],
     ray: impl Fn(usize, usize) -> (DVec3, DVec3),

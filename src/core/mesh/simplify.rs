@@ -33,8 +33,8 @@ const LENGTH_COST: f64 = 1e-3;
 /// A triangle that is gone.
 const GONE: [u32; 3] = [u32::MAX; 3];
 
-/// A mesh with fewer triangles, each point of which is at most `tolerance` mm from `mesh`, and the other way round. With it comes the bound
-/// that was reached, mm. The vertices are some of those of `mesh`.
+/// Simplifies a mesh: each point of the result is at most `tolerance` mm from `mesh`, and each point of `mesh` from the result. Also returns the
+/// bound that was reached, mm. The vertices are some of those of `mesh`.
 pub fn simplified(mesh: &Mesh, tolerance: f64) -> (Mesh, f64) {
     let mut surface = Surface::new(mesh, tolerance);
     surface.collapse_all();

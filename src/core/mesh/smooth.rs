@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 /// Reach of the kernel, standard deviations.
 const REACH: f64 = 3.0;
 
-/// Smooths slices one after another. Memory: as many slices as the kernel is long.
+/// Smooths a volume with a Gaussian, slice by slice. It keeps as many slices in memory as the kernel has taps.
 pub struct Smoother {
     width: usize,
     /// Half kernels along the axes: the weight of the middle, then of each distance. They are not normalized.
@@ -18,7 +18,8 @@ pub struct Smoother {
 }
 
 impl Smoother {
-    /// For a lattice of `size` voxels that are `spacing` apart, mm. `deviation`: standard deviation of the Gaussian, mm; 0 changes nothing.
+    /// For a lattice of `size` voxels with this `spacing` along each axis, mm. `deviation`: standard deviation of the Gaussian, mm; 0 changes
+    /// nothing.
     pub fn new(size: [usize; 3], spacing: [f64; 3], deviation: f64) -> Smoother {
         let kernel = |axis: usize| {
             let sigma = deviation / spacing[axis];
@@ -30,8 +31,8 @@ impl Smoother {
         Smoother { width: size[0], kernels, depth: size[2], slices: VecDeque::new(), first: 0 }
     }
 
-    /// Fills a slice with smoothed values. Slices are requested in order. `raw` fills one with unsmoothed values, NaN where they are not
-    /// known. Unknown values stay unknown.
+    /// Writes the smoothed slice `z` to `out`. Slices must be requested in order. `raw` fills a slice with the values before smoothing, NaN where
+    /// they are not known; these stay NaN.
     pub fn slice(&mut self, z: usize, out: &mut [f64], raw: impl Fn(usize, &mut [f64])) {
         let reach = self.kernels[2].len() - 1;
         let (from, to) = (z.saturating_sub(reach), (z + reach).min(self.depth.saturating_sub(1)));

@@ -90,18 +90,18 @@ impl Chain {
     }
 }
 
-/// The slot of the distance map after its filters.
+/// The slot that holds the distance map after all filters of it.
 pub fn distance_end(scene: &Scene) -> Slot {
     Chain::Distances.end(scene)
 }
 
-/// The slot of the picture after its filters.
+/// The slot that holds the picture after all filters of it.
 pub fn picture_end(scene: &Scene) -> Slot {
     Chain::Pictures.end(scene)
 }
 
-/// The slot that frames are copied into as they arrive, if no pass changes them: the only link of the chain of slices would store its input
-/// without loss, and no other pass reads the frames.
+/// The slot that frames are copied into as they arrive, without any pass: the only filter of slices would store its input without loss, and no other
+/// pass reads the frames. None if a pass converts or filters the frames.
 pub fn copied(scene: &Scene) -> Option<Slot> {
     if scene.has_sections() {
         return None;
@@ -126,7 +126,7 @@ impl Pass {
         self.needed(scene).is_ok()
     }
 
-    /// Whether a scene needs the pass, and why or why not.
+    /// Whether a scene needs the pass: `Ok` with the reason, or `Err` with the reason why not.
     pub fn needed(&self, scene: &Scene) -> Need {
         match self.link {
             Link::Filter(filter) if filter.chain.is_of_frames() => match (self.needed)(scene) {
@@ -142,7 +142,7 @@ impl Pass {
         }
     }
 
-    /// What a dispatch reads and writes as a link of a chain; an observer writes slots of its own.
+    /// The slots (read, written) of a dispatch of a chain's filter. An observer only reads the first. None for a pass that is no link of a chain.
     pub fn link_slots(&self, scene: &Scene, args: &DispatchArgs) -> Option<(Slot, Slot)> {
         let (chain, step) = match self.link {
             Link::Filter(filter) => (filter.chain, args.iteration / (filter.dispatches)(scene)),
@@ -155,13 +155,13 @@ impl Pass {
         Some((chain.after(scene, link, all), chain.after(scene, link + 1, all)))
     }
 
-    /// Path of the shader below glsl/, and variant.
+    /// Path of the shader below glsl/, with its variant.
     pub fn shader(&self, scene: &Scene, args: &DispatchArgs) -> &'static str {
         (self.shader)(scene, &Dispatch::new(args, self.link_slots(scene, args)))
     }
 
-    /// Specialization constants of a dispatch, by name. For passes on slices before the volume they include whether the slices go to
-    /// layers.
+    /// Specialization constants of a dispatch, by name. For the passes that make slices from frames they include `LAYERED`: whether the target is an
+    /// array of layers instead of the 3D texture.
     pub fn constants(&self, scene: &Scene, args: &DispatchArgs) -> Vec<(&'static str, i32)> {
         let mut constants = (self.constants)(scene, &Dispatch::new(args, self.link_slots(scene, args)));
         let is_of_frames = match self.link {
@@ -186,8 +186,8 @@ impl Pass {
         (self.writes)(scene, &Dispatch::new(args, self.link_slots(scene, args)))
     }
 
-    /// What a dispatch makes of all its extent, from the formula in f64; texels that it leaves NaN stay untouched. Of the frame array,
-    /// `reads` has the layers of the dispatch.
+    /// Computes the outputs of a dispatch from the formula in f64, over all of the pass's extent. Texels that stay NaN are not written by the
+    /// dispatch. For the frame array, `reads` holds only the layers of the dispatch.
     pub fn reference(&self, scene: &Scene, args: &DispatchArgs, reads: &Arrays, writes: &mut Arrays) {
         let slots = self.link_slots(scene, args);
         if self.frequency != Frequency::Frame {
@@ -221,14 +221,13 @@ impl Pass {
         }
     }
 
-    /// Slices of a dispatch that works on a complete volume; a pass over frames gets one frame.
+    /// Number of slices that one dispatch makes: all of the volume for a pass over volumes, 1 for a pass over frames.
     pub fn slices(&self, scene: &Scene) -> u32 {
         if self.frequency == Frequency::Volume { scene.slices() } else { 1 }
     }
 
-    /// The part of each slice that a pass over slices has to compute: the visible part, and as much around it as the later filters read.
-    /// None for passes that compute all of their extent: lines of a frame, and the rows and columns of AOS, where each texel depends on
-    /// all.
+    /// The rectangle of each slice that a pass over slices has to compute: the visible part, and as much around it as later filters read. None for
+    /// passes that compute all of their extent: passes over the lines of a frame, and AOS, where each texel depends on its complete row and column.
     pub fn rectangle(&self, scene: &Scene, args: &DispatchArgs) -> Option<Rectangle> {
         let all = Rectangle { first: [0; 2], size: scene.grid.size };
         let mut around = [0, 0];
@@ -255,7 +254,7 @@ impl Pass {
         Some(scene.visible_rectangle(around))
     }
 
-    /// Invocations of a dispatch. For slices only the visible part counts.
+    /// Number of invocations of a dispatch along x, y and z. A pass over slices has invocations only for its rectangle ([`Pass::rectangle`]).
     pub fn invocations(&self, scene: &Scene, args: &DispatchArgs) -> [u32; 3] {
         let extent = (self.extent)(scene, args);
         let Some(visible) = self.rectangle(scene, args) else { return extent };
@@ -265,7 +264,8 @@ impl Pass {
         [visible.size[0].div_ceil(run(0)), visible.size[1].div_ceil(run(1)), extent[2]]
     }
 
-    /// Numbers of a dispatch; of a slice, with the texel that its first invocation makes, and the first texel of the volume that is stored.
+    /// Parameters of a dispatch, as the shader gets them. A pass over slices also gets the bounds of its rectangle, and the first texel of the volume
+    /// that the device stores.
     pub fn numbers(&self, scene: &Scene, args: &DispatchArgs) -> Params {
         let mut params = (self.params)(scene, args);
         if let Some(r) = self.rectangle(scene, args) {
@@ -285,7 +285,8 @@ impl Pass {
         }
     }
 
-    /// What a dispatch leaves: the reference, and what was there before around the part of a slice that it makes.
+    /// Computes the content of the outputs after a dispatch: the reference within the rectangle that the dispatch makes, and what `writes` held
+    /// before around it.
     pub fn expected(&self, scene: &Scene, args: &DispatchArgs, reads: &Arrays, writes: &mut Arrays) {
         let before = writes.clone();
         self.reference(scene, args, reads, writes);

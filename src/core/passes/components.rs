@@ -4,13 +4,13 @@
 
 use std::ops::Range;
 
-/// A lattice of texels, which texels of it are connected, and the size of each texel.
+/// Input of the search for connected parts: a lattice of texels, how far texels may be apart to be connected, and the size of each texel.
 pub struct Lattice<'a> {
     /// Columns, rows, slices.
     pub size: [usize; 3],
-    /// Two set texels at most this many slices apart, and one column and one row, belong together: as far as a sample of the volume reaches.
+    /// Two set texels belong together if they are at most this many slices, one column and one row apart: the reach of an interpolated sample.
     pub slices: usize,
-    /// Size of a texel by row, then slice: entry `slice * rows + row`.
+    /// Size of a texel, in units of the caller, by row and slice: entry `slice * rows + row`.
     pub sizes: &'a [u64],
 }
 
@@ -21,7 +21,7 @@ struct Run {
     row: u32,
 }
 
-/// The parts of a lattice, by their runs.
+/// The connected parts of a lattice, stored as runs of texels along a row.
 pub struct Parts {
     columns: usize,
     runs: Vec<Run>,
@@ -30,7 +30,8 @@ pub struct Parts {
 }
 
 impl Lattice<'_> {
-    /// True for each texel, the column fastest, of a part whose size is below `least`. `is_set` holds for the texels of parts.
+    /// For each texel, the column fastest: true if it belongs to a part whose size is below `least`. Parts consist of the texels for which `is_set`
+    /// holds.
     pub fn floating(&self, is_set: impl Fn(usize) -> bool, least: u64) -> Vec<bool> {
         let [columns, rows, slices] = self.size;
         let parts = self.parts(is_set);
@@ -49,7 +50,7 @@ impl Lattice<'_> {
         floats
     }
 
-    /// The parts of the texels for which `is_set` holds.
+    /// Finds the connected parts of the texels for which `is_set` holds.
     pub fn parts(&self, is_set: impl Fn(usize) -> bool) -> Parts {
         let [columns, rows, slices] = self.size;
         let mut runs: Vec<Run> = Vec::new();
@@ -86,7 +87,8 @@ impl Lattice<'_> {
 }
 
 impl Parts {
-    /// The part of each texel: parts are numbered from 1 in the order of their first texels. 0 for texels of no part.
+    /// The number of the part that each of the lattice's `texels` belongs to, the column fastest. Parts are numbered from 1 in the order of their
+    /// first texels; 0 for a texel of no part.
     pub fn numbers(&self, texels: usize) -> Vec<u32> {
         let mut numbers = vec![0; texels];
         let (mut of_root, mut count) = (vec![0; self.runs.len()], 0);

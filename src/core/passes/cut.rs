@@ -99,12 +99,12 @@ const HEADER: usize = 5;
 /// What tells a brush from a contour: its header has the corners of its bounds in place of the axes.
 const BRUSH: f64 = 2.0;
 
-/// Vectors of four of all cuts.
+/// Length of the table of all cuts, in vectors of four floats.
 pub(super) fn table_length(scene: &Scene) -> usize {
     HEADER * scene.settings.cuts.len() + scene.cut_corners()
 }
 
-/// The cuts as cut.comp reads them, relative to [`Scene::local_origin`].
+/// The table of cuts as cut.comp reads it; places are relative to [`Scene::local_origin`].
 pub(super) fn table(scene: &Scene) -> Vec<f32> {
     let mut table: Vec<f64> = Vec::with_capacity(4 * table_length(scene));
     for cut in scene.cuts() {
@@ -137,8 +137,8 @@ pub(super) fn table(scene: &Scene) -> Vec<f32> {
     lookup_tables::floats(table)
 }
 
-/// Where each slice is, as cut.comp reads it: cosine and sine of its angle in a fan, otherwise 0 and its z relative to [`Scene::local_origin`]; how
-/// far the motor moves while its frame is acquired; and 0.
+/// The place of each slice as cut.comp reads it, four floats a slice: cosine and sine of its angle in a fan, otherwise 0 and its z relative to
+/// [`Scene::local_origin`], mm; the motor's travel while its frame is acquired (rad or mm); and 0.
 pub(super) fn slice_places(scene: &Scene) -> Vec<f32> {
     let place = |slice: u32| {
         let slice = f64::from(slice);
@@ -159,12 +159,12 @@ pub(super) fn slice_places(scene: &Scene) -> Vec<f32> {
     lookup_tables::floats((0..scene.slices()).flat_map(place))
 }
 
-/// Where the curved render start begins in each column and slice.
+/// The row at which rendering starts by `region.start_curve`, for each column and slice of the volume.
 pub(super) fn start_curve(scene: &Scene) -> Vec<f32> {
     scene.start_curve_rows().into_iter().map(|row| row as f32).collect()
 }
 
-/// Share of the lines of a frame that fired before the one at each texel of a slice.
+/// For each texel of a slice, the share (0..1) of the frame's lines that fired before the line through that texel.
 pub(super) fn line_shares(scene: &Scene) -> Vec<f32> {
     let [columns, rows] = scene.grid.size;
     let texels = (0..rows).flat_map(|row| (0..columns).map(move |column| (column, row)));

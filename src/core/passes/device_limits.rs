@@ -6,13 +6,13 @@ use crate::probe::StoredType;
 use crate::probe::{Geometry, Grid};
 use crate::scene::{Input, Scene, SceneError, Settings};
 
-/// Samples that each invocation takes.
+/// Number of samples that each invocation takes from the volume.
 pub const SAMPLES: u32 = 256;
 
-/// The measured passes, in this order.
+/// The passes that measure how fast the device samples a volume and copies a picture.
 pub const MEASURES: &[Pass] = &[FILTERED, EIGHT_FETCHES, ONE_FETCH, COPY];
 
-/// Samples through the device's trilinear filter.
+/// Takes samples by the device's trilinear filter.
 pub const FILTERED: Pass = Pass {
     name: "measure_filtered",
     shader: |_, _| "measure/sampling",
@@ -33,7 +33,7 @@ pub const FILTERED: Pass = Pass {
     ..Pass::OF_RAYS
 };
 
-/// Trilinear interpolation in the shader: eight texels, fetched or loaded in the way that is fastest on the device.
+/// Takes samples by interpolation in the shader: eight texels each, fetched or loaded in the way that is fastest on the device.
 pub const EIGHT_FETCHES: Pass = Pass {
     name: "measure_eight_fetches",
     reads: |_, _| vec![whole("volume", Slot::Volume)],
@@ -54,7 +54,7 @@ pub const ONE_FETCH: Pass = Pass {
     ..FILTERED
 };
 
-/// Reads and writes 8 bytes a pixel.
+/// Copies a picture: reads and writes 8 bytes a pixel.
 pub const COPY: Pass = Pass {
     name: "measure_copy",
     shader: |_, _| "measure/copy",
@@ -69,7 +69,7 @@ pub const COPY: Pass = Pass {
     ..FILTERED
 };
 
-/// Takes one sample for each texel of the output, at [`sample_position`], to test a device's filter. No profile measures it.
+/// Takes one sample for each texel of the output, at [`sample_position`]. `verify` tests a device's filter with it; no profile measures it.
 pub const POSITIONS: Pass = Pass {
     name: "measure_positions",
     shader: |_, _| "measure/positions",
@@ -89,8 +89,8 @@ pub const POSITIONS: Pass = Pass {
     ..FILTERED
 };
 
-/// The position at which [`POSITIONS`] samples for a texel of its output of this size: a share of the volume's size, from an eighth before
-/// its border to an eighth behind it. It is the same as in glsl/measure/positions.comp.
+/// The position at which [`POSITIONS`] samples for a texel of its output of `size` texels, as a share of the volume's size along each axis: -1/8 to
+/// 9/8, so that it also lies outside. It is the same as in glsl/measure/positions.comp.
 pub fn sample_position(texel: [usize; 2], size: [usize; 2]) -> [f64; 3] {
     let turn = (13 * texel[0] + 29 * texel[1]) % 61;
     let across = |axis: usize| (texel[axis] as f64 + 0.5) / size[axis] as f64;
@@ -113,7 +113,10 @@ fn mean(reads: &Arrays, writes: &mut Arrays, sample: impl Fn(&Texels, [f64; 3]) 
     }
 }
 
-/// A volume of `edge`^3 in the format that volumes have, and a picture of `pixels`^2.
+/// A scene with a Cartesian volume of `edge`^3 voxels in the default texel format and a picture of `pixels`^2.
+///
+/// # Errors
+/// A size is outside the limits of a scene.
 pub fn scene(edge: usize, pixels: u32) -> Result<Scene, SceneError> {
     let mut settings = Settings::default();
     settings.picture.size = [pixels, pixels];

@@ -15,9 +15,10 @@ const LONG: i64 = 4;
 /// Pixels on both sides up to which a run's ends are looked for.
 const REACH: i64 = 16;
 
-/// The share of a pixel that is nearer than a limit, from the distances of rays at an offset from it. The pixel keeps half of itself, at least: its ray
-/// tells where its middle lies; and all of itself where no edge can be told. Around an outline what is near is all that is hit; between two surfaces both may
-/// have the distance of the other further away, so that only the run tells, whose limit follows the two surfaces.
+/// Estimates the share (0..1) of a pixel's area that the surface nearer than `limit` covers. `distance` gives the distance of the ray at an offset
+/// (columns, rows) from the pixel. The result is at least 0.5 if the pixel's own ray is near and at most 0.5 if not; it is 1 or 0 where no edge can
+/// be recognised. `is_outline`: nothing was hit on the far side. Between two surfaces it is false: each may reach the other's distance a few pixels
+/// away, so that only the run of pixels along the edge is used, whose limit follows both surfaces.
 pub(crate) fn near_share(distance: &dyn Fn(i64, i64) -> f64, limit: f64, is_outline: bool) -> f64 {
     let is_near = |dx: i64, dy: i64| distance(dx, dy) < limit;
     let side = |dx: i64, dy: i64| f64::from(u8::from(is_near(dx, dy)));

@@ -20,14 +20,14 @@ const MAX_DISTANCE: u32 = 16;
 pub(in crate::passes) enum Skipping {
     /// Not at all: it takes every sample.
     None,
-    /// By the kinds of bricks and the distance to the nearest brick of another kind, in this slot.
+    /// By the kinds of bricks and the distance to the nearest brick of another kind, which are in this slot.
     Kinds(Slot),
-    /// By the value ranges of bricks, which are compared with the largest or smallest sample so far.
+    /// By the value ranges of bricks, which are compared with the largest (MIP) or smallest (MinIP) sample of the ray so far.
     Ranges,
 }
 
 impl Skipping {
-    /// The 3D texture that shaders name "bricks".
+    /// The slot that shaders name `bricks`. None if nothing is skipped.
     pub fn slot(self) -> Option<Slot> {
         match self {
             Skipping::None => None,
@@ -36,7 +36,7 @@ impl Skipping {
         }
     }
 
-    /// SKIP of empty_space.glsl.
+    /// The specialization constant SKIP of empty_space.glsl.
     pub fn constant(self) -> (&'static str, i32) {
         let value = match self {
             Skipping::None => 0,
@@ -68,7 +68,7 @@ fn need(scene: &Scene) -> Need {
     }
 }
 
-/// The smallest and the largest value of every tile of a slice. Only tiles of the slices that a new frame changes are updated.
+/// Computes the smallest and the largest value of every tile of a slice. Only tiles of the slices that a new frame changes are updated.
 pub(crate) const TILE_RANGES: Pass = Pass {
     name: "tile_ranges",
     stage: Stage::Preprocess,
@@ -109,8 +109,8 @@ pub(crate) const TILE_RANGES: Pass = Pass {
     },
 };
 
-/// The smallest and the largest value that samples in each brick may have, from the tiles that they may touch. Only bricks that
-/// depend on the slices that a new frame changes are updated.
+/// Computes the smallest and the largest value that samples in each brick may have, from the tiles that they may touch. Only bricks that depend on
+/// slices that a new frame changes are updated.
 pub(crate) const BRICK_RANGES: Pass = Pass {
     name: "brick_ranges",
     stage: Stage::Preprocess,
@@ -160,8 +160,7 @@ pub(crate) const BRICK_RANGES: Pass = Pass {
     },
 };
 
-/// The kind of each brick to the surface detector. A change of transfer function, threshold or window classifies bricks again and
-/// reads no voxel.
+/// Classifies each brick for the surface detector. After a change of transfer function, threshold or window this runs again and reads no voxel.
 pub(crate) const CLASSIFY_SURFACE: Pass = Pass {
     name: "classify_bricks_surface",
     shader: |_, _| "empty_space/classify",
@@ -192,7 +191,7 @@ pub(crate) const CLASSIFY_SURFACE: Pass = Pass {
     ..Pass::OF_RAYS
 };
 
-/// The kind of each brick to the mode that composites, or takes the mean.
+/// Classifies each brick for modes that composite or take the mean.
 pub(crate) const CLASSIFY_VOLUME: Pass = Pass {
     name: "classify_bricks_volume",
     needed: |s| match (s.composites(), s.settings.mode, need(s)) {
@@ -242,13 +241,13 @@ fn constants(entries: usize, from_zero: bool) -> Vec<(&'static str, i32)> {
     vec![("MAX_DISTANCE", MAX_DISTANCE as i32), ("ENTRIES", entries as i32), ("FROM_ZERO", from_zero as i32)]
 }
 
-/// The bindings that bricks are classified by: the table of bricks and their ranges.
+/// The bindings that classify bricks: the table of bricks and the ranges of their values.
 pub(super) fn ranges() -> Vec<Bind> {
     vec![whole("brick_table", Slot::BrickTable), whole("brick_ranges", Slot::BrickRanges)]
 }
 
-/// The level that no sample of a quiet brick exceeds: two means of samples in 0..=q differ by at most q, so that the detector
-/// cannot fire where q is below the lower threshold.
+/// The largest sample value q of a brick in which the detector cannot fire: two means of samples in 0..=q differ by at most q, which is below the
+/// lower threshold.
 pub(in crate::passes) fn quiet_level(scene: &Scene) -> f64 {
     let surface = &scene.settings.surface;
     let threshold = surface.threshold.min(surface.rough_threshold.unwrap_or(surface.threshold));
@@ -261,7 +260,8 @@ fn between_samples(scene: &Scene) -> bool {
     matches!(scene.settings.volume.compositing, Compositing::PreIntegrated | Compositing::Exponential)
 }
 
-/// Ratio by which rounding may raise a sample above its largest texel: for a weighted mean, some ulps.
+/// Factor by which rounding may raise a sample above the largest texel that it is interpolated from: 1 + 1e-5 for weighted means of many texels,
+/// otherwise 1.
 pub(super) fn beyond(scene: &Scene) -> f64 {
     if scene.settings.ray.sliding > 0 || scene.takes_bspline() { 1.0 + 1e-5 } else { 1.0 }
 }
@@ -289,8 +289,8 @@ fn classify_reference(
     }
 }
 
-/// The Chebyshev distance to the nearest brick of another kind, in bricks (Deakin and Knackstedt 2020), for the surface detector: one
-/// axis per dispatch, by d(p) = min over the line through p of max(|q - p|, d(q)).
+/// Computes for each brick the Chebyshev distance to the nearest brick of another kind, in bricks (Deakin and Knackstedt 2020), for the surface
+/// detector. Each of three dispatches handles one axis, by d(p) = min over the line through p of max(|q - p|, d(q)).
 pub(crate) const DISTANCE_SURFACE: Pass = Pass {
     name: "brick_distance_surface",
     shader: |_, _| "empty_space/distance",
@@ -305,7 +305,7 @@ pub(crate) const DISTANCE_SURFACE: Pass = Pass {
     ..Pass::OF_RAYS
 };
 
-/// The pass [`DISTANCE_SURFACE`] for modes that composite or take the mean.
+/// Computes the same as [`DISTANCE_SURFACE`] for modes that composite or take the mean.
 pub(crate) const DISTANCE_VOLUME: Pass = Pass {
     name: "brick_distance_volume",
     needed: CLASSIFY_VOLUME.needed,

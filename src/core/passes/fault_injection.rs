@@ -7,64 +7,65 @@ use crate::scene::Scene;
 use crate::spirv::mutants::{self, Mutation};
 use crate::spirv::{self, SpirvError};
 
-/// A fault with its name.
+/// A deliberate fault that checks are to detect, with its name.
 #[derive(Clone, Copy)]
 pub struct InjectedFault {
     pub name: &'static str,
-    /// The real fault that it represents, in a driver or in this program.
+    /// The real fault that it stands for, in a driver or in this program.
     pub what: &'static str,
     pub change: Change,
 }
 
-/// The data that a fault changes. A pass name applies to all passes whose names begin with it.
+/// What a fault changes on the way to the device. `pass` is the beginning of a name: the fault applies to all passes whose names begin with it.
 #[derive(Clone, Copy)]
 pub enum Change {
-    /// Numbers of a dispatch.
+    /// Changes the parameters of a dispatch.
     Numbers { pass: &'static str, by: fn(&Scene, &mut Params) },
-    /// A specialization constant.
+    /// Changes the value of the specialization constant `name`.
     Constant { pass: &'static str, name: &'static str, by: fn(i32) -> i32 },
-    /// Words of a shader.
+    /// Changes the SPIR-V words of a shader.
     Shader { pass: &'static str, by: fn(&[u32]) -> Result<Vec<u32>, SpirvError> },
-    /// Arguments of a dispatch.
+    /// Changes the dispatch arguments (slice, layer, iteration, volume image).
     DispatchArgs { pass: &'static str, by: fn(&Scene, &mut DispatchArgs) },
-    /// A dispatch that is left out: its outputs keep their old content.
+    /// Leaves out the dispatches for which `which` is true: their outputs keep their old content.
     LeftOut { pass: &'static str, which: fn(&Scene, &DispatchArgs) -> bool },
-    /// Invocations of a dispatch.
+    /// Changes the number of invocations of a dispatch.
     Extent { pass: &'static str, by: fn(&mut [u32; 3]) },
-    /// A table that the CPU makes from the scene.
+    /// Changes the values of a table that the CPU makes from the scene.
     Table { slot: Slot, by: fn(&Scene, &mut [f32]) },
-    /// The bytes of an uploaded frame; given are bytes per texel, texels per line, and lines.
+    /// Changes the bytes of an uploaded frame; the function gets bytes per texel, texels per line and number of lines.
     Frame(fn([usize; 3], &mut [u8])),
-    /// The sampler takes the nearest texel.
+    /// Makes the sampler take the nearest texel instead of interpolating.
     Nearest,
-    /// In every shader of the pass, one instruction of a class is changed as if the compiler had translated it wrongly. `share` (0 to 1)
-    /// chooses which one.
+    /// Changes one instruction of a class in every shader of the pass, as if a compiler had translated it wrongly. `share` (0 to 1) chooses which one
+    /// of them.
     Mutant { pass: &'static str, mutation: &'static Mutation, share: f32 },
-    /// A Vulkan command that the driver executes wrongly.
+    /// Makes the driver execute a Vulkan command wrongly.
     Command(Command),
 }
 
-/// A Vulkan command, and what a faulty driver makes of it.
+/// A Vulkan command, and what a faulty driver does instead.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Command {
-    /// `vkCmdDispatchBase` begins with the first workgroup.
+    /// `vkCmdDispatchBase` ignores the base: it begins with workgroup 0.
     DispatchBase,
     /// `vkCmdDispatchIndirect` dispatches nothing.
     DispatchIndirect,
-    /// `vkCmdCopyBufferToImage` copies the first layer or slice alone.
+    /// `vkCmdCopyBufferToImage` copies only the first layer or slice.
     CopyToImage,
     /// `vkCmdCopyImageToBuffer` copies nothing.
     CopyToBuffer,
-    /// `vkCmdClearColorImage` clears to one.
+    /// `vkCmdClearColorImage` clears to 1 instead of 0.
     Clear,
-    /// `vkCreateComputePipelines` leaves specialization constants at their defaults.
+    /// `vkCreateComputePipelines` ignores specialization constants: they keep their defaults.
     Specialize,
     /// `vkInvalidateMappedMemoryRanges` does nothing.
     Invalidate,
 }
 
 impl Change {
-    /// Changes the numbers of a dispatch; true if they differ afterwards. The methods below do the same for other arguments.
+    /// Applies the fault to the parameters of a dispatch. Returns true if they differ afterwards. The following methods do the same for what they
+    /// get.
     pub fn numbers(&self, pass: &Pass, scene: &Scene, params: &mut Params) -> bool {
         match self {
             Change::Numbers { pass: name, by } if pass.name.starts_with(name) => changed(params, |p| by(scene, p)),
@@ -78,8 +79,10 @@ impl Change {
         found.is_some_and(|(_, value)| changed(value, |v| *v = by(*v)))
     }
 
+    /// Applies the fault to the SPIR-V words of a shader. Returns true if they differ afterwards.
+    ///
     /// # Errors
-    /// A module that breaks the format, or does not have the instruction or name to change.
+    /// The module is invalid, or lacks the instruction or name to change.
     pub fn words(&self, pass: &str, words: &mut Vec<u32>) -> Result<bool, SpirvError> {
         match self {
             Change::Shader { pass: name, by } if pass.starts_with(name) => {

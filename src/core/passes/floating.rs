@@ -61,8 +61,8 @@ fn lowered(scene: &Scene) -> f64 {
     (level(scene) - MARGIN).max(0.0)
 }
 
-/// Finds the texels of floating parts: the content of [`Slot::Floating`] for a volume, 255 in such parts. `bytes` are the texels in the
-/// format of [`Slot::WholeVolume`], which is stored completely.
+/// Finds the texels of floating parts and returns the content of [`Slot::Floating`]: one byte a texel, 255 in such parts, otherwise 0. `bytes`: all
+/// texels of the volume in the format of [`Slot::WholeVolume`].
 pub fn find(scene: &Scene, bytes: &[u8]) -> Vec<u8> {
     /// Texels that are decoded at a time.
     const CHUNK: usize = 1 << 16;
@@ -79,7 +79,7 @@ pub fn find(scene: &Scene, bytes: &[u8]) -> Vec<u8> {
     floats.into_iter().map(|floats| if floats { 255 } else { 0 }).collect()
 }
 
-/// The reference of the search for floating parts, in f64, by flood fill from a texel of each part.
+/// The same search in f64 by another method, flood fill from a texel of each part. It is the reference of [`find`].
 pub fn reference(scene: &Scene, volume: &Texels) -> Texels {
     let [columns, rows, slices] = volume.size;
     let (level, reach, sizes) = (level(scene), scene.part_reach() as i64, scene.texel_sizes());

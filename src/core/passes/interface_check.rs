@@ -51,11 +51,11 @@ const OPTIONAL: [&str; 37] = [
     "volume_layer",
 ];
 
-/// Rewrites a pass's shader for a scene: without the textures and tables that the scene does not have, and with an array of layers for each
-/// volume that is one.
+/// Rewrites a pass's shader for a scene: removes the textures and tables that the scene does not have, and makes an array image of each volume that
+/// is stored as layers here.
 ///
 /// # Errors
-/// A module that breaks the format.
+/// The SPIR-V module is invalid.
 pub fn for_scene(pass: &Pass, scene: &Scene, args: &DispatchArgs, words: &[u32]) -> Result<Vec<u32>, String> {
     let bound = [pass.reads(scene, args), pass.writes(scene, args)].concat();
     let absent: Vec<_> = OPTIONAL.into_iter().filter(|name| bound.iter().all(|b| b.name != *name)).collect();
@@ -64,11 +64,11 @@ pub fn for_scene(pass: &Pass, scene: &Scene, args: &DispatchArgs, words: &[u32])
     volumes_to_layers(&words, &layered).map_err(|e| e.to_string())
 }
 
-/// Rewrites a pass's shader for fast execution on a CPU: numbers are loaded once, textures that it only fetches become storage images, and
-/// tables become storage texel buffers where `stores` allows it.
+/// Rewrites a pass's shader for fast execution on a CPU: parameters are loaded once, textures that are only fetched become storage images, and tables
+/// become storage texel buffers where `stores` is true for their slot.
 ///
 /// # Errors
-/// A module that breaks the format.
+/// The SPIR-V module is invalid.
 pub fn for_cpu(
     pass: &Pass,
     scene: &Scene,
@@ -113,7 +113,10 @@ fn image_format(format: Format) -> Option<ImageFormat> {
     })
 }
 
-/// Checks a pass's declaration. The error is the first disagreement and names both sides.
+/// Checks a pass's declaration against its shader's reflection.
+///
+/// # Errors
+/// The first disagreement, with what the declaration and the shader say.
 pub fn check(pass: &Pass, scene: &Scene, args: &DispatchArgs, module: &Module) -> Result<(), String> {
     let (reads, writes) = (pass.reads(scene, args), pass.writes(scene, args));
     for bind in &reads {
@@ -212,7 +215,7 @@ fn type_name(member: &Member) -> String {
     if member.components == 1 { scalar.into() } else { format!("{scalar} x {}", member.components) }
 }
 
-/// Packs the parameters into the block that the shader declares.
+/// Packs the parameters into the bytes of the block that the shader declares.
 pub fn pack(module: &Module, params: &Params) -> Vec<u8> {
     let mut block = vec![0; module.params_size as usize];
     for member in &module.params {

@@ -8,8 +8,9 @@ pub(super) fn floats(values: impl IntoIterator<Item = f64>) -> Vec<f32> {
     values.into_iter().map(|v| v as f32).collect()
 }
 
-/// (sample, line) of every slice pixel in f32, -1 where the pixel is left out. With an apron of 0 the rule of the PLUS toolkit
-/// applies: both neighbours must exist in both directions, so that the last sample and line are left out.
+/// The fractional (sample, line) of every slice pixel, row by row, for scan conversion; (-1, -1) where a pixel is left out. With an apron of 0 the
+/// rule of the PLUS toolkit applies: both neighbours must exist in both directions, so that the last sample and line are left out. Empty for a
+/// Cartesian volume.
 pub fn scan_lut(scene: &Scene) -> Vec<f32> {
     let Some(probe) = scene.probe() else { return Vec::new() };
     let [width, height] = scene.grid.size;
@@ -24,7 +25,7 @@ pub fn scan_lut(scene: &Scene) -> Vec<f32> {
     lut
 }
 
-/// Gain of every sample of a line: a factor for linear envelopes, an addend for log-compressed samples.
+/// Gain of every sample of a line: a factor for linear envelopes, an addend (0..1) for log-compressed samples. Empty for a Cartesian volume.
 pub fn tgc(scene: &Scene) -> Vec<f32> {
     let Some(probe) = scene.probe() else { return Vec::new() };
     let c = &scene.settings.conditioning;
@@ -34,8 +35,8 @@ pub fn tgc(scene: &Scene) -> Vec<f32> {
     }))
 }
 
-/// Fractional (sample, line) that a slice pixel at in-plane (x, y) shows, or none. Samples are counted on the lattice that is
-/// scan-converted: decimated by M, sample j is at sample j M of the frame, and pixels beyond the last sample take the last.
+/// Fractional (sample, line) that the slice pixel at in-plane (x, y), mm, shows. None outside the sector and its apron. Samples are counted after
+/// decimation: with the factor M, sample j is sample j M of the frame, and pixels beyond the last sample take the last.
 pub fn scan_index(scene: &Scene, probe: &Probe, x: f64, y: f64) -> Option<(f64, f64)> {
     let (sample, line) = probe.plane_indices(x, y);
     let factor = f64::from(scene.decimation());
@@ -67,8 +68,8 @@ fn sweep_position(motion: Motion, parameter: f64) -> f64 {
     }
 }
 
-/// The parameter of the line look-up table: the tangent of half the in-plane angle, or mm. For a radial probe that of a quarter, because
-/// the tangent of half has no bound towards 180 degrees.
+/// The abscissa of the line look-up table: the tangent of half the in-plane angle, or mm for a linear array. For a radial probe it is the tangent of
+/// a quarter of the angle, because that of half has no bound towards 180 degrees.
 pub(super) fn line_parameter(probe: &Probe, position: f64) -> f64 {
     match probe.array {
         Array::Curved { .. } if probe.is_radial() => (position / 4.0).tan(),
@@ -85,19 +86,21 @@ fn line_position(probe: &Probe, parameter: f64) -> f64 {
     }
 }
 
-/// Lowest and highest parameter of the sweep table.
+/// Lowest and highest abscissa of the sweep look-up table.
 pub(super) fn sweep_span(probe: &Probe) -> (f64, f64) {
     let (first, last) = probe.slice_bounds();
     (sweep_parameter(probe.motion, first), sweep_parameter(probe.motion, last))
 }
 
-/// What is in the sweep to a shader, as its parameter: a little beyond the outermost slices, where rounding puts places on them.
+/// The interval of the sweep table's abscissa that shaders take as inside the sweep. It is a little wider than the outermost slices, since rounding
+/// may move places on them outside.
 pub(super) fn sweep_border(probe: &Probe) -> [f64; 2] {
     let ((first, last), margin) = (probe.slice_bounds(), 1e-4 * probe.slices.pitch());
     [first - margin, last + margin].map(|position| sweep_parameter(probe.motion, position))
 }
 
-/// Slice position in mean pitches from slice 0, over the sweep's parameter: the slice index for a uniform sweep.
+/// The fractional slice index at equidistant abscissae of the sweep table, in mean slice pitches from slice 0. For a uniform sweep that is the slice
+/// index.
 pub fn sweep_lut(scene: &Scene) -> Vec<f32> {
     let Some(probe) = scene.probe() else { return Vec::new() };
     let entries = scene.settings.ray.entries;
@@ -108,7 +111,7 @@ pub fn sweep_lut(scene: &Scene) -> Vec<f32> {
     }))
 }
 
-/// Share of a frame's lines that fired before the line at each parameter.
+/// Share (0..1) of a frame's lines that fired before a line, at equidistant abscissae of the line table (`line_parameter`).
 pub fn line_lut(scene: &Scene) -> Vec<f32> {
     let Some(probe) = scene.probe() else { return Vec::new() };
     let entries = scene.settings.ray.entries;
@@ -120,7 +123,7 @@ pub fn line_lut(scene: &Scene) -> Vec<f32> {
     }))
 }
 
-/// Position and advance of every slice, in mean pitches from slice 0.
+/// For every slice its position from slice 0 and the motor's travel during its frame, both in mean slice pitches.
 pub fn slice_table(scene: &Scene) -> Vec<f32> {
     let Some(probe) = scene.probe() else { return Vec::new() };
     let pitch = probe.slices.pitch();
@@ -134,7 +137,7 @@ pub fn slice_table(scene: &Scene) -> Vec<f32> {
     }))
 }
 
-/// True if slices have non-uniform positions or mixed directions, so that a slice is found by bracketing.
+/// True if slices have non-uniform positions or are swept in mixed directions, so that shaders search for the slice at a position.
 pub(super) fn is_non_uniform(geometry: &Geometry) -> bool {
     match geometry {
         Geometry::Sweep(p) => matches!(p.slices, Axis::Table(_)) || matches!(p.advance, Advance::Each(_)),
@@ -148,7 +151,8 @@ pub fn transfer_table(scene: &Scene) -> Vec<f32> {
     floats(transfer_of(scene).into_iter().flatten())
 }
 
-/// Integral over the values up to each entry, of absorption times colour and of absorption. Between two entries both are linear in the value.
+/// For each entry of the transfer function, the integrals over the sample value from 0 up to it: of absorption times colour (3 channels) and of
+/// absorption. Between two entries colour and absorption are linear.
 pub(crate) fn transfer_integral(scene: &Scene) -> Vec<f32> {
     let entries = transfer_of(scene);
     let width = 1.0 / (entries.len() - 1) as f64;
@@ -162,8 +166,8 @@ pub(crate) fn transfer_integral(scene: &Scene) -> Vec<f32> {
     floats(sums.into_iter().flatten())
 }
 
-/// The integral of absorption times colour and of absorption, from an entry (`low`) over a share of the way to the next one (`high`); the entries
-/// count as 1 apart.
+/// The integrals of absorption times colour (3 channels) and of absorption over a `share` (0..1) of the way from entry `low` to the next entry
+/// `high`. The distance between two entries counts as 1.
 pub(super) fn transfer_integral_within(low: [f64; 4], high: [f64; 4], share: f64) -> [f64; 4] {
     let rise: [f64; 4] = std::array::from_fn(|c| high[c] - low[c]);
     let (t, kappa) = (share, low[3]);
@@ -173,7 +177,8 @@ pub(super) fn transfer_integral_within(low: [f64; 4], high: [f64; 4], share: f64
     })
 }
 
-/// For each entry of the transfer function the number of entries before it that are not transparent; last the number of all.
+/// For each entry of the transfer function the number of entries before it that are not transparent, and at the end the number of all entries that
+/// are not.
 pub fn opaque_before(scene: &Scene) -> Vec<f32> {
     let absorption: Vec<f32> = transfer_table(scene).chunks_exact(4).map(|entry| entry[3]).collect();
     let mut before = vec![0.0];
@@ -184,12 +189,13 @@ pub fn opaque_before(scene: &Scene) -> Vec<f32> {
     before
 }
 
-/// Mean colour and absorption of a step between every two sample values ([`transfer::pre_integrated`]).
+/// Table over the sample values at the begin and the end of a step: mean colour and absorption of the step ([`transfer::pre_integrated`]).
 pub fn pre_integrated_table(scene: &Scene) -> Vec<f32> {
     floats(transfer::pre_integrated(&transfer_of(scene)).into_iter().flatten())
 }
 
-/// Light and opacity of a step of the scene between every two sample values, then colour and absorption over the value.
+/// Table over the sample values at the begin and the end of a step of the scene's length: premultiplied light and opacity of the step. Behind it
+/// follows the transfer function itself.
 pub(crate) fn self_attenuated_table(scene: &Scene) -> Vec<f32> {
     let (table, length) = (transfer_of(scene), scene.optical_step());
     let rows = (0..table.len()).into_par_iter().flat_map_iter(|front| self_attenuation::row(&table, front, length));
@@ -198,17 +204,17 @@ pub(crate) fn self_attenuated_table(scene: &Scene) -> Vec<f32> {
     steps
 }
 
-/// Red, green, blue and absorption over the sample value.
+/// Red, green, blue and absorption at equidistant windowed sample values: [`transfer_table`] in f64.
 pub(super) fn transfer_of(scene: &Scene) -> Vec<[f64; 4]> {
     transfer::table_of(&scene.settings.volume, scene.reference_length(), scene.transfer_entries())
 }
 
-/// The medium of a still over the sample value: albedo of red, green and blue, and extinction, 1/mm.
+/// The medium of a still at equidistant windowed sample values: albedo of red, green and blue, and extinction, 1/mm.
 pub(super) fn still_medium(scene: &Scene) -> Vec<f32> {
     floats(scene.still_medium(&transfer_of(scene)).into_iter().flatten())
 }
 
-/// The tiles of a picture of planes, as `Tiling::table` lays them out, relative to [`Scene::local_origin`].
+/// The tiles of a picture of planes as shaders read them (`Tiling::table`), relative to [`Scene::local_origin`].
 pub(super) fn tile_table(scene: &Scene) -> Vec<f32> {
     let mut tiling = scene.tiling();
     for tile in &mut tiling.tiles {
@@ -218,7 +224,7 @@ pub(super) fn tile_table(scene: &Scene) -> Vec<f32> {
     floats(tiling.table(scene.settings.planes.thickness))
 }
 
-/// The columns of a curved plane, as `Tiling::column_table` lays them out, relative to [`Scene::local_origin`].
+/// The columns of a curved plane as shaders read them (`Tiling::column_table`), relative to [`Scene::local_origin`].
 pub(super) fn curve_table(scene: &Scene) -> Vec<f32> {
     let mut tiling = scene.tiling();
     if let Some(section) = tiling.tiles.last_mut().and_then(|tile| tile.section.as_mut()) {
@@ -227,7 +233,8 @@ pub(super) fn curve_table(scene: &Scene) -> Vec<f32> {
     floats(tiling.column_table(scene.settings.planes.thickness))
 }
 
-/// Outward normal and limit of each half-space of the block, relative to [`Scene::local_origin`].
+/// The half-spaces of the block of mode cube, four floats each: the outward normal n and the limit w of dot(n, p) <= w, for p relative to
+/// [`Scene::local_origin`], mm.
 pub(super) fn block_table(scene: &Scene) -> Vec<f32> {
     floats(
         scene
@@ -237,7 +244,7 @@ pub(super) fn block_table(scene: &Scene) -> Vec<f32> {
     )
 }
 
-/// The part of the texture that the samples of each brick may touch, x fastest.
+/// For each brick the texels that samples in it may touch; bricks are in the order x fastest, then y.
 pub(super) fn brick_reaches(scene: &Scene, bricks: &Bricks) -> Vec<Reach> {
     let [width, height, _] = bricks.count.map(u64::from);
     let cell = |n: u64| [n % width, n / width % height, n / (width * height)].map(|n| n as u32);
@@ -252,7 +259,8 @@ fn side_code(side: Side) -> u32 {
     }
 }
 
-/// Each brick's tile columns, tile rows and slices (first * 4096 + last, exact in f32), and the side.
+/// The table of bricks for shaders, four floats each: the ranges of tile columns, tile rows and slices that its samples may touch (packed as first *
+/// 4096 + last, exact in f32), and its [`Side`] as a number (0 outside, 1 across, 2 inside).
 pub fn brick_table(scene: &Scene) -> Vec<f32> {
     let packed = |[first, last]: [u32; 2]| (first * 4096 + last) as f32;
     let entry = |reach: &Reach| {

@@ -54,7 +54,7 @@ pub mod shade;
 pub use pass::*;
 pub use times::PassTime;
 
-/// All passes in the order in which they run.
+/// All passes, in the order in which a frame and a picture run them.
 pub const PASSES: &[Pass] = &[
     preprocess::CONDITION,
     preprocess::LOAD_SLICE,
@@ -130,20 +130,20 @@ pub const PASSES: &[Pass] = &[
     postprocess::TONE,
 ];
 
-/// A measured interval, ns since the begin of the run.
+/// A measured interval on the device or the host. `begin` and `end` are ns since the begin of the run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Span {
     pub name: &'static str,
     pub on_device: bool,
     pub begin: f64,
     pub end: f64,
-    /// Number of runs that it counts as: one for each frame of a batch.
+    /// Number of runs of the pass that the interval holds: one for each frame of a batch.
     pub runs: u32,
-    /// Number of shader invocations. None if the device does not count them.
+    /// Number of shader invocations that the device counted. None if it counts none.
     pub invocations: Option<u64>,
 }
 
-/// The pass of that name.
+/// The pass of that name. None if there is none.
 pub fn by_name(name: &str) -> Option<&'static Pass> {
     PASSES.iter().find(|p| p.name == name)
 }

@@ -8,7 +8,7 @@ use crate::scene::Scene;
 use glam::DVec3;
 use std::ops::Deref;
 
-/// The distance of a ray that hit nothing: the largest finite float, so that shaders need no infinities.
+/// The value of a distance map where the ray hit nothing: the largest finite float, so that shaders need no infinities.
 pub const MISS: f64 = f32::MAX as f64;
 
 pub fn is_hit(distance: f64) -> bool {
@@ -45,18 +45,18 @@ pub enum Frequency {
     Picture,
 }
 
-/// The numbers that differ between two dispatches of the same pass and scene. By default a pass over frames gets one frame.
+/// The numbers that differ between two dispatches of the same pass and scene. The default is one frame in slice 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DispatchArgs {
-    /// Layer of the frame array that holds the first frame.
+    /// The layer of the frame array that holds the first frame of the dispatch.
     pub layer: u32,
     /// The first slice that the dispatch writes. For a pass over frames it is the slice of the first frame.
     pub slice: u32,
     /// Number of slices that the dispatch writes. For a pass over frames it is the number of frames.
     pub slices: u32,
-    /// Number of the dispatch, from 0, within a pass that repeats.
+    /// Number of the dispatch, from 0, among those of a pass that repeats.
     pub iteration: u32,
-    /// Index of the copy of multi-buffered slots that the dispatch uses.
+    /// Index of the volume image: which copy of multibuffered slots the dispatch uses.
     pub image: u32,
 }
 
@@ -66,14 +66,14 @@ impl Default for DispatchArgs {
     }
 }
 
-/// One dispatch as its pass sees it: the numbers, and the slots of the filter chain that the pass is a link of.
+/// The arguments of one dispatch, and the slots that it reads and writes as a link of a filter chain.
 pub struct Dispatch<'a> {
     args: &'a DispatchArgs,
     slots: Option<(Slot, Slot)>,
 }
 
 impl<'a> Dispatch<'a> {
-    /// `slots`: what the link reads and writes.
+    /// `slots`: the slots (read, written) of the chain. None for a pass that is no link.
     pub(super) fn new(args: &'a DispatchArgs, slots: Option<(Slot, Slot)>) -> Dispatch<'a> {
         Dispatch { args, slots }
     }
@@ -81,7 +81,7 @@ impl<'a> Dispatch<'a> {
     /// The slot that this link of the chain reads.
     ///
     /// # Panics
-    /// When the pass declares [`Link::None`].
+    /// If the pass is no link of a chain: [`Link::None`] or [`Link::AfterSlices`].
     pub fn source(&self) -> Slot {
         self.link().0
     }
@@ -89,12 +89,12 @@ impl<'a> Dispatch<'a> {
     /// The slot that this link of the chain writes.
     ///
     /// # Panics
-    /// When the pass declares [`Link::None`].
+    /// If the pass is no link of a chain: [`Link::None`] or [`Link::AfterSlices`].
     pub fn target(&self) -> Slot {
         self.link().1
     }
 
-    /// True if this link writes into the 3D texture: it is the last of its chain.
+    /// True if this link writes into the 3D texture, because it is the last filter of slices.
     pub(super) fn writes_volume(&self) -> bool {
         self.target().is_volume()
     }
@@ -115,28 +115,28 @@ impl Deref for Dispatch<'_> {
     }
 }
 
-/// The part of a slot that one dispatch touches.
+/// The part of a slot that one dispatch reads or writes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
     Whole,
-    /// The dispatch's slices of a 3D texture, or a layer from the first on for each of them. All of a plane.
+    /// Of a 3D texture the dispatch's slices, of an array the dispatch's layers, and of a 2D image all of it.
     Slices,
-    /// The dispatch's layers of the frame array.
+    /// The layers of the frame array from [`DispatchArgs::layer`] on, one for each frame of the dispatch.
     Layers,
-    /// The dispatch's slices of a 3D texture, and that many more on either side.
+    /// The dispatch's slices of a 3D texture, and this many more on either side.
     Around(u32),
-    /// All of it. The first three texels are the number of workgroups along x, y and z. The device reads them when it executes the
-    /// dispatch.
+    /// The whole slot, which sets the size of an indirect dispatch: its first three texels are the number of workgroups along x, y and z, which the
+    /// device reads when it executes the dispatch.
     Groups,
 }
 
-/// A slot under the name that the shader gives it.
+/// One binding of a dispatch: a slot under the name that the shader gives it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Bind {
     pub name: &'static str,
     pub slot: Slot,
     pub part: Part,
-    /// True if the device's linear filter samples the slot. Otherwise the shader only fetches texels.
+    /// True if the shader samples the slot through the device's linear filter. Otherwise it only fetches texels.
     pub filtered: bool,
 }
 
@@ -144,7 +144,7 @@ pub fn whole(name: &'static str, slot: Slot) -> Bind {
     Bind { name, slot, part: Part::Whole, filtered: false }
 }
 
-/// The dispatch's slices.
+/// Binds the dispatch's slices of a slot.
 pub fn slices(name: &'static str, slot: Slot) -> Bind {
     Bind { part: Part::Slices, ..whole(name, slot) }
 }
@@ -153,17 +153,17 @@ pub fn layers(name: &'static str, slot: Slot) -> Bind {
     Bind { part: Part::Layers, ..whole(name, slot) }
 }
 
-/// The dispatch's slices of a slot of a filter chain; of the frames, which a chain may begin with, its layers.
+/// Binds a slot of a filter chain: the dispatch's slices of a volume, or its layers of the frame array, which a chain may begin with.
 pub(super) fn chain_slot(name: &'static str, slot: Slot) -> Bind {
     if slot == Slot::Frames { layers(name, slot) } else { slices(name, slot) }
 }
 
-/// What a filter reads: its chain's slot, which shaders name `source`.
+/// The input of a filter: its chain's slot, which shaders name `source`.
 pub(super) fn reads_source(_: &Scene, dispatch: &Dispatch) -> Vec<Bind> {
     vec![chain_slot("source", dispatch.source())]
 }
 
-/// What a filter writes: its chain's slot, which shaders name `target`; of the 3D texture the dispatch's slices.
+/// The output of a filter: its chain's slot, which shaders name `target`. Of the 3D texture only the dispatch's slices are written.
 pub(super) fn writes_target(_: &Scene, dispatch: &Dispatch) -> Vec<Bind> {
     vec![slices("target", dispatch.target())]
 }
@@ -173,7 +173,7 @@ pub(super) fn writes_target(_: &Scene, dispatch: &Dispatch) -> Vec<Bind> {
 pub enum Chain {
     /// The slices of stage 1, from the frame to the 3D texture.
     Slices,
-    /// The slices of the volume that planes beside a rendering are cut from.
+    /// The slices of the section volume ([`Slot::SectionVolume`]), which planes beside a rendering are cut from.
     Sections,
     /// The distance maps of stage 3.
     Distances,
@@ -182,7 +182,7 @@ pub enum Chain {
 }
 
 impl Chain {
-    /// The volume that frames go to by this chain, smoothed; none of the others.
+    /// The volume that the slices of this chain make, after smoothing across slices. None for chains of distance maps and pictures.
     pub(super) fn volume(self, scene: &Scene) -> Option<Slot> {
         match self {
             Chain::Slices if scene.drops_floating() => Some(Slot::WholeVolume),
@@ -193,98 +193,99 @@ impl Chain {
     }
 }
 
-/// The need of a pass of the volume that planes beside a rendering are cut from.
+/// The need of a pass that makes the section volume: `need`, or an error if the scene has no section volume.
 pub(super) fn of_sections(scene: &Scene, need: Need) -> Need {
     if scene.has_sections() { need } else { Err("no planes are cut from a volume of their own") }
 }
 
-/// How a pass takes part in a filter chain. Its slots and the part of a slice that it makes follow from this.
+/// How a pass takes part in a filter chain. The slots that it reads and writes, and the part of a slice that it makes, follow from this.
 #[derive(Clone, Copy)]
 pub enum Link {
     /// It takes no part: the pass names its own slots and computes all of its extent.
     None,
     /// It filters the output of the link before it.
     Filter(Filter),
-    /// It reads the state of the chain at this place of `PASSES` and passes nothing on. A pass after the chain reads its end.
+    /// It reads what the chain holds at this place of [`PASSES`](super::PASSES) and writes slots of its own. If it stands after the last filter, it
+    /// reads the end of the chain.
     Observer(Chain),
-    /// Reads the slices of the volume after their chain, and makes the visible part of each.
+    /// It reads the finished slices of the volume, and makes the visible part of each slice of its own output.
     AfterSlices,
 }
 
-/// A filter of a chain.
+/// A filter of a chain. One step of it is one application of the filter, which may take several dispatches.
 #[derive(Clone, Copy)]
 pub struct Filter {
     pub chain: Chain,
-    /// Number of dispatches of one step. Their intermediate results stay within the pass.
+    /// Number of dispatches of one step. What they hand on to each other is in slots of the pass's own.
     pub dispatches: fn(&Scene) -> u32,
-    /// How many columns and rows around a texel one step on slices reads. None: from border to border. Filters before it compute this much
-    /// more than the visible part.
+    /// How many columns and rows around a texel one step reads; for slices only. None if each texel depends on the complete slice. The filters before
+    /// it compute that much more than the visible part.
     pub reach: fn(&Scene) -> Option<[u32; 2]>,
-    /// Adjacent texels that an invocation makes, along an axis that the pass's extent shortens.
+    /// Number of adjacent texels that one invocation makes, along the axis along which the pass's extent is shorter than the slice.
     pub run: u32,
-    /// True if a step would store its input without loss. Alone in its chain such a step is left out, and frames are copied.
+    /// True if a step would store its input without loss. If it is the only filter of its chain it is left out, and frames are copied.
     pub copies: fn(&Scene) -> bool,
-    /// True if the next filter could read the input of a step instead of its output. Before another filter such a step is left out.
+    /// True if the next filter could read this step's input instead of its output. If another filter follows, the step is left out.
     pub is_identity: fn(&Scene) -> bool,
 }
 
 impl Filter {
-    /// A filter of that chain that reads one texel and takes one dispatch a step.
+    /// A filter of this chain that reads one texel for each that it writes, and takes one dispatch a step.
     pub const fn of(chain: Chain) -> Filter {
         Filter { chain, dispatches: once, reach: |_| Some([0; 2]), run: RUN, copies: |_| false, is_identity: |_| false }
     }
 
-    /// A filter of slices that looks that many columns and rows away.
+    /// A filter of slices that reads `reach` columns and rows around each texel ([`Filter::reach`]).
     pub(super) const fn of_slices(reach: fn(&Scene) -> Option<[u32; 2]>) -> Filter {
         Filter { reach, ..Filter::of(Chain::Slices) }
     }
 }
 
-/// Whether a scene needs a pass, with the reason, for `--explain`.
+/// Whether a scene needs a pass: `Ok` with the reason, or `Err` with the reason why not. `--explain` prints it.
 pub type Need = Result<&'static str, &'static str>;
 
-/// Largest error against the reference on the test inputs.
+/// The largest error that a pass may have against its reference on the test inputs.
 #[derive(Clone, Copy, Debug)]
 pub struct Tolerance {
-    /// Absolute, in the units of the output.
+    /// Absolute error, in the units of the output.
     pub absolute: f64,
-    /// Relative to the expected value. The larger of the two tolerances applies.
+    /// Error relative to the expected value. The larger of the absolute and the relative tolerance applies.
     pub relative: f64,
-    /// Share of texels whose error may be larger, because a branch may take the other side.
+    /// Share (0..1) of the texels whose error may be larger, because a branch may go the other way by rounding.
     pub outliers: f64,
     pub why: &'static str,
 }
 
-/// One compute dispatch. This is the only place where it is described. Callers use the methods with the names of the fields.
+/// The declaration of a compute pass, the only place where it is described. Callers use the methods with the names of the fields.
 pub struct Pass {
-    /// Debug label, time stamp and test case; unique.
+    /// Unique name: debug label, name of its time stamps and of its test case.
     pub name: &'static str,
     pub stage: Stage,
     pub frequency: Frequency,
-    /// The pass's part in a filter chain.
+    /// The part that it has in a filter chain.
     pub link: Link,
-    /// Path below glsl/ and variant.
+    /// Path of the shader below glsl/, with its variant.
     pub shader: fn(&Scene, &Dispatch) -> &'static str,
     pub needed: fn(&Scene) -> Need,
     pub reads: fn(&Scene, &Dispatch) -> Vec<Bind>,
     pub writes: fn(&Scene, &Dispatch) -> Vec<Bind>,
-    /// Invocations, not workgroups.
+    /// Number of invocations (not workgroups) along x, y and z.
     pub extent: fn(&Scene, &DispatchArgs) -> [u32; 3],
-    /// Dispatches in a row, with [`DispatchArgs::iteration`] counting.
+    /// Number of dispatches in a row; [`DispatchArgs::iteration`] counts them.
     pub repeat: fn(&Scene) -> u32,
-    /// The numbers of a dispatch. They change from picture to picture without compiling anything.
+    /// The parameters of a dispatch. They may change from picture to picture without a new pipeline.
     pub params: fn(&Scene, &DispatchArgs) -> Params,
     /// Specialization constants: the structure of a dispatch. Another value is another pipeline.
     pub constants: fn(&Scene, &Dispatch) -> Vec<(&'static str, i32)>,
     pub tolerance: Tolerance,
-    /// The same result computed from the formula in f64. It reads arrays by the shader's names. Texels that it leaves NaN stay untouched.
-    /// For a pass over frames it is called for each frame, with that frame's layer of every array of layers.
+    /// Computes the outputs of a dispatch from the formula in f64, in arrays named as in the shader: inputs, then outputs. Texels that it leaves NaN
+    /// are not written by the dispatch. For a pass over frames it is called once a frame, with that frame's layer of every array of layers.
     pub reference: fn(&Scene, &Dispatch, &Arrays, &mut Arrays),
 }
 
 impl Pass {
-    /// What most passes of the rays have in common: one invocation and one dispatch a picture, without parameters and constants. What is
-    /// left empty here is different in every pass, and no pass without it passes its tests.
+    /// Defaults of passes with one invocation per ray and one dispatch a picture, without parameters and constants. Every pass has to replace the
+    /// fields that are empty here; tests fail otherwise.
     pub(super) const OF_RAYS: Pass = Pass {
         name: "",
         stage: Stage::Raycast,
@@ -302,7 +303,7 @@ impl Pass {
         reference: |_, _, _, _| {},
     };
 
-    /// The same of passes that make slices of frames.
+    /// Defaults of passes that make slices from frames, as [`Pass::OF_RAYS`].
     pub(super) const OF_SLICES: Pass = Pass {
         stage: Stage::Preprocess,
         frequency: Frequency::Frame,
@@ -310,10 +311,10 @@ impl Pass {
         ..Pass::filter(Chain::Slices)
     };
 
-    /// The same of filters of the distance map.
+    /// Defaults of filters of the distance map, as [`Pass::OF_RAYS`].
     pub(super) const OF_DISTANCES: Pass = Pass { stage: Stage::Shade, ..Pass::filter(Chain::Distances) };
 
-    /// The same of filters of the picture.
+    /// Defaults of filters of the picture, as [`Pass::OF_RAYS`].
     pub(super) const OF_PICTURES: Pass =
         Pass { stage: Stage::Postprocess, extent: picture_extent, ..Pass::filter(Chain::Pictures) };
 
@@ -330,7 +331,7 @@ pub(super) fn no_constants(_: &Scene, _: &Dispatch) -> Vec<(&'static str, i32)> 
     Vec::new()
 }
 
-/// One invocation per texel of each slice.
+/// One invocation per texel of each of the dispatch's slices.
 pub(super) fn slice_extent(scene: &Scene, args: &DispatchArgs) -> [u32; 3] {
     [scene.grid.size[0], scene.grid.size[1], args.slices]
 }
@@ -345,20 +346,20 @@ pub(super) fn ray_extent(scene: &Scene, _: &DispatchArgs) -> [u32; 3] {
     [scene.ray_size()[0], scene.ray_size()[1], 1]
 }
 
-/// One invocation per pixel of the rendering.
+/// One invocation per pixel of the part of the picture that shows the rendering.
 pub(super) fn rendering_extent(scene: &Scene, _: &DispatchArgs) -> [u32; 3] {
     [scene.rendering_size()[0], scene.rendering_size()[1], 1]
 }
 
-/// Number of adjacent texels that one invocation of some filters computes, because their windows share most texels: RUN of glsl/filter.
+/// Number of adjacent texels that one invocation of most filters computes, because their windows share most texels: RUN of glsl/filter.
 pub const RUN: u32 = 4;
 
-/// Invocations that make so many texels in runs along an axis.
+/// Number of invocations along each axis that make `texels`, each a run of [`RUN`] texels along `axis`.
 pub(crate) fn in_runs(texels: [u32; 3], axis: usize) -> [u32; 3] {
     in_runs_of(RUN, texels, axis)
 }
 
-/// Number of invocations that compute these texels in runs of this length along an axis.
+/// As [`in_runs`], with runs of `run` texels.
 pub fn in_runs_of(run: u32, mut texels: [u32; 3], axis: usize) -> [u32; 3] {
     texels[axis] = texels[axis].div_ceil(run);
     texels
@@ -371,8 +372,8 @@ pub const GROUP: u32 = 8;
 /// subgroups that it holds.
 const LARGEST_TILE: u32 = 8 << 10;
 
-/// Whether a workgroup reads its texels once into shared memory, of which they take so many words: glsl/include/workgroup_tile.glsl. A CPU, which has none
-/// of its own, reads them once more as fast.
+/// True if the invocations of a workgroup read their texels once into shared memory (glsl/include/workgroup_tile.glsl), which must hold `words` words
+/// of 4 bytes. On a CPU it is false: it has no shared memory, and reads texels again as fast.
 pub(super) fn reads_tile(scene: &Scene, words: u32) -> bool {
     4 * words <= LARGEST_TILE.min(scene.shared_memory)
 }
@@ -384,14 +385,14 @@ pub enum Value {
     Vec2([f32; 2]),
     Vec3([f32; 3]),
     Vec4([f32; 4]),
-    /// An array, of which the first may be all that are set.
+    /// An array of floats; elements that were not set are 0.
     Floats([f32; MOST_FLOATS]),
 }
 
 /// The length of arrays of parameters.
 const MOST_FLOATS: usize = 32;
 
-/// Numbers of one dispatch, by the names that the shader gives them.
+/// Parameters of one dispatch, by the names that the shader gives them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Params(pub Vec<(&'static str, Value)>);
 
@@ -400,7 +401,7 @@ fn finite(value: f64) -> f32 {
 }
 
 impl Params {
-    /// Adds a number, clamped to finite values, so that shaders need no infinities.
+    /// Adds a float. Infinities become the largest finite float, so that shaders need not handle them.
     pub fn f32(mut self, name: &'static str, value: f64) -> Params {
         self.0.push((name, Value::F32(finite(value))));
         self
@@ -411,7 +412,7 @@ impl Params {
         self
     }
 
-    /// The texel of the volume that its image begins with.
+    /// Adds the first texel of the volume that the device stores: column, row and slice.
     pub(super) fn first_stored(self, scene: &Scene) -> Params {
         let [column, row, slice] = Slot::Volume.first_texel(scene);
         self.i32("first_stored_column", column).i32("first_stored_row", row).i32("first_stored_slice", slice)
@@ -427,7 +428,7 @@ impl Params {
         self
     }
 
-    /// As many as the array has at most; the others are 0.
+    /// Adds an array of the first 32 of these values; missing ones are 0.
     pub(super) fn floats(mut self, name: &'static str, values: &[f64]) -> Params {
         let value = |n: usize| values.get(n).copied().map_or(0.0, finite);
         self.0.push((name, Value::Floats(std::array::from_fn(value))));
@@ -440,7 +441,7 @@ impl Params {
     }
 }
 
-/// The rays of a scene, as every shader that casts or retraces them names them; relative to [`Scene::local_origin`].
+/// The rays of a scene as parameters, under the names that all shaders give them; relative to [`Scene::local_origin`].
 pub(super) fn ray_params(scene: &Scene) -> Params {
     let rays = &scene.rays;
     Params::default()

@@ -10,7 +10,7 @@ use glam::DVec3;
 /// Opacity of a cross-line: the anatomy below it stays visible.
 pub(in crate::passes) const LINE_STRENGTH: f64 = 0.7;
 
-/// Contrast, brightness, gamma and colour map; cross-lines and frames over planes; the picture in 8 bits.
+/// Applies contrast, brightness, gamma and colour map, draws cross-lines and borders over planes, and stores the picture in 8 bits.
 pub const TONE: Pass = Pass {
     name: "tone",
     stage: Stage::Postprocess,
@@ -67,7 +67,7 @@ fn tone_and_lines_constants(scene: &Scene) -> Vec<(&'static str, i32)> {
     [tone_constants(scene), vec![("LINES", lines)]].concat()
 }
 
-/// Adds the numbers of toning to those of a pass.
+/// Adds the parameters of contrast, brightness, gamma and colour map to those of a pass.
 pub(crate) fn tone_params(scene: &Scene, params: Params) -> Params {
     let post = &scene.settings.post;
     let [a, b, c, d, e] = transfer::colour_map(post.colour_map);
@@ -82,7 +82,7 @@ pub(crate) fn tone_params(scene: &Scene, params: Params) -> Params {
         .vec3("map_4", e)
 }
 
-/// The constants of toning.
+/// Specialization constants of a pass that applies contrast, brightness, gamma and colour map.
 pub(crate) fn tone_constants(scene: &Scene) -> Vec<(&'static str, i32)> {
     let post = &scene.settings.post;
     vec![
@@ -92,7 +92,8 @@ pub(crate) fn tone_constants(scene: &Scene) -> Vec<(&'static str, i32)> {
     ]
 }
 
-/// The colour on the screen, black where there is none; with the lines of the tiling, if it has any.
+/// The colour on the screen (0..1, opaque) of pixel (x, y), whose colour before toning is `colour`; black for None. With the lines of `tiling`, if
+/// there is one.
 pub(crate) fn reference_pixel(
     scene: &Scene,
     tiling: Option<&Tiling>,
@@ -190,8 +191,9 @@ fn assemble_extent(scene: &Scene, _: &DispatchArgs) -> [u32; 3] {
     }
 }
 
-/// The picture from the rendering: the mean of several rays per pixel; what is near and what is far at an edge of a surface, by the share of the pixel that
-/// each covers; or interpolation between the rays where one ray makes several pixels, without mixing what is near with what lies far behind it; the rendering next to planes; in a pair, the composited volume next to the lit surface.
+/// Makes the picture from what was rendered. Several rays per pixel are averaged. At an edge of a surface the near and the far colour are mixed by
+/// the share of the pixel that each covers. Where one ray makes several pixels, pixels are interpolated between rays, without mixing what is near
+/// with what lies far behind it. Planes are placed next to the rendering; in a pair, the composited volume is placed next to the lit surface.
 pub(crate) const ASSEMBLE: Pass = Pass {
     name: "assemble",
     stage: Stage::Postprocess,
@@ -219,7 +221,7 @@ pub(crate) const ASSEMBLE: Pass = Pass {
     reference: |scene, _, reads, writes| assemble(scene, reads, writes.get_mut("picture")),
 };
 
-/// The pass [`ASSEMBLE`] that also tones and stores 8 bits.
+/// Does the same as [`ASSEMBLE`], and also tones the picture and stores it in 8 bits.
 pub(crate) const ASSEMBLE_TONED: Pass = Pass {
     name: "assemble_toned",
     shader: |_, _| "postprocess/assemble.toned",

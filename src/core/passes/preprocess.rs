@@ -7,7 +7,7 @@ use crate::passes::slots::Format;
 use crate::probe::StoredType;
 use crate::scene::{Conditioning, Scene, VolumeFormat, gaussian_radius};
 
-/// Scan conversion of each polar frame into a slice, through the look-up table (thesis 4.3, Fig. 31).
+/// Converts each polar frame into a slice, through the look-up table (thesis 4.3, Fig. 31).
 pub(crate) const SCAN_CONVERT: Pass = Pass {
     name: "scan_convert",
     shader: |_, _| "preprocess/scan_convert",
@@ -55,7 +55,7 @@ pub(crate) const SCAN_CONVERT: Pass = Pass {
     ..Pass::OF_SLICES
 };
 
-/// Scan conversion for the section volume, made again because a filter may have overwritten the first one.
+/// Scan conversion for the section volume. It is done again because a filter may have overwritten the result of the first one.
 pub(crate) const SECTION_SCAN_CONVERT: Pass = Pass {
     name: "section_scan_convert",
     link: Link::Filter(Filter::of(Chain::Sections)),
@@ -82,8 +82,8 @@ fn scale(scene: &Scene) -> (f64, f64) {
     if scene.conditions() { (1.0, 0.0) } else { normalisation(scene) }
 }
 
-/// Line conditioning of polar frames before scan conversion (thesis 4.3): time gain compensation, Gaussian low pass and
-/// decimation along the lines, log compression. Sample j of the result is centred on sample j M of the frame.
+/// Conditions the lines of polar frames before scan conversion (thesis 4.3): time gain compensation, Gaussian low pass and decimation along the
+/// lines, log compression. With the decimation factor M, sample j of the result is centred on sample j M of the frame.
 pub(crate) const CONDITION: Pass = Pass {
     name: "condition",
     stage: Stage::Preprocess,
@@ -179,7 +179,7 @@ fn compressed(c: &Conditioning, value: f64) -> f64 {
     }
 }
 
-/// Slices of a Cartesian volume, scaled to 0..1.
+/// Loads the slices of a Cartesian volume and scales them to 0..1.
 pub(crate) const LOAD_SLICE: Pass = Pass {
     name: "load_slice",
     link: Link::Filter(Filter { copies: stores_without_loss, is_identity: is_unscaled, ..Filter::of(Chain::Slices) }),
@@ -232,8 +232,8 @@ fn load_params(scene: &Scene, args: &DispatchArgs) -> Params {
     Params::default().f32("gain", gain).f32("offset", offset).i32("slice", args.slice)
 }
 
-/// Stores every texel of a slice together with its neighbours one column and one row on. An interpolated sample then takes two loads, one a
-/// slice. This needs four times the volume's memory, and one more pass over every new slice.
+/// Stores every texel of a slice together with its neighbours one column and one row on, so that an interpolated sample takes two loads, one a slice.
+/// This needs four times the volume's memory in addition, and one more pass over every new slice.
 pub const PACKED_NEIGHBOURS: Pass = Pass {
     name: "packed_neighbours",
     stage: Stage::Preprocess,
@@ -283,7 +283,7 @@ fn packed_format(scene: &Scene) -> i32 {
     }
 }
 
-/// SAMPLING of ray.glsl where rays load packed neighbours.
+/// The value of the constant SAMPLING of ray.glsl for rays that load packed neighbours.
 pub(in crate::passes) fn packed_sampling(scene: &Scene) -> i32 {
     2 + packed_format(scene)
 }

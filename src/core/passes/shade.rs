@@ -6,7 +6,8 @@ use crate::passes::raycast::cap;
 use crate::scene::{Dims, Mode, Scene, Shadow, Skin, SurfaceColour};
 use glam::DVec3;
 
-/// Blinn-Phong (thesis 4-4..4-7) with a directional or point light, with shadow, occlusion and the look of skin where requested.
+/// Lights the distance map: Blinn-Phong (thesis 4-4..4-7) with a directional or point light, with shadow, occlusion and the look of skin where
+/// requested.
 pub const LIGHT: Pass = Pass {
     name: "light",
     link: Link::Observer(Chain::Distances),
@@ -139,7 +140,8 @@ fn reference_pixel(scene: &Scene, reads: &Arrays, light: Option<(DVec3, DVec3)>,
     [colour.x, colour.y, colour.z, opacity]
 }
 
-/// Red wraps furthest: light travels furthest through skin at long wavelengths.
+/// How far light wraps around the surface in red, green and blue, for the setting `share` (0..1). Red wraps furthest, because long wavelengths travel
+/// furthest through skin.
 pub(super) fn wrap(share: f64) -> DVec3 {
     DVec3::new(1.0, 0.55, 0.35) * share
 }
@@ -257,8 +259,8 @@ fn stride(scene: &Scene, distance: f64, to_light: DVec3, along: DVec3) -> f64 {
     (pixel / across.max(1e-6)).min(0.5 * shadow.thickness / behind.max(1e-6)).max(0.25 * pixel)
 }
 
-/// Shadow, by tracing the distance map towards the light (thesis Fig. 41): the map is taken as the front of matter that is
-/// `thickness` deep, and a place on the way to the light that lies in it is where the light is blocked.
+/// Computes the shadow by tracing the distance map towards the light (thesis Fig. 41). The map is taken as the front of matter that is `thickness`
+/// deep; the light is blocked where the way towards it goes through that matter.
 pub const SHADOW: Pass = Pass {
     name: "shadow",
     link: Link::Observer(Chain::Distances),
@@ -383,8 +385,8 @@ const GOLDEN_ANGLE: f64 = 2.399_963_23;
 /// Cosine above the tangent plane that is ignored: the map's own roughness.
 const ROUGHNESS: f64 = 0.1;
 
-/// Ambient occlusion in image space: surfaces that rise above a pixel's tangent plane nearby occlude ambient light. (Mittring 2007;
-/// Bavoil and Sainz 2008.)
+/// Computes ambient occlusion in image space: surfaces that rise above a pixel's tangent plane nearby occlude ambient light. (Mittring 2007; Bavoil
+/// and Sainz 2008.)
 pub(crate) const OCCLUSION: Pass = Pass {
     name: "occlusion",
     link: Link::Observer(Chain::Distances),
@@ -494,9 +496,9 @@ fn place(scene: &Scene, distances: &Texels, x: i64, y: i64) -> Option<(DVec3, f6
     Some((origin + direction * distance, distance))
 }
 
-/// Unit normal at a pixel, towards the viewer. No difference is taken across a cliff. A step that is no cliff yet is no slope either: of the two
-/// differences along an axis the steeper one counts less, by weights as in a WENO scheme of second order (Liu, Osher and Chan 1994). Between two cliffs that
-/// rise the same way a pixel lies on a flank that is as steep as the lower one; between two that do not, it faces the viewer.
+/// Unit normal of the surface at a pixel, towards the viewer; None where nothing was hit. No difference is taken across a cliff (another surface). Of
+/// the two differences along an axis the steeper one counts less, by weights as in a WENO scheme of second order (Liu, Osher and Chan 1994). A pixel
+/// between two cliffs that rise the same way lies on a flank as steep as the lower one; between two others it faces the viewer.
 pub fn normal(scene: &Scene, distances: &Texels, x: i64, y: i64) -> Option<DVec3> {
     let (here, distance) = place(scene, distances, x, y)?;
     let slope = |dx: i64, dy: i64, facing: DVec3| {

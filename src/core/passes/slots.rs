@@ -8,14 +8,14 @@ use crate::probe::StoredType;
 use crate::scene::planes::{TILE_VECTORS, cell};
 use crate::scene::{Propagation, Scene, SurfaceColour, VolumeFormat, WindowTexels};
 
-/// Largest number of batches of frames in flight: entries of the staging ring. The frame array has layers for each.
+/// Largest number of batches of frames in flight, and of entries of the staging ring. The frame array has layers for each entry.
 pub const BATCHES_IN_FLIGHT: u32 = 4;
 
 /// Most frames that go through stage 1 at once. Submitting a batch of so many costs little more than a single frame.
 const MAX_FRAMES: u64 = 16;
 
-/// Maximum bytes of the samples of a batch, and of each slot between its filters, unless a single frame is larger. This much stays in the
-/// caches of a CPU, and takes a GPU several times longer than the host needs to submit it.
+/// Largest size in bytes of the samples of a batch, and of each slot between its filters, unless a single frame is larger. A CPU's caches hold this
+/// much; a GPU works on it several times longer than the host needs to submit it.
 pub fn batch_bytes(scene: &Scene) -> u64 {
     if scene.is_for_cpu() { 4 << 20 } else { 16 << 20 }
 }
@@ -49,12 +49,12 @@ struct Descriptor {
     crosses_queues: bool,
 }
 
-/// What the values of a slot are, for whoever reads it (`--dump`).
+/// What the values of a slot mean; `--dump` prints it.
 #[derive(Clone, Copy)]
 pub(crate) struct Meaning {
     pub channels: &'static [&'static str],
     pub unit: &'static str,
-    /// The value where nothing was hit.
+    /// The value of a ray that hit nothing. None if the slot has no such value.
     pub miss: Option<f64>,
 }
 
@@ -64,25 +64,25 @@ const COST: &str = "cost of a candidate above that of no surface";
 /// Of samples of the recording.
 const SHARE_OF_RANGE: &str = "share of the range of the recording's samples, 0..1, before the grey window";
 
-/// The first writer of a slot.
+/// What fills a slot first.
 #[derive(Clone, Copy)]
 pub enum Initializer {
     ByPasses,
     ByFrames,
-    /// The CPU computes the content from the scene in f64. It is stored as f32.
+    /// The CPU computes the content from the scene in f64 and stores it as f32.
     ByScene(fn(&Scene) -> Vec<f32>),
-    /// The CPU finds the content in a volume when the volume is complete.
+    /// The CPU finds the content by a search in a complete volume.
     ByVolume(Search),
 }
 
 /// A search in a volume by the CPU.
 #[derive(Clone, Copy)]
 pub struct Search {
-    /// Name of the search in the times of the host.
+    /// Name of the search in the list of host times.
     pub name: &'static str,
-    /// The volume that is searched.
+    /// The slot of the volume that is searched.
     pub within: Slot,
-    /// The search. It gets the texels of the volume, in their format.
+    /// The search. Its second argument is the texels of the volume, in their format.
     pub find: fn(&Scene, &[u8]) -> Found,
     /// The same search in f64, by another method.
     pub reference: fn(&Scene, &Texels) -> Texels,
@@ -90,9 +90,9 @@ pub struct Search {
 
 /// What a search found.
 pub struct Found {
-    /// Texels of the slot, in its format.
+    /// Content of the slot, in its format.
     pub texels: Vec<u8>,
-    /// Where rendering starts, if the search was for that.
+    /// Where rendering starts, if the search was for that; else None.
     pub unveiled: Option<Unveiled>,
 }
 
@@ -189,77 +189,77 @@ use Descriptor as D;
 use Differs::{By, ByContent};
 
 slots! {
-    /// Arriving frames, one a layer: those of every batch in flight.
+    /// The frame array: the frames of every batch in flight, one a layer.
     Frames = D::image("frames", frame_layers, frame_format).by_frames().across_queues().of(GREY, SHARE_OF_RANGE);
-    /// Gain of every sample of a line.
+    /// Gain of every sample of a line, for time gain compensation.
     Tgc = D::table("tgc", |s| Shape::Buffer(4 * s.frame_size()[0]), lookup_tables::tgc, ByContent)
         .of(GREY, "gain of a sample: a factor, or an addend where samples are log-compressed");
-    /// The frame after line conditioning: decimated samples x lines.
+    /// The frames of a batch after line conditioning: decimated samples x lines.
     Conditioned = D::image("conditioned", |s| batch(s.line_lattice(), s), |_| Format::R32f).across_queues()
         .of(GREY, SHARE_OF_RANGE);
-    /// (sample, line) of every slice pixel on the lattice that is scan-converted; -1 outside the sector.
+    /// The (sample, line) of every slice pixel, for scan conversion; -1 outside the sector.
     ScanLut = D::image("scan_lut", one_slice, |_| Format::Rg32f)
         .by_scene(lookup_tables::scan_lut, By(lattice_differs))
         .across_queues().of(&["sample", "line"], "index from 0; -1 outside the sector");
-    /// Slices between filters of stage 1. In these slots each slice of a batch is a layer.
+    /// Slices between two filters of stage 1; each slice of a batch is a layer.
     SliceA = D::image("slice_a", slices, |_| Format::R32f).clear().across_queues().of(GREY, SHARE_OF_RANGE);
     SliceB = D::image("slice_b", slices, |_| Format::R32f).clear().across_queues().of(GREY, SHARE_OF_RANGE);
     /// How many rings the window of the enhanced sigma filter grew, at each pixel of the last batch's slices.
     Growth = D::image("growth", slices, |_| Format::R32f).across_queues().of(GREY, "rings of pixels");
-    /// Of a slice's rows or columns under elimination: u = forward + shares u of the next pixel.
+    /// AOS on slices, elimination of rows or columns: u = `SliceForward` + `SliceShares` u of the next pixel.
     SliceShares = D::image("slice_shares", slices, |_| Format::R32f).across_queues().of(GREY, "share, 0..1");
     SliceForward = D::image("slice_forward", slices, |_| Format::R32f).across_queues().of(GREY, SHARE_OF_RANGE);
     /// A slice diffused along its rows.
     SliceRows = D::image("slice_rows", slices, |_| Format::R32f).across_queues().of(GREY, SHARE_OF_RANGE);
-    /// A slice after a complete step, and after the first half of one, of AOS with Richardson's extrapolation.
+    /// AOS with Richardson's extrapolation: a slice after a complete step, and (`SliceHalfStep`) after the first of two half steps.
     SliceStep = D::image("slice_step", slices, |_| Format::R32f).across_queues().of(GREY, SHARE_OF_RANGE);
     SliceHalfStep = D::image("slice_half_step", slices, |_| Format::R32f).across_queues().of(GREY, SHARE_OF_RANGE);
-    /// A slice after a stage of RKL1. Each stage reads the last two.
+    /// RKL1: slices after a stage. Each stage reads the results of the last two.
     SliceStageA = D::image("slice_stage_a", slices, |_| Format::R32f).across_queues().of(GREY, SHARE_OF_RANGE);
     SliceStageB = D::image("slice_stage_b", slices, |_| Format::R32f).across_queues().of(GREY, SHARE_OF_RANGE);
     SliceStageC = D::image("slice_stage_c", slices, |_| Format::R32f).across_queues().of(GREY, SHARE_OF_RANGE);
-    /// The volume before smoothing across slices.
+    /// The volume before it is smoothed across slices.
     SharpVolume = D::image("sharp_volume", volume, volume_format).multibuffered().clear().across_queues()
         .of(GREY, SHARE_OF_RANGE);
-    /// The volume before parts that float are dropped.
+    /// The volume before floating parts are dropped.
     WholeVolume = D::image("whole_volume", volume, volume_format).multibuffered().clear().across_queues()
         .of(GREY, SHARE_OF_RANGE);
-    /// 1 in parts of a volume that float.
+    /// 1 in texels of floating parts of the volume, otherwise 0.
     Floating = D::image("floating", volume, |_| Format::R8)
         .by_volume(floating::SEARCH, |a, b| a.floating_basis() != b.floating_basis())
         .of(GREY, "1 in parts of the volume that float");
-    /// The 3D texture that rays are cast through: the part that is visible.
+    /// The volume that rays are cast through, unless parts of it are removed ([`Slot::CutVolume`]).
     Volume = D::image("volume", volume, volume_format).multibuffered().clear().across_queues().of(GREY, SHARE_OF_RANGE);
-    /// The volume without what is removed, by cuts or in front of the render start: rays are cast through it in place of the other.
+    /// The volume without what cuts or the render start remove. Rays are cast through it in place of [`Slot::Volume`].
     CutVolume = D::image("cut_volume", volume, volume_format).multibuffered().clear().of(GREY, SHARE_OF_RANGE);
-    /// The row of each column and slice of the volume at which rendering starts.
+    /// The start surface: the row at which rendering starts, for each column and slice of the volume.
     StartSurface = D::image("start_surface", |s| Shape::Two([s.grid.size[0], s.slices()]), |_| Format::R32f)
         .by_volume(unveil::SEARCH, |a, b| a.unveil_basis() != b.unveil_basis())
         .multibuffered().of(GREY, "row of the volume, by column and slice");
-    /// The first row of each column and slice of the volume that is not in front of the curved render start.
+    /// The start curve: the first row that is not in front of it, for each column and slice of the volume.
     StartCurve = D::image("start_curve", |s| Shape::Two([s.grid.size[0], s.slices()]), |_| Format::R32f)
         .by_scene(cut::start_curve, By(|a, b| a.start_curve_differs(b))).of(GREY, "row of the volume, by column and slice");
-    /// The cuts: the axes of their views, and the edges of their contours.
+    /// The cuts: the axes of their views, and the edges of their contours or the points of their brushes.
     Cuts = D::table("cuts", |s| Shape::Buffer(16 * cut::table_length(s) as u32), cut::table, ByContent)
         .of(&["x", "y", "z", "w"], "vectors as the shader takes them");
-    /// Where each slice is.
+    /// The place of each slice in space: its angle or position, and how far the motor moves during its frame.
     SlicePlaces = D::table("slice_places", |s| Shape::Buffer(16 * s.slices()), cut::slice_places, ByContent)
         .of(&["x", "y", "z", "w"], "vectors as the shader takes them");
-    /// Share of the lines of a frame that fired before the one at each texel of a slice.
+    /// For each texel of a slice, the share (0..1) of the frame's lines that fired before the line through it.
     LineShares = D::image("line_shares", one_slice, |_| Format::R32f).by_scene(cut::line_shares, By(lattice_differs))
         .of(GREY, "share of the frame's lines that fired before");
-    /// The volume that the planes beside a rendering are cut from, before smoothing across slices, and after.
+    /// The section volume, which planes beside a rendering are cut from: before it is smoothed across slices, and (`SectionVolume`) after.
     SharpSectionVolume = D::image("sharp_section_volume", volume, volume_format).multibuffered().clear().across_queues()
         .of(GREY, SHARE_OF_RANGE);
     SectionVolume = D::image("section_volume", volume, volume_format).multibuffered().clear().across_queues()
         .of(GREY, SHARE_OF_RANGE);
-    /// Each texel of the volume with its neighbours one column and one row on, as their bits.
+    /// The bits of each texel of the volume together with those of its neighbours one column and one row on.
     PackedNeighbours = D::image("packed_neighbours", volume, four_texels).multibuffered()
         .of(&["bits", "more_bits"], "bits of a texel and of its neighbours one column on, one row on, and both");
     /// Smallest and largest value of every tile of every slice.
     TileRanges = D::image("tile_ranges", |s| Shape::Three(s.tile_counts()), |_| Format::Rg16).multibuffered().clear()
         .of(&["smallest", "largest"], SHARE_OF_RANGE);
-    /// Which tiles the samples in each brick may touch, and on which side of the sector's border the brick is.
+    /// For each brick, which tiles and slices its samples may touch, and on which side of the sector's border it is.
     BrickTable = D::table(
         "brick_table",
         |s| Shape::Buffer(16 * s.bricks().total() as u32),
@@ -270,38 +270,39 @@ slots! {
     /// Smallest and largest value that samples within each brick may have.
     BrickRanges = D::image("brick_ranges", per_brick, |_| Format::Rg16).multibuffered()
         .of(&["smallest", "largest"], SHARE_OF_RANGE);
-    /// The kind of each brick to a mode: active, empty or homogeneous.
+    /// The kind of each brick for the scene's mode: active, empty or homogeneous.
     BrickKinds = D::image("brick_kinds", per_brick, |_| Format::R8)
         .of(GREY, "(64 kind + distance in bricks) / 255; kinds: 0 active, 1 empty, 2 homogeneous");
-    /// The kind of each brick and its distance to the nearest brick of another kind: along x, and within x and y.
+    /// Steps of the distance transform of bricks: the kind of each brick, and its distance to the nearest brick of another kind along x, and
+    /// (`BrickDistancesXy`) within x and y.
     BrickDistancesX = D::image("brick_distances_x", per_brick, |_| Format::R8)
         .of(GREY, "(64 kind + distance in bricks) / 255; kinds: 0 active, 1 empty, 2 homogeneous");
     BrickDistancesXy = D::image("brick_distances_xy", per_brick, |_| Format::R8)
         .of(GREY, "(64 kind + distance in bricks) / 255; kinds: 0 active, 1 empty, 2 homogeneous");
-    /// The kind of each brick and its distance to the nearest brick of another kind in space: for the surface detector, and for modes that
-    /// composite or take the mean.
+    /// The kind of each brick, and its distance to the nearest brick of another kind: for the surface detector, and (`VolumeBrickDistances`) for
+    /// modes that composite or take the mean.
     SurfaceBrickDistances = D::image("surface_brick_distances", per_brick, |_| Format::R8)
         .of(GREY, "(64 kind + distance in bricks) / 255; kinds: 0 active, 1 empty, 2 homogeneous");
     VolumeBrickDistances = D::image("volume_brick_distances", per_brick, |_| Format::R8)
         .of(GREY, "(64 kind + distance in bricks) / 255; kinds: 0 active, 1 empty, 2 homogeneous");
-    /// Number of entries of the transfer function before each that are not transparent.
+    /// For each entry of the transfer function, the number of entries before it that are not transparent.
     OpaqueBefore = D::table(
         "opaque_before",
         |s| Shape::Buffer(4 * (s.transfer_entries() as u32 + 1)),
         lookup_tables::opaque_before,
         ByContent,
     ).of(GREY, "entries of the transfer function");
-    /// Slice position over the sweep parameter. The direction of the motor only stretches the span of the sweep.
+    /// The slice index over the position in the sweep. The direction of the motor only stretches the span of positions.
     SweepLut = D::table(
         "sweep_lut",
         entries,
         lookup_tables::sweep_lut,
         By(|a, b| !a.geometry.equals_except_direction(&b.geometry) || lattice(a) != lattice(b)),
     ).of(GREY, "mean distances of slices");
-    /// Share of the lines that fired before each line.
+    /// Share (0..1) of a frame's lines that fired before a line, over the position of the line.
     LineLut = D::table("line_lut", entries, lookup_tables::line_lut, By(lattice_differs))
         .of(GREY, "share of the lines of a frame");
-    /// Position and advance of every slice.
+    /// Position of every slice, and the motor's travel during its frame.
     SliceTable = D::table(
         "slice_table",
         |s| Shape::Buffer(8 * s.slices()),
@@ -315,22 +316,22 @@ slots! {
         lookup_tables::transfer_table,
         ByContent,
     ).of(&["red", "green", "blue", "absorption"], "colour 0..1; absorption of one slice pixel");
-    /// Its integral over the values up to each entry: of absorption times colour, and of absorption.
+    /// Integrals of the transfer function over the sample value up to each entry: of absorption times colour, and of absorption.
     TransferIntegral = D::table(
         "transfer_integral",
         |s| Shape::Buffer(16 * s.transfer_entries() as u32),
         lookup_tables::transfer_integral,
         ByContent,
     ).of(&["red", "green", "blue", "absorption"], "colour 0..1; absorption of one slice pixel");
-    /// The transfer function between every two sample values. It differs when the transfer function does, which is shorter.
+    /// The mean colour and absorption of a step between every two sample values. It is compared by the transfer function, which is shorter.
     PreIntegrated = D::table(
         "pre_integrated",
         |s| Shape::Buffer(16 * (s.transfer_entries().pow(2)) as u32),
         lookup_tables::pre_integrated_table,
         By(|a, b| Slot::Transfer.differs(a, b)),
     ).of(&["red", "green", "blue", "absorption"], "colour 0..1; absorption of one slice pixel");
-    /// Light and opacity of a complete step between every two sample values, then the transfer function for the incomplete last step of a
-    /// ray. They differ with the step's length too.
+    /// Light and opacity of a complete step between every two sample values, then the transfer function for the incomplete last step of a ray. They
+    /// also depend on the length of the step.
     SelfAttenuated = D::table(
         "self_attenuated",
         |s| Shape::Buffer(16 * (s.transfer_entries() * (s.transfer_entries() + 1)) as u32),
@@ -344,7 +345,7 @@ slots! {
         lookup_tables::tile_table,
         ByContent,
     ).of(&["x", "y", "z", "w"], "vectors as the shader takes them");
-    /// The columns of a curved plane: where each is, and through which vector its slab reaches.
+    /// The columns of a curved plane: the place of each, and the vector through its slab.
     CurveColumns = D::table("curve_columns", curve_columns, lookup_tables::curve_table, ByContent)
         .of(&["x", "y", "z", "w"], "vectors as the shader takes them");
     /// The half-spaces that bound the block of mode cube.
@@ -354,10 +355,10 @@ slots! {
         lookup_tables::block_table,
         ByContent,
     ).of(&["x", "y", "z", "w"], "vectors as the shader takes them");
-    /// The light volume: density of the matter in each cell, and its echo.
+    /// The light volume: density and echo of the matter in each cell.
     LightMatter = D::image("light_matter", |s| Shape::Three(s.light_lattice().count), |_| Format::Rg16f)
         .of(&["density", "echo"], "share of the densest matter; share of the range of the recording's samples");
-    /// The density in a Gaussian pyramid: cells of twice the edge at each level.
+    /// The Gaussian pyramid of the light volume's density. At each level cells have twice the edge of the level before.
     LightPyramid1 = D::image("light_pyramid_1", |s| light_level(s, 1), |_| Format::R16f)
         .of(GREY, "share of the densest matter, 0..1");
     LightPyramid2 = D::image("light_pyramid_2", |s| light_level(s, 2), |_| Format::R16f)
@@ -374,45 +375,46 @@ slots! {
         .of(GREY, "share of the densest matter, 0..1");
     LightPyramid8 = D::image("light_pyramid_8", |s| light_level(s, 8), |_| Format::R16f)
         .of(GREY, "share of the densest matter, 0..1");
-    /// Light that has passed one layer of cells, and the next.
+    /// Light that has passed a layer of cells, and (`LightFrontB`) the next layer.
     LightFrontA = D::image("light_front_a", |s| light_layer(s, false), |_| Format::Rgba32f)
         .of(COLOUR, "light; 1 is that of an unshadowed light of strength 1");
     LightFrontB = D::image("light_front_b", |s| light_layer(s, false), |_| Format::Rgba32f)
         .of(COLOUR, "light; 1 is that of an unshadowed light of strength 1");
-    /// Light that arrives in each cell, and the density of its matter. The other slots are those of the passes that scatter it, which alternate: what
-    /// arrives stays, as many dispatches have made it.
+    /// Light that arrives in each cell, and the density of its matter. The passes that scatter it alternate between the other two slots, so that this
+    /// one stays.
     LightArriving = D::image("light_arriving", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f)
         .of(&["red", "green", "blue", "density"], "light: share of what came; share of the densest matter");
     LightScattered = D::image("light_scattered", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f)
         .of(&["red", "green", "blue", "density"], "light: share of what came; share of the densest matter");
     LightScatteredB = D::image("light_scattered_b", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f)
         .of(&["red", "green", "blue", "density"], "light: share of what came; share of the densest matter");
-    /// The same of the back light, in cells of twice the edge.
+    /// The back light, in cells of twice the edge: as `LightFrontA`, `LightFrontB` and `LightArriving`.
     BackFrontA = D::image("back_front_a", |s| light_layer(s, true), |_| Format::Rgba32f)
         .of(COLOUR, "light; 1 is that of an unshadowed light of strength 1");
     BackFrontB = D::image("back_front_b", |s| light_layer(s, true), |_| Format::Rgba32f)
         .of(COLOUR, "light; 1 is that of an unshadowed light of strength 1");
     BackLight = D::image("back_light", |s| light_level(s, 1), |_| Format::Rgba16f)
         .of(&["red", "green", "blue", "density"], "light: share of what came; share of the densest matter");
-    /// Light from all sides and from behind in cells of twice the edge: its colour, and the ambient share.
+    /// Light that arrives from all sides and from behind, in cells of twice the edge: its colour, and the share of the ambient light.
     LightAmbient = D::image("light_ambient", |s| light_level(s, 1), |_| Format::Rgba16f)
         .of(COLOUR, "light; 1 is that of an unshadowed light of strength 1");
-    /// Light that each cell scatters, and its ambient share.
+    /// Light that white matter in each cell scatters, and the share of ambient light in it.
     LightShade = D::image("light_shade", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f)
         .of(COLOUR, "light; 1 is that of an unshadowed light of strength 1");
-    /// Orientation of each cell, as long as it is certain, and the light for a highlight.
+    /// For each cell the direction towards weaker echoes, whose length (0..1) is its certainty, and the light for a highlight.
     LightNormals = D::image("light_normals", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f)
         .of(&["x", "y", "z", "highlight"], "direction, as long as it is certain; light");
-    /// The medium of a still: albedo and extinction over the sample value.
+    /// The medium of a still at the entries of the transfer function: albedo and extinction.
     StillMedium = D::table(
         "still_medium",
         |s| Shape::Buffer(16 * s.transfer_entries() as u32),
         lookup_tables::still_medium,
         ByContent,
     ).of(&["red", "green", "blue", "extinction"], "albedo of scattering, 0..1; extinction, 1/mm");
-    /// The largest extinction in each brick.
+    /// The largest extinction of each brick, for stills.
     StillMajorants = D::image("still_majorants", per_brick, |_| Format::R32f).of(GREY, "largest extinction of a brick, 1/mm");
-    /// Sums of light and collisions of the paths of each pixel, and of the squares of their luminance; the dispatches alternate.
+    /// Sums over the paths of each pixel of a still: light and number of collisions, and (`StillSquares`) squares of luminance. Dispatches alternate
+    /// between A and B.
     StillSumsA = D::image("still_sums_a", per_ray, |_| Format::Rgba32f)
         .of(&["red", "green", "blue", "collided"], "light of all paths of a pixel; how many of them collided");
     StillSumsB = D::image("still_sums_b", per_ray, |_| Format::Rgba32f)
@@ -421,62 +423,64 @@ slots! {
         .of(GREY, "squares of the luminance of all paths of a pixel");
     StillSquaresB = D::image("still_squares_b", per_ray, |_| Format::R32f)
         .of(GREY, "squares of the luminance of all paths of a pixel");
-    /// The cut faces of clip planes: echo where a ray ends at one, and its opacity.
+    /// The cut face of a clip plane that each ray ends at: its echo, and its opacity (0 without one).
     Cap = D::image("cap", per_ray, |_| Format::Rg16f)
         .of(&["echo", "opacity"], "echo 0..1 after the grey window of planes, where a ray ends at a cut face; opacity, 0..1");
-    /// The two edges of each ray that are most likely its surface, for the detector that chooses among neighbours.
+    /// Detector consistent: the two edges of each ray that are most likely its surface.
     Candidates = D::image("candidates", per_ray, |_| Format::Rgba32f)
         .of(&["first", "second", "first_weight", "second_weight"], "mm along the ray, the largest float where there is none; weight, 0..1");
-    /// How much more either candidate costs than no surface, by paths along rows and columns.
+    /// Detector consistent: how much more either candidate costs than no surface, summed along rows and columns from four sides.
     PathsFromLeft = D::image("from_left", per_ray, |_| Format::Rg32f).of(&["first", "second"], COST);
     PathsFromRight = D::image("from_right", per_ray, |_| Format::Rg32f).of(&["first", "second"], COST);
     PathsFromTop = D::image("from_top", per_ray, |_| Format::Rg32f).of(&["first", "second"], COST);
     PathsFromBottom = D::image("from_bottom", per_ray, |_| Format::Rg32f).of(&["first", "second"], COST);
-    /// Distance along each pixel's ray, mm; the largest float where nothing was hit.
+    /// The distance map: the distance along each ray at which it meets a surface, mm; the largest float where it hit nothing.
     Distance = D::image("distance_map", per_ray, |_| Format::R32f).distances();
     DistanceA = D::image("distance_a", per_ray, |_| Format::R32f).distances();
     DistanceB = D::image("distance_b", per_ray, |_| Format::R32f).distances();
-    /// Echo at the surface, 1 where a surface was found, and the mean echo behind it where the skin look needs it.
+    /// For each ray the echo at its surface, 1 where a surface was found, and the mean echo behind it where skin shading needs that.
     Surface = D::image("surface", per_ray, |s| if s.samples_behind() > 0 { Format::Rgba16f } else { Format::Rg16f })
         .of(&["echo", "found", "echo_behind", "unused"], "echo 0..1 after the grey window; found: 0 or 1");
-    /// Light that arrives at each pixel's surface, 0..1.
+    /// Share (0..1) of the light that reaches each ray's surface, by shadow.
     Shadow = D::image("shadow", per_ray, |_| Format::R16f).of(GREY, "share, 0..1");
-    /// Ambient light that arrives, 0..1.
+    /// Share (0..1) of the ambient light that reaches each ray's surface.
     Occlusion = D::image("occlusion", per_ray, |_| Format::R16f).of(GREY, "share, 0..1");
-    /// The composited volume, where stage 3 lights it or shows it in front of a surface.
+    /// The composited volume that stage 3 lights or shows in front of a surface, or that gives the surface its colour.
     VolumeLayer = D::image("volume_layer", per_ray, |_| Format::Rgba16f).of(COLOUR, "share, 0..1");
-    /// The volume that is shown beside a surface, where the volume layer is the surface's colour.
+    /// Layout pair: the volume that is shown beside a surface, where `VolumeLayer` holds the surface's colour.
     VolumeBesideSurface = D::image("volume_beside_surface", per_ray, |_| Format::Rgba16f).of(COLOUR, "share, 0..1");
-    /// What stages 2 and 3 render, where it becomes the picture only by averaging or next to planes. With adaptive supersampling the rays of marked
-    /// pixels: what was there stays in the others.
+    /// What stages 2 and 3 render, if the picture is assembled from it. With adaptive supersampling it holds the rays of marked pixels; other texels
+    /// keep their old content.
     Rendered = D::image("rendered", per_ray, |_| Format::Rgba16f).of(COLOUR, "share, 0..1");
-    /// With adaptive supersampling: one ray through the middle of each pixel of the rendering, and 1 in pixels that have all rays.
+    /// Adaptive supersampling: the colour of one ray through the middle of each pixel, and (`EdgeMarks`) 1 in pixels that have all rays.
     PixelRays = D::image("pixel_rays", per_pixel_of_rendering, |_| Format::Rgba16f).of(COLOUR, "share, 0..1");
     EdgeMarks = D::image("edge_marks", per_pixel_of_rendering, |_| Format::R8).of(GREY, "1 in pixels that have several rays");
-    /// With a tolerance: the rays through every other pixel of every other row; their colours on the screen, and their errors.
+    /// With a tolerance: the colours of the rays through every other pixel of every other row, and (`LatticeErrors`) their colours on the screen with
+    /// their errors.
     Lattice = D::image("lattice", |s| Shape::Two(tolerance::lattice_size(s)), |_| Format::Rgba16f).of(COLOUR, "share, 0..1");
     LatticeErrors = D::image("lattice_errors", |s| Shape::Two(tolerance::lattice_size(s)), |_| Format::Rgba32f)
         .of(&["red", "green", "blue", "error"], "colour and error on the screen, 0..1; no error is certain");
-    /// The error of each pixel, 0..1 of the screen; 0 is certain.
+    /// With a tolerance: the error of each pixel, 0..1 of the screen; 0 is certain.
     PixelErrors = D::image("pixel_errors", per_ray, |_| Format::R32f).of(GREY, "error on the screen, 0..1; 0 is certain");
-    /// Which pixels of each tile of 8 x 8 have too large an error, a bit each; how many of them are in the tiles before.
+    /// With a tolerance: a bit for each pixel of a tile of 8 x 8, set if its error is too large, and (`MarkedBefore`) the number of such pixels in
+    /// the tiles before.
     ErrorMarks = D::image("error_marks", |s| Shape::Two(tolerance::tiles(s)), |_| Format::Rg32u)
         .of(&["rows 0 to 3", "rows 4 to 7"], "bits of pixels of a tile");
     MarkedBefore = D::image("marked_before", |s| Shape::Two(tolerance::tiles(s)), |_| Format::R32u).of(GREY, "pixels");
-    /// Workgroups along x, y and z that take all of them, and their number.
+    /// With a tolerance: the number of workgroups along x, y and z for the rays of all marked pixels, and the number of these pixels.
     RefineGroups = D::image("refine_groups", |_| Shape::Two([4, 1]), |_| Format::R32u)
         .of(GREY, "workgroups along x, y, z; pixels");
-    /// The planes beside a rendering; black where a 4-up picture has the rendering.
+    /// The planes beside a rendering; black where the picture has the rendering.
     Planes = D::image("planes", |s| Shape::Two(s.tile_area().size), |_| Format::Rgba16f).of(COLOUR, "share, 0..1");
     /// The picture of stages 2 and 3 before the filters of stage 4.
     Picture = D::image("picture", per_pixel, |_| Format::Rgba16f).of(COLOUR, "share, 0..1");
     SmoothPicture = D::image("smooth_picture", per_pixel, |_| Format::Rgba16f).of(COLOUR, "share, 0..1");
     SmoothPictureB = D::image("smooth_picture_b", per_pixel, |_| Format::Rgba16f).of(COLOUR, "share, 0..1");
-    /// As of slices: elimination of the picture's rows or columns.
+    /// AOS on the picture, elimination of rows or columns, as `SliceShares` and `SliceForward`.
     PictureShares = D::image("picture_shares", per_pixel, |_| Format::R32f).of(GREY, "share, 0..1");
     PictureForward = D::image("picture_forward", per_pixel, |_| Format::Rgba32f).of(COLOUR, "share, 0..1");
     PictureRows = D::image("picture_rows", per_pixel, |_| Format::Rgba32f).of(COLOUR, "share, 0..1");
-    /// The result: in 8 bits, or as the window shows it.
+    /// The result: 8 bits a channel, or the format of the window.
     Screen = D::image("screen", per_pixel, |s| match s.window_texels {
         WindowTexels::Rgba8 => Format::Rgba8,
         WindowTexels::Bgra8 => Format::Bgra8,
@@ -489,7 +493,7 @@ fn frame_layers(scene: &Scene) -> Shape {
     Shape::Layers([width, height, BATCHES_IN_FLIGHT * frames_per_batch(scene)])
 }
 
-/// For a frame array with `layers` layers: the end of the ring entry that holds `layer`.
+/// The layer after the last one of the ring entry that holds `layer`, in a frame array of `layers` layers.
 pub fn ring_entry_end(layers: u32, layer: u32) -> u32 {
     let entry = (layers / BATCHES_IN_FLIGHT).max(1);
     layer - layer % entry + entry
@@ -591,7 +595,7 @@ impl Slot {
         &DESCRIPTORS[self as usize]
     }
 
-    /// The CPU's search for the content of this slot. None if it has none.
+    /// The search by which the CPU finds the content of this slot. None for slots that are filled otherwise.
     pub fn search(self) -> Option<Search> {
         match self.initializer() {
             Initializer::ByVolume(search) => Some(search),
@@ -603,7 +607,7 @@ impl Slot {
         self.descriptor().meaning
     }
 
-    /// Debug name. It is also the name of the GLSL variable unless a pass gives an alias.
+    /// Debug name, which is also the name of the GLSL variable unless a pass binds it under another.
     pub fn name(self) -> &'static str {
         self.descriptor().name
     }
@@ -620,7 +624,7 @@ impl Slot {
         self.descriptor().initializer
     }
 
-    /// True if each of the volume images has its own copy.
+    /// True if each volume image has its own copy of the slot.
     pub fn is_multibuffered(self) -> bool {
         self.descriptor().is_multibuffered
     }
@@ -630,12 +634,12 @@ impl Slot {
         self.descriptor().starts_clear
     }
 
-    /// True if several queues use it, on devices that have several.
+    /// True if several queues use the slot, on devices that have several.
     pub fn crosses_queues(self) -> bool {
         self.descriptor().crosses_queues
     }
 
-    /// True if the CPU makes the slot's content from the scene, or finds it in a volume, and the content differs between these two scenes.
+    /// True if the CPU makes or finds the slot's content and the content differs between these two scenes.
     pub fn differs(self, old: &Scene, new: &Scene) -> bool {
         match (self.initializer(), self.descriptor().differs) {
             (Initializer::ByScene(make), ByContent) => make(old) != make(new),
@@ -649,20 +653,19 @@ impl Slot {
         matches!(self.shape(scene), Shape::Layers(_))
     }
 
-    /// True if the slot has one texel for each texel of the volume. Only the visible part of it is stored.
+    /// True if the slot has one texel for each texel of the volume. The device stores only the stored bounds of it.
     pub fn is_volume(self) -> bool {
         let of_rays =
             matches!(self, Slot::Volume | Slot::SharpVolume | Slot::WholeVolume | Slot::Floating | Slot::CutVolume);
         of_rays || matches!(self, Slot::SectionVolume | Slot::SharpSectionVolume)
     }
 
-    /// The volume through which rays are cast, without removed parts.
+    /// The volume through which rays are cast; cuts and the start surface have been removed from it.
     pub fn of_rays(scene: &Scene) -> Slot {
         if scene.removes() { Slot::CutVolume } else { Slot::Volume }
     }
 
-    /// The volume that planes are cut from: their own beside a rendering if they have one, otherwise the volume before cuts, with its
-    /// floating parts.
+    /// The volume that planes are cut from: the section volume if there is one, otherwise the volume before cuts and with its floating parts.
     pub fn of_planes(scene: &Scene) -> Slot {
         match (scene.has_sections(), scene.drops_floating()) {
             (true, _) => Slot::SectionVolume,
@@ -671,7 +674,7 @@ impl Slot {
         }
     }
 
-    /// The texel of the whole volume at which the image begins. 0 for slots that are not part of a volume.
+    /// The texel of the volume that is texel (0, 0, 0) of the slot's image. 0 for slots that are no volume.
     pub fn first_texel(self, scene: &Scene) -> [u32; 3] {
         match self {
             Slot::PackedNeighbours => scene.stored_bounds().low,
@@ -680,8 +683,8 @@ impl Slot {
         }
     }
 
-    /// Size of the slot's array in references and readbacks. For a volume it is the whole volume, so that its indices are texel
-    /// coordinates.
+    /// Size of the slot's array in references and readbacks. For a volume it is the whole volume, not only what the device stores, so that indices
+    /// are texel coordinates of the volume.
     pub fn array_size(self, scene: &Scene) -> [usize; 3] {
         match self {
             _ if self.is_volume() => scene.volume_size().map(|n| n as usize),
@@ -689,19 +692,19 @@ impl Slot {
         }
     }
 
-    /// Size, bytes. Of a slot that each volume image has a copy of, the size of one copy.
+    /// Size in bytes, of one copy if each volume image has its own.
     pub fn bytes(self, scene: &Scene) -> u64 {
         self.shape(scene).texels() * self.format(scene).texel_bytes() as u64
     }
 }
 
-/// The slot that stages 2 and 3 render into: the picture itself, unless it is assembled from what they render.
+/// The slot that stages 2 and 3 render into: the picture, unless the picture is assembled from what they render ([`Scene::assembles`]).
 pub fn rendered(scene: &Scene) -> Slot {
     if scene.assembles() { Slot::Rendered } else { Slot::Picture }
 }
 
-/// The slot of whole rays that are composited for a picture or a colour of a surface: the volume layer, unless that holds what lies
-/// behind the surface.
+/// The slot of volume-rendered whole rays that are composited next to a surface or give it its colour. It is the volume layer, unless that holds what
+/// lies behind the surface.
 pub(super) fn composited_beside_surface(scene: &Scene) -> Slot {
     let is_behind = scene.settings.surface.colour == SurfaceColour::Behind;
     if scene.is_pair() && is_behind { Slot::VolumeBesideSurface } else { Slot::VolumeLayer }
@@ -712,7 +715,7 @@ pub enum Shape {
     Two([u32; 2]),
     Layers([u32; 3]),
     Three([u32; 3]),
-    /// Bytes.
+    /// A buffer of this many bytes.
     Buffer(u32),
 }
 
@@ -728,12 +731,12 @@ pub enum Format {
     Rgba16f,
     Rgba32f,
     Rgba8,
-    /// As most windows store their pixels.
+    /// 8 bits a channel, blue first, as most windows store their pixels.
     Bgra8,
-    /// Bits.
+    /// 32 bits of an unsigned integer.
     R32u,
     Rg32u,
-    /// 32-bit floats of a buffer.
+    /// A buffer of 32-bit floats.
     Floats,
 }
 
@@ -768,7 +771,7 @@ impl Shape {
         }
     }
 
-    /// Texels along x, y and z; the first varies fastest. A buffer counts as a row of floats.
+    /// Number of texels along x, y and z; x varies fastest. A buffer counts as one row of 32-bit floats.
     pub fn size(self) -> [usize; 3] {
         match self {
             Shape::Two([w, h]) => [w as usize, h as usize, 1],
@@ -777,7 +780,7 @@ impl Shape {
         }
     }
 
-    /// Slices of a 3D image, layers of an array, 1 otherwise: the parts that barriers distinguish.
+    /// Number of parts that barriers distinguish: slices of a 3D image, layers of an array, otherwise 1.
     pub fn parts(self) -> u32 {
         match self {
             Shape::Layers(n) | Shape::Three(n) => n[2],

@@ -5,7 +5,7 @@ use crate::scene::Scene;
 use half::f16;
 use std::borrow::Cow;
 
-/// Texels with `channels` values each; x fastest.
+/// An array of texels with `channels` values each; x varies fastest.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Texels {
     pub size: [usize; 3],
@@ -14,7 +14,7 @@ pub struct Texels {
 }
 
 impl Texels {
-    /// All values are NaN. Texels that a reference leaves NaN are not written by the pass either.
+    /// An array of NaN. In the outputs of a reference, texels that stay NaN are those that the pass does not write.
     pub fn untouched(size: [usize; 3], channels: usize) -> Texels {
         Texels { size, channels, values: vec![f64::NAN; size.iter().product::<usize>() * channels] }
     }
@@ -43,12 +43,12 @@ impl Texels {
         &self.values[i..i + self.channels]
     }
 
-    /// First channel.
+    /// Value of the first channel.
     pub fn one(&self, x: usize, y: usize, z: usize) -> f64 {
         self.values[self.index([x, y, z])]
     }
 
-    /// First channel of the nearest texel.
+    /// Value of the first channel of the texel nearest to these indices, which may lie outside.
     pub fn clamped(&self, x: i64, y: i64, z: i64) -> f64 {
         let at = |i: i64, n: usize| i.clamp(0, n as i64 - 1) as usize;
         self.one(at(x, self.size[0]), at(y, self.size[1]), at(z, self.size[2]))
@@ -69,7 +69,7 @@ impl Texels {
         part
     }
 
-    /// One layer; that of an array that has a single one, whatever its number.
+    /// A single layer. An array of one layer returns that one whatever `n` is.
     pub(super) fn layer(&self, n: usize) -> Texels {
         self.part([0, 0, n.min(self.size[2] - 1)], [self.size[0], self.size[1], 1])
     }
@@ -87,7 +87,7 @@ impl Texels {
         }
     }
 
-    /// The part of a slot's array ([`Slot::array_size`]) that the device stores.
+    /// The part of a slot's array ([`Slot::array_size`]) that the device stores; all of it for a slot that is no volume.
     pub fn stored_part(&self, slot: Slot, scene: &Scene) -> Texels {
         match slot {
             _ if slot.is_volume() => self.part(slot.first_texel(scene).map(|n| n as usize), slot.shape(scene).size()),
@@ -95,7 +95,7 @@ impl Texels {
         }
     }
 
-    /// The slot's array of which the device stores this part. The rest is `outside`.
+    /// The opposite of [`Texels::stored_part`]: the slot's whole array, in which texels that the device does not store have the value `outside`.
     pub fn with_outside(self, slot: Slot, scene: &Scene, outside: f64) -> Texels {
         if self.size == slot.array_size(scene) {
             return self;
@@ -105,7 +105,7 @@ impl Texels {
         array
     }
 
-    /// First channel, interpolated between texels. Beyond the border the nearest texel counts.
+    /// First channel, interpolated linearly at fractional texel indices. Beyond the border the nearest texel counts.
     pub fn trilinear(&self, at: [f64; 3]) -> f64 {
         let low = at.map(f64::floor);
         let mut sum = 0.0;
@@ -123,7 +123,7 @@ impl Texels {
         sum
     }
 
-    /// Up to four channels, interpolated between texels, all of which exist.
+    /// Up to four channels, interpolated linearly at fractional texel indices, which must lie within the array.
     pub fn interpolated(&self, at: [f64; 3]) -> [f64; 4] {
         let mut sum = [0.0; 4];
         for corner in 0..8 {
@@ -140,8 +140,8 @@ impl Texels {
         sum
     }
 
-    /// First channel between texels: bilinear within a slice, the uniform cubic B-spline without a prefilter across slices, beyond the
-    /// border that of the nearest. As the sum of two linear fetches (Sigg and Hadwiger 2005).
+    /// First channel at fractional texel indices: bilinear within a slice, the uniform cubic B-spline (without a prefilter) across slices, as the sum
+    /// of two linear fetches (Sigg and Hadwiger 2005). Beyond the border the nearest texel counts.
     pub fn bspline_across_slices(&self, [x, y, z]: [f64; 3]) -> f64 {
         let k = z.floor();
         let t = z - k;
@@ -195,13 +195,13 @@ impl Texels {
         Texels { size, channels: format.channels(), values: in_order(format, &values).into_owned() }
     }
 
-    /// What a texel of the format holds, in its first channel, after `value` was stored in it.
+    /// The value that a texel of this format holds after `value` was stored in it.
     pub fn stored(format: Format, value: f64) -> f64 {
         let one = Texels { size: [1; 3], channels: format.channels(), values: vec![value; format.channels()] };
         Texels::decode([1; 3], format, &one.encode(format)).values[0]
     }
 
-    /// The distance between neighbouring values that the format stores near `value`.
+    /// The distance between neighbouring values of this format near `value`.
     pub fn spacing(format: Format, value: f64) -> f64 {
         match format {
             Format::R8 | Format::Rgba8 | Format::Bgra8 => 1.0 / 255.0,
@@ -232,8 +232,10 @@ impl Arrays {
         self.0.push((name, texels));
     }
 
+    /// The array under this name.
+    ///
     /// # Panics
-    /// When the pass did not declare the name: the declaration and its reference disagree.
+    /// The pass did not declare the name: its declaration and its reference disagree.
     pub fn get(&self, name: &str) -> &Texels {
         match self.0.iter().find(|(n, _)| *n == name) {
             Some((_, texels)) => texels,
@@ -241,6 +243,8 @@ impl Arrays {
         }
     }
 
+    /// The array under this name, to be changed.
+    ///
     /// # Panics
     /// As [`Arrays::get`].
     pub fn get_mut(&mut self, name: &str) -> &mut Texels {

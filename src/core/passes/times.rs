@@ -4,18 +4,18 @@ use super::by_name;
 use crate::scene::Scene;
 use std::fmt::Write as _;
 
-/// Time of one pass over a run.
+/// GPU time of one pass, over all its runs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PassTime {
     pub name: &'static str,
-    /// Number of runs: one for each frame of a batch.
+    /// Number of runs: a batch counts one for each of its frames.
     pub runs: u32,
     /// Sum over all runs, ns.
     pub total: f64,
 }
 
-/// Pass times of one run as a table: one line per pass, the sum, and the acquisition floor if a probe swept the volume. Without
-/// time stamps no time is printed.
+/// Formats pass times as a table: one line per pass, their sum, and the acquisition floor if a probe swept the volume. If `measured` is empty it says
+/// that the device has no time stamps.
 pub fn pass_time_table(measured: &[PassTime], scene: &Scene) -> String {
     let mut text = String::new();
     if measured.is_empty() {
@@ -37,7 +37,7 @@ pub fn pass_time_table(measured: &[PassTime], scene: &Scene) -> String {
     text
 }
 
-/// A sentence with the acquisition floor: `seconds` is the travel time of sound for a volume, `sound_speed` in m/s.
+/// A sentence that states the acquisition floor. `seconds`: the time that sound travels for all lines of a volume; `sound_speed` in m/s.
 pub fn acquisition_floor(seconds: f64, sound_speed: f64) -> String {
     let ms = seconds * 1e3;
     format!("sound itself needs {ms:.1} ms for this volume ({sound_speed} m/s): no display is faster")

@@ -6,22 +6,23 @@ pub mod oracle;
 
 use crate::barriers::{Access, Barrier, BarrierTracker};
 
-/// The maximum number of queues: copies, stage 1, and all later stages.
+/// The largest number of queues: one for copies, one for passes over frames, and one for all other passes.
 pub const MAX_QUEUES: usize = 3;
 
-/// A kind of work.
+/// What a queue is used for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum QueueRole {
-    /// All passes over volumes and pictures.
+    /// All passes with the frequency volume or picture.
     Render,
-    /// Stage 1: converting a frame.
+    /// All passes with the frequency frame.
     Ingest,
-    /// Uploads of samples.
+    /// Uploads of frames.
     Copy,
 }
 
 impl QueueRole {
-    /// The queue of this work: 0 renders, 1 ingests frames, 2 copies them. `queues`: number of queues.
+    /// Index of the queue for this work, on a device with `queues` queues: 0 renders, 1 converts frames, 2 copies them. With fewer queues, work
+    /// shares one.
     pub fn queue(self, queues: usize) -> usize {
         (self as usize).min(queues.clamp(1, MAX_QUEUES) - 1)
     }
@@ -30,7 +31,7 @@ impl QueueRole {
 /// A vector clock: by queue, the timeline value of the last submission that is known to be complete.
 type Clock = [u64; MAX_QUEUES];
 
-/// Tracks the accesses of all queues to the same slots.
+/// Tracks the accesses of all queues to the same slots, and derives the semaphore waits between queues.
 #[derive(Clone, Debug)]
 pub struct QueueTracker {
     each: Vec<Queue>,
@@ -49,7 +50,7 @@ struct Queue {
     after: Clock,
 }
 
-/// A wait for another queue's timeline to reach a value.
+/// A semaphore wait until the timeline of `queue` reaches `value`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Wait {
     pub queue: usize,
@@ -64,7 +65,7 @@ impl Default for QueueTracker {
 }
 
 impl QueueTracker {
-    /// `count`: number of queues, clamped to 1..=3.
+    /// `count`: number of queues; it is clamped to 1..=3.
     pub fn new(count: usize) -> QueueTracker {
         QueueTracker { each: vec![Queue::default(); count.clamp(1, MAX_QUEUES)] }
     }
@@ -73,7 +74,7 @@ impl QueueTracker {
         self.each.len()
     }
 
-    /// Records an operation on this queue. Returns the barrier that it needs before it, if any.
+    /// Records an operation on a queue. Returns the barrier that it needs in front of it; None if it needs none.
     pub fn record(&mut self, queue: usize, accesses: &[Access]) -> Option<Barrier> {
         let alone = self.count() == 1;
         let me = &mut self.each[queue];
@@ -112,7 +113,8 @@ impl QueueTracker {
         needed.iter().map(|(wait, _)| *wait).filter(|wait| !implied(wait)).collect()
     }
 
-    /// Records that the recording of this queue was submitted with these waits. It is complete at this value of the queue's timeline.
+    /// Records that the recording of this queue was submitted with these waits. The submission signals `value` on the queue's timeline when it is
+    /// complete.
     pub fn submitted(&mut self, queue: usize, waits: &[Wait], value: u64) {
         self.each[queue].recording = false;
         if self.count() == 1 {

@@ -8,36 +8,37 @@ use crate::passes::Slot;
 use crate::passes::slots::Shape;
 use crate::scene::Scene;
 
-/// An entry of a queue's recording.
+/// An entry in the recording of a submission.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Event {
     Barrier(Barrier),
-    /// An operation, by its memory accesses.
+    /// An operation, described by its memory accesses.
     Operation(Vec<Access>),
     /// A time stamp.
     Stamp,
-    /// A barrier of execution only, around a time stamp. It makes no memory visible, so the oracle derives no order from it.
+    /// An execution barrier around a time stamp. It makes no memory visible, so the oracle derives no order from it.
     Serialize,
 }
 
-/// One submission.
+/// One submission to a queue.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Submission {
     pub queue: usize,
-    /// The value of its queue's timeline at which it is complete.
+    /// The value that its queue's timeline has when it is complete.
     pub value: u64,
     pub waits: Vec<Wait>,
     pub events: Vec<Event>,
 }
 
-/// All submissions in order, and the recordings that are not submitted yet.
+/// All submissions in order. It also holds the recordings that are not submitted yet.
 #[derive(Clone, Debug, Default)]
 pub struct SubmissionLog {
     pub submissions: Vec<Submission>,
     open: Vec<(usize, Vec<Event>)>,
 }
 
-/// Two conflicting accesses to a resource without an order between them, by submission and event.
+/// Two conflicting accesses to a resource without an order between them. Each is given by its index in [`SubmissionLog::submissions`] and that of its
+/// event there.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Hazard {
     pub earlier: (usize, usize),
@@ -46,13 +47,13 @@ pub struct Hazard {
 }
 
 impl SubmissionLog {
-    /// Begins the recording of a submission. A recording of the same queue that was not submitted never runs.
+    /// Begins the recording of a submission. A recording of the same queue that was not submitted is dropped.
     pub fn begin(&mut self, queue: usize) {
         self.open.retain(|(of, _)| *of != queue);
         self.open.push((queue, Vec::new()));
     }
 
-    /// Records an operation on a queue, after a barrier.
+    /// Records an operation on a queue, behind its barrier if it has one.
     pub fn record(&mut self, queue: usize, barrier: Option<Barrier>, accesses: &[Access]) {
         let Some((_, events)) = self.open.iter_mut().find(|(of, _)| *of == queue) else { return };
         events.extend(barrier.map(Event::Barrier));
@@ -66,14 +67,14 @@ impl SubmissionLog {
         }
     }
 
-    /// Submits the recording of a queue.
+    /// Submits the recording of a queue, which waits for `waits` and signals `value`.
     pub fn submit(&mut self, queue: usize, waits: &[Wait], value: u64) {
         let Some(at) = self.open.iter().position(|(of, _)| *of == queue) else { return };
         let (_, events) = self.open.swap_remove(at);
         self.submissions.push(Submission { queue, value, waits: waits.to_vec(), events });
     }
 
-    /// The positions of all barriers: submission and event.
+    /// The positions of all barriers: index of the submission and of the event in it.
     pub fn barriers(&self) -> Vec<(usize, usize)> {
         let of = |(n, submission): (usize, &Submission)| {
             let events = submission.events.iter().enumerate();
@@ -83,7 +84,7 @@ impl SubmissionLog {
         self.submissions.iter().enumerate().flat_map(of).collect()
     }
 
-    /// The positions of all semaphore waits: submission and wait.
+    /// The positions of all semaphore waits: index of the submission and of the wait in it.
     pub fn waits(&self) -> Vec<(usize, usize)> {
         let of = |(n, submission): (usize, &Submission)| (0..submission.waits.len()).map(move |w| (n, w));
         self.submissions.iter().enumerate().flat_map(of).collect()
@@ -103,7 +104,7 @@ impl SubmissionLog {
         log
     }
 
-    /// The first two conflicting accesses without an order between them. The scene says which slots are 3D images.
+    /// Finds the first two conflicting accesses without an order between them; None if all are ordered. The scene tells which slots are 3D images.
     pub fn find_hazard(&self, scene: &Scene) -> Option<Hazard> {
         let is_volume = |slot: Slot| matches!(slot.shape(scene), Shape::Three(_));
         (0..self.submissions.len()).find_map(|s| {

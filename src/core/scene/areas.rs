@@ -10,7 +10,7 @@ pub(crate) struct Area {
 }
 
 impl Area {
-    /// The first column and row after it.
+    /// The first column and row beyond the area, to the right and below.
     pub fn end(&self) -> [usize; 2] {
         std::array::from_fn(|a| (self.corner[a] + self.size[a]) as usize)
     }
@@ -27,12 +27,12 @@ fn beside_axis([width, height]: [u32; 2]) -> usize {
 }
 
 impl Layout {
-    /// True if three planes are shown with a rendering.
+    /// True if the layout shows the three orthogonal planes beside a rendering.
     pub fn has_planes(self) -> bool {
         matches!(self, Layout::Four | Layout::Beside)
     }
 
-    /// The part of a picture of this size that shows the rendering; in a pair, the surface.
+    /// The part of a picture of `size` pixels that shows the rendering; in a pair, the part with the surface.
     pub(super) fn rendering(self, size: [u32; 2]) -> Area {
         let [width, height] = size;
         match self {
@@ -62,17 +62,17 @@ impl Layout {
 }
 
 impl Scene {
-    /// The part of the picture that shows the rendering; in a pair, the surface.
+    /// The part of the picture that shows the rendering; in a pair, the part with the surface.
     pub(crate) fn rendering_area(&self) -> Area {
         self.settings.layout.rendering(self.picture_size())
     }
 
-    /// The part of the picture over which the grid of planes lies, the whole one in a mode of planes.
+    /// The part of the picture that the grid of planes covers; the whole picture in a mode of planes.
     pub(crate) fn tile_area(&self) -> Area {
         self.settings.layout.tiles(self.picture_size())
     }
 
-    /// Columns and rows of planes beside a rendering.
+    /// Number of columns and rows of the planes beside a rendering (layout beside).
     pub(super) fn grid_beside(&self) -> [u32; 2] {
         if beside_axis(self.picture_size()) == 0 { [1, 3] } else { [3, 1] }
     }

@@ -10,7 +10,7 @@ use glam::DVec3;
 
 /// Edge of a brick where no setting says another, texels.
 const EDGE: u32 = 8;
-/// Size of the slice tiles whose minimum and maximum are stored, texels.
+/// Edge of the tiles of a slice whose minimum and maximum are stored, texels.
 pub const TILE: u32 = 4;
 /// Maximum number of bricks of a scene: a table of 8 MB.
 const MAX_BRICKS: f64 = 524_288.0;
@@ -20,12 +20,12 @@ const MARGIN: f64 = 4e-3;
 const MIN_ENTRIES: u32 = 65;
 const SLICE_MARGIN: f64 = 0.01;
 
-/// The grid of bricks.
+/// The grid of bricks, along the axes of space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bricks {
     /// Lower corner of brick (0, 0, 0), mm in space.
     pub low: DVec3,
-    /// Edge length, mm.
+    /// Edge length of a brick along each axis, mm.
     pub edge: DVec3,
     pub count: [u32; 3],
 }
@@ -33,11 +33,11 @@ pub struct Bricks {
 /// Position of a brick relative to the insonified region.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
-    /// Entirely outside: no sample is taken.
+    /// Entirely outside the insonified region: no sample is taken there.
     Outside,
-    /// Across the border, or unknown.
+    /// Across the border of the insonified region, or not known.
     Across,
-    /// Entirely inside.
+    /// Entirely inside the insonified region.
     Inside,
 }
 
@@ -52,7 +52,8 @@ impl Side {
     }
 }
 
-/// The tiles that samples within a brick may touch: columns, rows and slices, first and last.
+/// What samples within a brick may touch, first and last inclusive: columns and rows of tiles (`tiles`), and slices. `side` tells where the brick
+/// lies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Reach {
     pub tiles: [[u32; 2]; 2],
@@ -71,12 +72,12 @@ impl Bricks {
 }
 
 impl Scene {
-    /// Edge of a brick, texels. 0 if no bricks are used.
+    /// Edge of a brick by the setting `ray.brick`, texels; 0 if the setting switches bricks off.
     pub fn brick(&self) -> u32 {
         self.settings.ray.brick.unwrap_or(EDGE)
     }
 
-    /// True if rays skip bricks.
+    /// True if rays skip bricks. It needs a mode that casts rays through samples, and positions that f32 resolves finely enough.
     pub fn skips(&self) -> bool {
         let casts = self.composites() || self.detects_surface() || self.projects();
         let swept = self.probe().is_some_and(|p| !matches!(p.motion, Motion::Still { .. }));
@@ -91,8 +92,8 @@ impl Scene {
         farthest * 1e-6 < MARGIN * bricks.edge.min_element()
     }
 
-    /// The bricks that rays may take samples in, on a lattice that does not depend on the region of interest. With
-    /// `slices.everything`, those of the whole insonified region: a region that is dragged then changes no table.
+    /// The bricks in which rays may take samples, on a lattice that does not depend on the region of interest. With `slices.everything` they cover
+    /// the whole insonified region, so that a region that is dragged changes no table.
     pub fn bricks(&self) -> Bricks {
         let (low, high) = insonified_box(&self.geometry);
         let size = f64::from(self.brick().max(TILE));
@@ -123,13 +124,13 @@ impl Scene {
         Bricks { low: low + first * edge, edge, count: (last - first).to_array().map(|n| n as u32) }
     }
 
-    /// Number of tiles along both axes of a slice, and number of slices.
+    /// Number of tiles along columns and rows of a slice, and number of slices.
     pub(crate) fn tile_counts(&self) -> [u32; 3] {
         let [width, height, slices] = self.volume_size();
         [width.div_ceil(TILE), height.div_ceil(TILE), slices]
     }
 
-    /// The tiles that samples within one brick may touch.
+    /// The tiles and slices that samples within the brick `cell` (index along each axis) may touch.
     pub fn reach(&self, bricks: &Bricks, cell: [u32; 3]) -> Reach {
         let margin = bricks.edge * MARGIN;
         let (low, high) = (bricks.place(cell) - margin, bricks.place(cell) + bricks.edge + margin);
@@ -152,13 +153,13 @@ impl Scene {
         Reach { tiles: [columns, rows].map(|r| r.map(|n| n / TILE)), slices, side: extent.side }
     }
 
-    /// Reach of the sliding filter around a sample, mm: its taps along the ray, and the same distance to both sides.
+    /// Largest distance of a tap of the sliding filter from the sample, mm: along the ray and to both sides of it.
     pub(super) fn tap_reach(&self) -> f64 {
         let own = reach(self, self.step.max(self.ring.step), self.settings.ray.sliding / 2) * 3f64.sqrt();
         self.shared.as_ref().map_or(own, |shared| shared.taps)
     }
 
-    /// The values, apart from the geometry, that determine the brick tables. Equal keys give equal tables.
+    /// A key of the values, apart from the geometry, that determine the brick tables: scenes with equal keys have equal tables.
     pub(crate) fn brick_basis(&self) -> impl PartialEq + use<> {
         (self.bricks(), self.grid, self.tap_reach(), self.takes_bspline())
     }

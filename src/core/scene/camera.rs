@@ -8,8 +8,8 @@ use glam::DVec3;
 /// for a fetal head; the least that keeps a ray's entry above 0 by more than f32 loses.
 const OFF: f64 = 1.0 / 128.0;
 
-/// The ray of the point (px, py) in pixels: origin + px origin_dx + py origin_dy, and the direction likewise, then normalised. Distances
-/// along a ray are in mm.
+/// The rays of a picture. The ray through (px, py), in rays from the upper left corner, has the origin `origin + px origin_dx + py origin_dy`; its
+/// direction is computed likewise and normalised. Lengths are in mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rays {
     pub origin: DVec3,
@@ -18,17 +18,17 @@ pub struct Rays {
     pub direction: DVec3,
     pub direction_dx: DVec3,
     pub direction_dy: DVec3,
-    /// Camera axes in space, unit length.
+    /// Camera axes in space, unit vectors: `right` and `up` in the picture, `forward` away from the viewer.
     pub right: DVec3,
     pub up: DVec3,
     pub forward: DVec3,
-    /// The camera's target, mm.
+    /// The point that the camera looks at, mm in space.
     pub target: DVec3,
     pub is_perspective: bool,
 }
 
 impl Rays {
-    /// Origin and unit direction of a pixel's ray; (0.5, 0.5) is the centre of the upper left pixel.
+    /// Origin and unit direction of the ray through (px, py); (0.5, 0.5) is the centre of the upper left ray's cell.
     pub fn at(&self, px: f64, py: f64) -> (DVec3, DVec3) {
         let origin = self.origin + self.origin_dx * px + self.origin_dy * py;
         let direction = self.direction + self.direction_dx * px + self.direction_dy * py;
@@ -41,19 +41,18 @@ impl Rays {
     }
 }
 
-/// Number of rays along each axis: the part of the picture that the layout leaves to the rendering, times the rays per pixel, or half
-/// or a quarter (rounded up) with that resolution.
+/// Number of rays along each axis: the pixels of the rendering times `ray.rays`, divided by `ray.subsampling` (rounded up).
 pub fn ray_size(settings: &Settings) -> [u32; 2] {
     full_size(settings).map(|n| n.div_ceil(settings.ray.subsampling))
 }
 
-/// As [`ray_size`], with a ray for every pixel.
+/// Number of rays along each axis without `ray.subsampling`.
 pub fn full_size(settings: &Settings) -> [u32; 2] {
     settings.layout.rendering(settings.picture.size).size.map(|n| n * settings.ray.rays)
 }
 
-/// The camera that frames the box (`low`, `high`) by the settings. `depth_offset` converts depths below the face to Y.
-/// A single frame is viewed from the side like a B-mode picture, with the probe on top.
+/// The rays of the settings' camera, which frames the box `low`..`high`, mm in space. `depth_offset` converts depths below the probe's face to Y.
+/// `still`: the recording is a single frame, which is viewed from the side like a B-mode picture, with the probe on top.
 pub fn rays(settings: &Settings, low: DVec3, high: DVec3, depth_offset: f64, still: bool) -> Rays {
     let camera = &settings.camera;
     let azimuth = camera.azimuth.to_radians();

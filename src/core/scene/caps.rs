@@ -9,7 +9,7 @@ const OPAQUE: f64 = 0.5;
 const LEAST_LEVEL: f64 = 1e-6;
 
 impl Settings {
-    /// True if there is something that clip planes cut, whether or not their cut faces are shown.
+    /// True if clip planes of these settings cut what is rendered, whether or not the cut faces are shown.
     pub(crate) fn can_cap(&self) -> bool {
         let is_cut = match self.mode {
             Mode::Surface | Mode::Mixed => self.surface.sign != Sign::Dark,
@@ -20,13 +20,13 @@ impl Settings {
 }
 
 impl Scene {
-    /// True if clip planes have cut faces. Stills have none: what they cut is lit. Whether any matter is tissue (`cap_level`) is a number
-    /// and does not change the plan.
+    /// True if the rendering shows the cut faces of clip planes. A still does not: it lights what they cut. Whether any echo reaches the level of
+    /// tissue ([`Scene::cap_level`]) does not matter.
     pub fn has_caps(&self) -> bool {
         self.settings.cap.enabled && self.settings.can_cap() && self.still().is_none()
     }
 
-    /// The region that is cut, with the grey window of planes. In mode mixed that of the surface, which ends at the faces.
+    /// The region in which cut faces are shown, with the grey window of planes. In mode mixed it is the region of the surface.
     pub(crate) fn cap_view(&self) -> View {
         let low = match self.settings.mode {
             Mode::Surface | Mode::Mixed => self.surface_view().low,
@@ -35,8 +35,8 @@ impl Scene {
         View { window: self.settings.planes.window, low, high: self.high }
     }
 
-    /// The echo from which on matter counts as tissue, before any window. None if nothing is capped: the rendering draws dark matter, or
-    /// everything is translucent.
+    /// The sample value, before any window, from which on matter counts as tissue on a cut face. None if no cut face is shown: dark matter is
+    /// rendered, or everything is translucent.
     pub fn cap_level(&self) -> Option<f64> {
         let solid = self.solid_from()?;
         let level = self.settings.cap.level.unwrap_or(solid);
@@ -44,12 +44,12 @@ impl Scene {
         Some(if self.removes() { level.max(LEAST_LEVEL) } else { level })
     }
 
-    /// Radius of the disc around a place of a cut face that tells tissue from fluid, mm: the length of an edge.
+    /// Radius of the disc on a cut face over which echoes are averaged to tell tissue from fluid, mm: the length of an edge.
     pub(crate) fn cap_radius(&self) -> f64 {
         self.ring.step * f64::from(self.ring.half)
     }
 
-    /// True if cut faces fade towards the faces of the region, as what is composited does.
+    /// True if cut faces fade towards the faces of the region, as composited matter does.
     pub(crate) fn fades_caps(&self) -> bool {
         self.settings.mode == Mode::Volume && self.region_fade().is_some()
     }

@@ -45,7 +45,7 @@ fn check_consistent(surface: &Surface) -> Result<(), SceneError> {
     Ok(())
 }
 
-/// Checks that need no geometry.
+/// Checks settings as far as no geometry is needed.
 pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     check_clip(&settings.clip)?;
     let ray = &settings.ray;
@@ -293,7 +293,7 @@ fn check_smooth(smooth: Option<Smooth>, field: &'static str) -> Result<(), Scene
     }
 }
 
-/// Checks of planes that need no geometry.
+/// Checks the settings of planes as far as no geometry is needed.
 pub(super) fn check_planes(settings: &Settings) -> Result<(), SceneError> {
     check_smooth(settings.planes.smooth, "planes.smooth.kernel")?;
     check_curve(settings.planes.curve.as_ref())
@@ -314,7 +314,7 @@ fn check_curve(curve: Option<&Curve>) -> Result<(), SceneError> {
     }
 }
 
-/// Checks that need the volume: number of tiles and samples, and whether anything is left of the block.
+/// Checks planes against the volume: number of tiles and of samples through a slab, and whether anything is left of the block of mode cube.
 pub(super) fn check_planes_resolved(scene: &Scene) -> Result<(), SceneError> {
     if scene.settings.mode == Mode::Cube {
         scene.check_block()?;

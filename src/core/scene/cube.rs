@@ -22,7 +22,7 @@ const SIDES: [(&str, usize, f64); 6] =
     [("left", 0, -1.0), ("right", 0, 1.0), ("near", 1, -1.0), ("far", 1, 1.0), ("bottom", 2, -1.0), ("top", 2, 1.0)];
 
 impl Scene {
-    /// The half-spaces whose intersection is shown.
+    /// The half-spaces whose intersection is the block of mode cube: its faces and the clip planes.
     pub fn block(&self) -> Vec<HalfSpace> {
         let mut faces = self.faces();
         faces.extend(self.clips().map(|(normal, limit)| HalfSpace { normal, limit }));
@@ -54,7 +54,7 @@ impl Scene {
         faces
     }
 
-    /// Refuses faces with nothing left between them.
+    /// Refuses insets and tilts that leave nothing of the block.
     pub(super) fn check_block(&self) -> Result<(), SceneError> {
         // About the box's centre, and relative to its size: a volume may be a micrometre wide, or a kilometre away.
         let centre = (self.low + self.high) / 2.0;

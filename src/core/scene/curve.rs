@@ -45,7 +45,7 @@ impl Segment {
     }
 }
 
-/// A smooth line. Positions on it are found by their distance along the line.
+/// A smooth line in a plane, mm. Positions on it are found by their distance along the line.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Line {
     segments: Vec<Segment>,
@@ -56,7 +56,7 @@ pub struct Line {
 }
 
 impl Line {
-    /// A line through points. Consecutive points have to differ; fewer than two make a line without length.
+    /// The line through points. Consecutive points must differ; fewer than two points make a line without length.
     pub fn through(points: &[[f64; 2]]) -> Line {
         let points: Vec<DVec2> = points.iter().map(|point| DVec2::from(*point)).collect();
         let steps: Vec<f64> = points.windows(2).map(|p| p[0].distance(p[1]).sqrt()).collect();
@@ -95,7 +95,7 @@ impl Line {
         self.starts.last().copied().unwrap_or(0.0)
     }
 
-    /// Position and unit direction at a distance along the line, mm. Beyond an end the end counts.
+    /// Position and unit direction at a distance along the line, mm. A distance beyond an end is clamped to it.
     pub fn at(&self, along: f64) -> (DVec2, DVec2) {
         let along = along.clamp(0.0, self.length());
         let piece = self.starts.partition_point(|start| *start <= along).clamp(1, self.starts.len().max(2) - 1) - 1;
@@ -114,12 +114,12 @@ impl Line {
         (segment.at(t), direction.unwrap_or(DVec2::X))
     }
 
-    /// Distance along the line of the point of the line that is nearest to `point`, and the distance between both, mm.
+    /// The point of the line that is nearest to `point`, as its distance along the line, and how far it is from `point`; mm.
     pub fn nearest(&self, point: DVec2) -> (f64, f64) {
         self.near(point, 0.0).into_iter().min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0.0, f64::INFINITY))
     }
 
-    /// True if two passages of the line are within `reach` of a point, mm.
+    /// True if two different stretches of the line pass `point` within `reach` mm.
     pub(crate) fn passes_twice(&self, point: DVec2, reach: f64) -> bool {
         let near: Vec<f64> =
             self.near(point, reach).into_iter().filter(|(_, off)| *off <= reach).map(|(along, _)| along).collect();
@@ -166,7 +166,7 @@ impl Line {
         }
     }
 
-    /// Positions along the line from which it can be drawn.
+    /// Points along the line, close enough to draw it by straight pieces. Empty for a line without length.
     pub fn outline(&self) -> Vec<DVec2> {
         if self.segments.is_empty() {
             return Vec::new();
@@ -175,7 +175,7 @@ impl Line {
         (0..self.starts.len()).filter(|n| !straight || n % PIECES == 0).map(|n| self.place_of(n)).collect()
     }
 
-    /// A unit vector from which the whole line deviates by at most 45 degrees. None if the line bends more.
+    /// The unit direction from the first point to the last, if the whole line deviates from it by at most 45 degrees; else None.
     pub fn heading(&self) -> Option<DVec2> {
         let (first, last) = (self.segments.first()?, self.segments.last()?);
         let chord = (last.to - first.from).try_normalize()?;

@@ -11,28 +11,28 @@ use super::{
 use crate::probe::{Advance, Geometry, Motion};
 use glam::{DVec2, DVec3};
 
-/// A cut in space.
+/// A cut, placed in space.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CutShape {
-    /// Origin of the contour's plane, mm.
+    /// Origin of the contour's plane, mm in space.
     pub at: DVec3,
-    /// Unit axes: in the contour's plane, and away from the viewer.
+    /// Unit vectors: `right` and `up` lie in the contour's plane, `forward` is its normal, away from the viewer.
     pub right: DVec3,
     pub up: DVec3,
     pub forward: DVec3,
-    /// Distance of the eye from the plane, mm. None in parallel projection.
+    /// Distance of the eye from the contour's plane, mm. None in parallel projection.
     pub eye: Option<f64>,
-    /// Corners in the plane, mm.
+    /// Corners of the contour in its plane, along `right` and `up`, mm.
     pub contour: Vec<DVec2>,
-    /// What is removed is within the contour; otherwise it is outside.
+    /// True if the cut removes what is within the contour, false if it removes what is outside.
     pub(crate) removes_inside: bool,
-    /// Largest distance behind the plane at which matter is removed, mm. None: any distance.
+    /// Largest distance behind the contour's plane at which matter is removed, mm. None: any distance.
     pub depth: Option<f64>,
-    /// Strokes near which matter is removed. The contour is then empty.
+    /// The brush of a cut that was made by strokes; the contour is then empty. None for a cut by a contour.
     pub brush: Option<BrushShape>,
 }
 
-/// Strokes of a brush in space.
+/// Strokes of a brush in space, mm: matter within `radius` of them is removed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BrushShape {
     pub radius: f64,
@@ -40,7 +40,7 @@ pub struct BrushShape {
 }
 
 impl BrushShape {
-    /// True if a place is within the radius of a stroke: in a ball about each point, or in a cylinder about the line between two.
+    /// True if a place is within the radius of a stroke: in a ball about one of its points, or in a cylinder about the line between two.
     pub fn holds(&self, place: DVec3) -> bool {
         let is_near = |from: DVec3, to: DVec3| {
             let (along, off) = (to - from, place - from);
@@ -54,7 +54,7 @@ impl BrushShape {
         })
     }
 
-    /// Lower and upper corner of the box that holds all of it.
+    /// Lower and upper corner of the box that holds all that the brush removes, mm.
     pub fn bounds(&self) -> [DVec3; 2] {
         let ends = [DVec3::INFINITY, DVec3::NEG_INFINITY];
         let [low, high] =
@@ -116,7 +116,7 @@ impl CutShape {
             && point.is_some_and(|point| self.winds_about(point)) == self.removes_inside
     }
 
-    /// Lower and upper corner of the contour's bounds.
+    /// Lower and upper corner of the bounds of the contour in its plane, mm.
     pub fn bounds(&self) -> [DVec2; 2] {
         let ends = [DVec2::INFINITY, DVec2::NEG_INFINITY];
         self.contour.iter().fold(ends, |[low, high], corner| [low.min(*corner), high.max(*corner)])
@@ -124,28 +124,28 @@ impl CutShape {
 }
 
 impl Scene {
-    /// True if a rendering has cuts: it casts rays through a volume from which they have removed matter. Planes and the block of mode cube
-    /// show the volume without cuts.
+    /// True if the scene has cuts and renders through a volume from which they have removed matter. Planes and the block of mode cube show the volume
+    /// without cuts.
     pub(crate) fn has_cuts(&self) -> bool {
         !self.settings.cuts.is_empty() && self.renders()
     }
 
-    /// True if rays render the echoes of the volume: planes and the block of mode cube show them as they are.
+    /// True if rays render the volume. False for planes and the block of mode cube, which show samples as they are.
     pub fn renders(&self) -> bool {
         self.composites() || self.detects_surface() || self.projects()
     }
 
-    /// True if rays are cast through a volume without what is removed: by cuts, or in front of the render start.
+    /// True if parts of the volume are removed before rays are cast: by cuts, or in front of the render start.
     pub fn removes(&self) -> bool {
         self.has_cuts() || self.unveils() || self.starts_at_curve()
     }
 
-    /// Corners of all contours, and points of all brushes.
+    /// Number of corners of all contours and of points of all brushes.
     pub fn cut_corners(&self) -> usize {
         self.settings.cuts.iter().map(|cut| cut.contour.len() + cut.brush.as_ref().map_or(0, Brush::points)).sum()
     }
 
-    /// The cuts in space.
+    /// The cuts of the settings, placed in space.
     pub fn cuts(&self) -> impl Iterator<Item = CutShape> {
         let in_space = |brush: &Brush| BrushShape {
             radius: brush.radius,
@@ -157,8 +157,8 @@ impl Scene {
         })
     }
 
-    /// The cut along a contour that was drawn on the rendering, pixels of the picture. Its plane faces the view at the first place of the region that
-    /// the contour meets. None if it encloses nothing, or meets no region.
+    /// The cut along a contour that was drawn on the rendering. `outline`: its corners, pixels of the picture; `keep`: the side that stays. Its plane
+    /// faces the viewer and goes through the nearest place of the region that the contour meets. None if it encloses nothing or misses the region.
     pub fn cut_along(&self, outline: &[[f64; 2]], keep: KeptSide) -> Option<Cut> {
         let (picker, rays) = (Picker::of(self), &self.rays);
         let corners = simplified(outline.iter().map(|at| DVec2::from(*at)).collect());
@@ -194,7 +194,7 @@ impl Scene {
         Some(Cut { contour: contour.collect(), view, keep, depth: None, brush: None })
     }
 
-    /// The value of removed texels, of which the rendering draws nothing: 0, or 1 where dark matter is drawn. In mode mean it counts as
+    /// The value that removed texels get so that the rendering draws nothing of them: 0, or 1 where dark matter is drawn. In mode mean it counts as
     /// dark matter. None if the rendering draws both.
     pub fn removed_value(&self) -> Option<f64> {
         let is_drawn = |value: f64| {
@@ -229,7 +229,7 @@ impl Scene {
         }
     }
 
-    /// Share of a frame's lines that fired before the one through a texel of its slice, 0..1; beside the sector that of the nearest.
+    /// Share (0..1) of a frame's lines that fired before the line through a texel of its slice. Beside the sector the nearest line counts.
     pub(crate) fn share_fired(&self, column: u32, row: u32) -> f64 {
         let Some(probe) = self.probe() else { return 0.0 };
         let (x, y) = self.grid.place(f64::from(column), f64::from(row));
@@ -299,7 +299,7 @@ fn distance(point: DVec2, from: DVec2, to: DVec2) -> f64 {
     point.distance(from + along * share)
 }
 
-/// Checks that need no geometry.
+/// Checks cuts as far as no geometry is needed.
 pub(super) fn check(cuts: &[Cut]) -> Result<(), SceneError> {
     if cuts.len() > MAX_CUTS {
         return refuse("cuts", format!("has {} entries, at most {MAX_CUTS}", cuts.len()));
@@ -344,16 +344,19 @@ fn check_brush(n: usize, cut: &Cut, brush: &Brush) -> Result<(), SceneError> {
     Ok(())
 }
 
+/// Checks whether cuts can remove anything.
+///
 /// # Errors
-/// Nothing can be removed where everything is drawn.
+/// The rendering draws both dark and bright matter, so that no value of a texel is invisible.
 pub(super) fn check_drawn(scene: &Scene) -> Result<(), SceneError> {
     check_removal(scene, scene.has_cuts(), "cuts", "remove the cuts")
 }
 
-/// Checks whether a setting can remove parts of a rendering. `remedy`: what to do if it cannot.
+/// Checks whether a setting can remove parts of a rendering. `removes`: it is set; `setting`: its key; `remedy`: what the message tells the user to
+/// do instead.
 ///
 /// # Errors
-/// The rendering draws both what is dark and what is bright.
+/// The rendering draws both dark and bright matter, so that no value of a texel is invisible.
 pub(super) fn check_removal(
     scene: &Scene,
     removes: bool,

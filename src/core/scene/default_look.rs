@@ -55,14 +55,14 @@ const REGION: [&str; 4] = ["region.lateral", "region.depth", "region.elevation",
 const UNKNOWN: EchoLevels =
     EchoLevels { dark: 0.05, threshold: 0.4, bright: 0.68, mean: 0.3, low: 0.02, high: 0.95, start: None };
 
-/// Settings, and one line for each default on how it was found.
+/// Settings completed by defaults. `said` has a line for each default, which tells how it was found.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Completed {
     pub settings: Settings,
     pub said: Vec<String>,
 }
 
-/// Standard deviation of the default smoothing of a volume, mm.
+/// Standard deviation of the default Gaussian of a volume of this geometry, mm.
 pub fn smoothing(geometry: &Geometry) -> f64 {
     let (low, high) = insonified_box(geometry);
     let [least, most] = SMOOTHING_RANGE;
@@ -70,7 +70,7 @@ pub fn smoothing(geometry: &Geometry) -> f64 {
     if wanted.is_finite() { wanted.clamp(least, most) } else { most }
 }
 
-/// Edge of the blocks whose means tell the levels of a volume, mm.
+/// Edge of the blocks over whose means [`EchoHistogram`] finds the levels of a volume's echoes, mm.
 pub fn block_edge(geometry: &Geometry) -> f64 {
     BLOCK * smoothing(geometry)
 }
@@ -80,17 +80,17 @@ pub fn block_edge(geometry: &Geometry) -> f64 {
 #[derive(Clone, Debug)]
 pub struct Recorded {
     pub geometry: Geometry,
-    /// The type of the samples, and the range that the source states.
+    /// The type of the samples, and the value range that the source states.
     pub stated: Input,
-    /// Offset that signed samples are stored with ([`SampleType::shift`](crate::probe::SampleType::shift)).
+    /// What was added to signed samples to store them as unsigned ([`SampleType::shift`](crate::probe::SampleType::shift)).
     pub shift: f64,
-    /// Levels of the echoes. None if they decide nothing, or if all samples are equal.
+    /// Levels of the volume's echoes. None if no default depends on them, or if all samples are equal.
     pub levels: Option<EchoLevels>,
-    /// False if the settings are complete, such as those of a workspace. No defaults are added then.
+    /// True if defaults complete the settings. False if the settings are complete already, such as those of a workspace.
     pub is_completed: bool,
 }
 
-/// Why layers of settings and a recording give no scene.
+/// Why no scene can be made of layers of settings and a recording.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordedFault {
     #[error("{0}")]
@@ -100,17 +100,17 @@ pub enum RecordedFault {
 }
 
 impl Recorded {
-    /// Scenes of settings without defaults.
+    /// A recording whose scenes take the settings as they are, without defaults.
     pub fn as_set(geometry: Geometry, stated: Input) -> Recorded {
         Recorded { geometry, stated, shift: 0.0, levels: None, is_completed: false }
     }
 
-    /// The samples, with the range that the settings ask for.
+    /// Type and value range of the samples: the range that `samples.range` sets, or else the one that the source states.
     pub fn samples(&self, settings: &Settings) -> Input {
         self.stated.in_range_of(settings, self.shift)
     }
 
-    /// True if the scene of these layers depends on the levels of the echoes.
+    /// True if defaults for these layers depend on the levels of the echoes ([`Recorded::levels`]).
     pub fn needs_levels(&self, layers: &Layers) -> bool {
         self.is_completed && layers.needs_levels()
     }
@@ -124,7 +124,7 @@ impl Recorded {
         Ok(EchoHistogram::new(&self.geometry, samples, block_edge(&self.geometry)))
     }
 
-    /// The scene of some layers of settings, completed by defaults.
+    /// The scene of these layers of settings on the recording, completed by defaults.
     ///
     /// # Errors
     /// As for [`Layers::finish`] and [`Scene::new`].
@@ -142,17 +142,17 @@ impl Recorded {
     }
 }
 
-/// The facts from which default settings follow.
+/// What default settings follow from.
 #[derive(Clone, Debug)]
 pub struct Defaults {
     pub layers: Layers,
     pub geometry: Geometry,
-    /// None before the first whole volume.
+    /// Levels of the volume's echoes. None before the first whole volume.
     pub levels: Option<EchoLevels>,
 }
 
 impl Defaults {
-    /// The settings for the chosen mode.
+    /// The settings of the layers, completed by defaults for their mode.
     ///
     /// # Errors
     /// As for [`Layers::finish`].
@@ -166,8 +166,8 @@ impl Defaults {
         Some(layers.completed(&self.geometry, self.levels.as_ref()).ok()?.settings)
     }
 
-    /// Settings whose mode or layout was changed to that of `to`. Values that still equal the defaults for the mode of `from` become the
-    /// defaults for the new mode. Values that were set meanwhile stay.
+    /// Completes `to`, settings whose mode or layout differs from that of `from`: values that still equal the defaults of `from` become the defaults
+    /// of the new mode. Values that the user changed stay.
     pub fn switched(&self, from: &Settings, to: Settings) -> Settings {
         if (from.mode, from.layout) == (to.mode, to.layout) {
             return to;
@@ -180,7 +180,7 @@ impl Defaults {
 }
 
 impl Layers {
-    /// The layers with another mode and layout on top, as if a user had given them.
+    /// The layers with this mode and layout on top, as if the user had set them. None if they do not fit the layers.
     pub fn in_mode(mut self, mode: Mode, layout: Layout) -> Option<Layers> {
         let table = Table::from_iter([
             ("mode".to_string(), Value::try_from(mode).ok()?),
@@ -190,12 +190,12 @@ impl Layers {
         Some(self)
     }
 
-    /// True if the settings depend on the levels of the echoes: no preset describes the recording.
+    /// True if defaults depend on the levels of the echoes, because no preset was chosen.
     pub fn needs_levels(&self) -> bool {
         self.presets().is_empty()
     }
 
-    /// The settings for a geometry, completed by defaults. Without `levels` windows are those of a face in fluid.
+    /// The settings of the layers for a geometry, completed by defaults. Without `levels` grey windows are those of a face in fluid.
     ///
     /// # Errors
     /// As for [`Layers::finish`].

@@ -26,23 +26,23 @@ const BEHIND: f64 = 0.2;
 const DARKEST: f64 = 0.02;
 const BRIGHTEST: f64 = 0.003;
 
-/// How dark and how bright the echoes of a volume are: sample values as shares 0..1 of the input's range.
+/// How dark and how bright the echoes of a volume are. Values are shares (0..1) of the value range of the samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EchoLevels {
-    /// Median of the darker class of blocks: fluid, or soft tissue next to bone.
+    /// Median of the darker class of blocks (parts of a frame, of which the mean echo is taken): fluid, or soft tissue next to bone.
     pub dark: f64,
-    /// Otsu's threshold between the classes.
+    /// Otsu's threshold between the darker and the brighter class of blocks.
     pub threshold: f64,
-    /// Median of the brighter class: tissue, or bone.
+    /// Median of the brighter class of blocks: tissue, or bone.
     pub bright: f64,
     /// Mean of all blocks.
     pub mean: f64,
-    /// The sample value below which two per cent of the samples lie.
+    /// The value below which two per cent of the samples lie.
     pub low: f64,
-    /// The sample value above which three of a thousand samples lie.
+    /// The value above which three of a thousand samples lie.
     pub high: f64,
-    /// Depth at which the region of interest begins behind a bright layer next to the probe, mm as in `region.depth`. None without such a
-    /// layer.
+    /// Depth behind a bright layer next to the probe, mm as in `region.depth`, at which the default region of interest begins. None if there is no
+    /// such layer.
     pub start: Option<f64>,
 }
 
@@ -65,7 +65,7 @@ pub struct EchoHistogram {
 }
 
 impl EchoHistogram {
-    /// For frames of a geometry, with blocks of about `edge` mm.
+    /// For frames of a geometry, with blocks whose edges are about `edge` mm.
     pub fn new(geometry: &Geometry, input: Input, edge: f64) -> EchoHistogram {
         let pitch = match geometry {
             Geometry::Cartesian(grid) => [grid.spacing[0], grid.spacing[1]],
@@ -97,7 +97,7 @@ impl EchoHistogram {
         }
     }
 
-    /// Adds the stored samples of a frame. A frame that is too short counts as far as it goes.
+    /// Adds the stored samples of a frame. Of a frame that is too short, the samples that it has are counted.
     pub fn take(&mut self, bytes: &[u8]) {
         let [low, high] = self.input.range;
         let scaled = |value: f64| ((value - low) / (high - low)).clamp(0.0, 1.0);

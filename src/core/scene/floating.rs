@@ -7,14 +7,14 @@ use crate::probe::{Geometry, Motion};
 const PER_TEXEL: f64 = (1u64 << 30) as f64;
 
 impl Scene {
-    /// True if parts that float are dropped: a size is set, and something is drawn from a volume of several slices.
+    /// True if floating parts are dropped: `floating` is set, and something is rendered from a volume of several slices.
     pub fn drops_floating(&self) -> bool {
         let is_still = self.probe().is_some_and(|probe| matches!(probe.motion, Motion::Still { .. }));
         self.settings.floating > 0.0 && (self.composites() || self.detects_surface()) && self.slices() > 1 && !is_still
     }
 
-    /// The largest sample of which nothing is drawn. Below it the transfer function is transparent, and no edge reaches the threshold of
-    /// the detector. None if dark samples are drawn.
+    /// The largest sample value of which nothing is drawn: up to it the transfer function is transparent and no edge reaches the detector's
+    /// threshold. Texels above it form parts. None if dark samples are drawn.
     pub fn floating_level(&self) -> Option<f64> {
         let (volume, surface) = (&self.settings.volume, &self.settings.surface);
         let sample = |[low, high]: [f64; 2], share: f64| low + (high - low) * share;
@@ -35,7 +35,7 @@ impl Scene {
         }
     }
 
-    /// The unit in which sizes of parts are counted, mm^3. It is a share of a texel, whatever the size of a texel is.
+    /// The unit in which sizes of parts are counted, mm^3: the volume of the largest texel divided by 2^30.
     pub fn part_unit(&self) -> f64 {
         let [across, down] = self.grid.pitch;
         let along = match &self.geometry {
@@ -51,17 +51,18 @@ impl Scene {
         across * down * along / PER_TEXEL
     }
 
-    /// The size below which a part is dropped, in units.
+    /// The size below which a part is dropped, in units of [`Scene::part_unit`].
     pub(crate) fn least_part(&self) -> u64 {
         (self.settings.floating / self.part_unit()).ceil() as u64
     }
 
-    /// Slices from one texel to another that one sample may touch both.
+    /// How many slices two texels may be apart so that one interpolated sample can touch both.
     pub(crate) fn part_reach(&self) -> usize {
         if self.takes_bspline() { 3 } else { 1 }
     }
 
-    /// The size of a texel in units by row, then slice: entry `slice * rows + row`. Along a fan's sweep a texel is as long as its arc.
+    /// The size of each texel in units of [`Scene::part_unit`], by slice and row: entry `slice * rows + row`. In a fan a texel is as long across
+    /// slices as its arc.
     pub fn texel_sizes(&self) -> Vec<u64> {
         let ([across, down], unit) = (self.grid.pitch, self.part_unit());
         // Above the axis of a fan, radii are negative.
@@ -82,14 +83,16 @@ impl Scene {
         (0..self.slices()).flat_map(|slice| (0..rows).map(move |row| (slice, row))).map(|(s, r)| each(s, r)).collect()
     }
 
-    /// What decides which parts float, besides the volume.
+    /// A key of the settings that decide which parts float: scenes with equal keys find the same parts in the same volume.
     pub(crate) fn floating_basis(&self) -> impl PartialEq + use<> {
         (self.least_part(), self.floating_level(), self.part_reach())
     }
 }
 
+/// Checks whether floating parts can be told from what surrounds them.
+///
 /// # Errors
-/// Something dark is drawn, of which the outside of everything is made.
+/// Dark matter is drawn, and so is everything around the parts.
 pub(super) fn check_floating(scene: &Scene) -> Result<(), SceneError> {
     match scene.drops_floating() && scene.floating_level().is_none() {
         true => refuse(

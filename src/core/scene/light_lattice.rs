@@ -15,40 +15,41 @@ const CONE_WIDTH: f64 = 0.08;
 /// Levels of the pyramid, from 0, whose cells the nearest place may have.
 const NARROWEST: [f64; 2] = [-4.0, 3.0];
 
-/// Cubic cells over the rendered box.
+/// The lattice of cubic cells of the light volume, over the rendered box.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightLattice {
     /// Corner of the first cell, mm in space.
     pub low: DVec3,
     /// Edge of a cell, mm.
     pub cell: f64,
-    /// Number of cells along each axis, even.
+    /// Number of cells along each axis; even.
     pub count: [u32; 3],
-    /// Size of the box, mm. Cells reach beyond it by less than one, by as much on both sides.
+    /// Size of the rendered box, mm. The cells reach beyond it by less than one cell, by the same length on both sides.
     pub extent: DVec3,
 }
 
 impl LightLattice {
-    /// The share of the outermost layers of `count` cells with an edge of `cell` along an axis that is within the box.
+    /// The share (0..1) of the outermost of `count` cells of `cell` mm along an axis that lies within the rendered box.
     pub(crate) fn outer_share(&self, axis: usize, count: u32, cell: f64) -> f64 {
         let beyond = f64::from(count) * cell - self.extent[axis];
         let sides = if count == 1 { 1.0 } else { 2.0 };
         (1.0 - beyond / (sides * cell)).clamp(0.0, 1.0)
     }
 
-    /// A place in space, from a place in cells: cell n reaches from n to n + 1.
+    /// The place in space, mm, of a position in cells: cell n reaches from n to n + 1.
     pub fn place(&self, cells: [f64; 3]) -> DVec3 {
         self.low + DVec3::from(cells) * self.cell
     }
 }
 
-/// The levels of the pyramid of matter, from 0, that the cones of ambient light pass. Their cells are as wide as the cones, so that another
-/// lattice has the same cones. Cones that are narrower or wider than any cell have the width of the narrowest or widest cells.
+/// The levels of the pyramid of densities that the cones of ambient light are sampled in, at four positions along each cone. The cells of a level are
+/// as wide as the cone there, so that another lattice has the same cones. Cones narrower or wider than all cells are sampled in the narrowest or
+/// widest ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AmbientCones {
-    /// Level of the nearest position. Below 0 its cells would be narrower than any of the lattice.
+    /// Level (0 is the finest of the pyramid) for the position nearest to the lit cell. Below 0 its cells would be narrower than any of the pyramid.
     pub narrowest: i32,
-    /// Share of the next level, 0..1. The mixture of both levels has the variance of the cone's width.
+    /// Weight (0..1) of the next level, mixed with that level so that the variance of the cone's width is met.
     pub wider: f64,
 }
 
@@ -64,27 +65,27 @@ impl AmbientCones {
         AmbientCones { narrowest: whole as i32, wider }
     }
 
-    /// Level of the n-th position, from 0.
+    /// Level for position `n` along the cone, from 0.
     pub fn level(&self, n: i32) -> u32 {
         (self.narrowest + n).max(0) as u32
     }
 
-    /// Number of levels that are needed: the farthest place may lie between two, and the second one tells where matter is near.
+    /// Number of levels that the pyramid needs for all positions, including the next level of the farthest one.
     pub fn levels(&self) -> u32 {
         1 + self.level(4).max(1)
     }
 }
 
-/// The path of light through the lattice: layer by layer across one axis.
+/// How light goes through the lattice: layer by layer across one axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Propagation {
-    /// The axis that the light is nearest to.
+    /// The axis whose direction is nearest to that of the light.
     pub axis: usize,
-    /// True if the light comes from the high end of the axis.
+    /// True if the light comes from the upper end of that axis.
     pub(crate) from_high: bool,
-    /// Cells along the other two axes, in their order, from a place to where its light comes from, one layer nearer to the light.
+    /// Offset along the other two axes, in cells and in the order of the axes, from a place to where its light crosses the layer before it.
     pub shift: [f64; 2],
-    /// Path through one layer, cells.
+    /// Length of the light's path through one layer, cells.
     pub path: f64,
 }
 
@@ -140,7 +141,7 @@ impl LightVolume {
         AMBIENT_EXTINCTION / self.depth
     }
 
-    /// Powers of the share of ambient light that arrives.
+    /// Exponents for red, green and blue of the share of ambient light that arrives at a cell; they give ambient light its warmth.
     pub(crate) fn ambient_powers(&self) -> [f64; 3] {
         AMBIENT_POWERS.map(|power| 1.0 + self.warmth * (power - 1.0))
     }
@@ -152,13 +153,12 @@ impl LightVolume {
 }
 
 impl Scene {
-    /// The settings of the light volume if they apply: something is composited that the light volume lights. Stills compute light
-    /// themselves.
+    /// The settings of the light volume, if it lights something that is composited. None without one, or for a still, which computes light itself.
     pub fn lit_by_volume(&self) -> Option<LightVolume> {
         self.settings.light.volume.filter(|_| self.composites() && self.still().is_none())
     }
 
-    /// The lattice of the light volume over the box that is composited. Cells are larger than asked for where there would be too many.
+    /// The lattice of the light volume over the rendered box. Cells are larger than requested where there would be too many.
     pub fn light_lattice(&self) -> LightLattice {
         let low = self.volume_view().low;
         let extent = self.high - low;
@@ -188,7 +188,7 @@ impl Scene {
         (lateral * self.grid.pitch[0]).min(depth * self.grid.pitch[1])
     }
 
-    /// The lattice of the light volume and why it is as it is, for `--explain`; none if nothing is lit by one.
+    /// A line on the lattice of the light volume and why it has this size, for `--explain`. None if the scene has no light volume.
     pub(crate) fn light_choice(&self) -> Option<String> {
         let light = self.lit_by_volume()?;
         let (LightLattice { cell, count: [x, y, z], .. }, wanted) = (self.light_lattice(), self.wanted_cell());
@@ -209,26 +209,26 @@ impl Scene {
         Some(format!("light volume: {x} x {y} x {z} cells of {cell:.3} mm, {}: {why}", x * y * z))
     }
 
-    /// The least edge of a cell of which a cell of the pyramid is as wide as the nearest place of a cone, mm.
+    /// The smallest edge of the lattice's cells, mm, with which the pyramid has cells as narrow as the cones of ambient light need.
     pub(crate) fn least_cell_of_cones(&self) -> f64 {
         CONE_WIDTH * self.settings.light.volume.unwrap_or_default().reach / 2.0 / NARROWEST[1].exp2()
     }
 
-    /// The levels of the pyramid that ambient light comes through.
+    /// The levels of the pyramid through which ambient light is computed.
     pub fn ambient_cones(&self) -> AmbientCones {
         let light = self.settings.light.volume.unwrap_or_default();
         AmbientCones::new(light.reach, self.light_lattice().cell)
     }
 
-    /// Number of consecutive steps of a ray that share the light of their middle: two, if together they are no longer than a cell of the
-    /// lattice and each has one sample.
+    /// Number of consecutive steps of a ray that share the light at their middle: 2 if two steps together are no longer than a cell of the light
+    /// volume and each has one sample, else 1.
     pub fn lit_steps(&self) -> u32 {
         let has_one_sample = matches!(self.settings.volume.compositing, Compositing::Riemann | Compositing::Corrected);
         let is_fine = !self.spreads() && 2.0 * self.step <= self.light_lattice().cell;
         if self.lit_by_volume().is_some() && has_one_sample && is_fine { 2 } else { 1 }
     }
 
-    /// A direction in the axes that `light.follows` names, in space, as a unit vector.
+    /// Converts a direction from the axes that `light.follows` names to space; a unit vector.
     pub(crate) fn light_direction(&self, direction: DVec3) -> DVec3 {
         let v = direction.normalize();
         match self.settings.light.follows {
@@ -239,12 +239,12 @@ impl Scene {
         }
     }
 
-    /// Length over which matter fades towards the faces of the region, mm; none if it does not.
+    /// Length over which matter fades towards the faces of the region, mm. None if it does not fade.
     pub fn region_fade(&self) -> Option<f64> {
         Some(self.settings.region.fade).filter(|fade| *fade > 0.0)
     }
 
-    /// Share of the matter that the fade leaves at a position in space, near the faces of the region.
+    /// Factor (0..1) of the matter at a place in space, mm, by which it fades near the faces of the region; 1 without a fade.
     pub fn faded(&self, place: DVec3) -> f64 {
         let Some(fade) = self.region_fade() else { return 1.0 };
         let (low, high) = (place - self.volume_view().low, self.high - place);

@@ -14,7 +14,7 @@ use toml::{Table, Value};
 /// Maximum size of a settings file, bytes.
 const MAX_BYTES: u64 = 1 << 20;
 
-/// The presets as TOML.
+/// The presets: name and TOML text of each.
 pub const PRESETS: &[(&str, &str)] = &[
     ("bmode", include_str!("presets/bmode.toml")),
     ("bone", include_str!("presets/bone.toml")),
@@ -64,7 +64,7 @@ impl Layers {
         settings.to_table().ok().map(|merged| Layers { merged, ..Layers::default() })
     }
 
-    /// These layers with those of `over` on top. What `over` gives without a preset counts as given.
+    /// These layers with those of `over` on top. The result keeps presets and given values of `over` only.
     pub(super) fn with(mut self, over: &Layers) -> Layers {
         merge(&mut self.merged, over.merged.clone(), &mut Vec::new());
         // A `none` of these layers left nothing to merge.
@@ -74,12 +74,12 @@ impl Layers {
         Layers { presets: over.presets.clone(), given: over.given.clone(), ..self }
     }
 
-    /// The presets among the layers, in their order.
+    /// The names of the presets that were added, in their order.
     pub fn presets(&self) -> &[String] {
         &self.presets
     }
 
-    /// True if a layer other than a preset gives this value, a value of this table, or the whole table that it is in.
+    /// True if a layer other than a preset sets the value at `path`, a value in the table at `path`, or the table that contains it.
     pub fn gives(&self, path: &str) -> bool {
         self.given.iter().any(|given| {
             let (longer, shorter) =
@@ -88,7 +88,7 @@ impl Layers {
         })
     }
 
-    /// True if any layer, presets included, gives this value or table.
+    /// True if any layer, presets included, sets the value or table at `path`.
     pub fn has(&self, path: &str) -> bool {
         self.gives(path) || holds(&self.merged, path)
     }
@@ -103,7 +103,8 @@ impl Layers {
         Ok(())
     }
 
-    /// Adds a preset of a user: the complete look of `settings` replaces the look of the layers so far. Its values count as given.
+    /// Adds a user's preset: the look of `settings` replaces that of the layers so far, and counts as set by the user ([`Layers::gives`]). `name` is
+    /// for messages.
     ///
     /// # Errors
     /// The settings cannot be written as TOML.
@@ -118,11 +119,11 @@ impl Layers {
         Ok(())
     }
 
-    /// Adds the presets of the built-in phantom: `face-classic`, a lit surface, and over it `face`, light in the volume, if `is_plain`: if nobody
-    /// chose a look.
+    /// Adds the presets of the built-in phantom: the face as a lit surface. If `is_plain` (the user chose no look), it is shown by volume rendering
+    /// with a light volume instead.
     ///
     /// # Errors
-    /// None: the presets are embedded, and a test reads them.
+    /// None in practice: the presets are embedded, and a test reads them.
     pub fn phantom(&mut self, is_plain: bool) -> Result<(), LoadError> {
         self.preset("face-classic")?;
         if is_plain { self.preset("face") } else { Ok(()) }
@@ -133,17 +134,17 @@ impl Layers {
         self.add(&path.display().to_string(), &text, path.parent())
     }
 
-    /// Adds a table with the keys of a scene file. `layer` names it in messages; relative file names refer to `folder`.
+    /// Adds a layer: a table with the keys of a scene file. `layer` names it in messages; relative file names in it refer to `folder`.
     pub fn table(&mut self, layer: &str, table: Table, folder: &Path) -> Result<(), LoadError> {
         self.merge_checked(layer, table, Some(folder))
     }
 
-    /// Adds one `key.path=value` of `--set`. The value is TOML, or a plain word.
+    /// Adds the assignment of a flag `--set key.path=value`. The value is TOML, or a plain word.
     pub fn set(&mut self, assignment: &str) -> Result<(), LoadError> {
         self.set_by(&format!("--set {assignment}"), assignment)
     }
 
-    /// Like [`Layers::set`], for a flag that stands for a setting. Messages name the flag as it was typed.
+    /// Like [`Layers::set`], for another flag that sets a value. `flag`: the flag as it was typed, for messages.
     pub fn set_by(&mut self, flag: &str, assignment: &str) -> Result<(), LoadError> {
         let fault = |fault: &str| LoadError::Layer { layer: flag.into(), fault: fault.into() };
         let (path, text) = assignment.split_once('=').ok_or_else(|| fault("must read key.path=value"))?;
@@ -215,8 +216,8 @@ impl Layers {
     }
 }
 
-/// `current` with the values that changed from `before` to `after`. A value of `current` that differs from `before` stays. So does a table
-/// with such a value that `after` no longer has. None if the result is no valid settings.
+/// `current` with every value that changed from `before` to `after`, unless `current` already differs from `before` there. A table in which `current`
+/// differs stays, even if `after` lacks it. None if the result is no valid settings.
 pub fn rebase(current: &Settings, before: &Settings, after: &Settings) -> Option<Settings> {
     let table = |settings: &Settings| settings.to_table().ok();
     let mut rebased = table(current)?;
@@ -241,7 +242,7 @@ fn rebase_table(current: &mut Table, before: &Table, after: &Table) {
     }
 }
 
-/// The settings of a preset alone.
+/// The settings that a preset alone makes. None if there is no such preset.
 pub(super) fn preset_settings(name: &str) -> Option<Settings> {
     let mut layers = Layers::default();
     layers.preset(name).ok()?;
@@ -278,12 +279,15 @@ fn remove(table: &mut Table, path: &str) {
     }
 }
 
-/// Reads a small text file. `what` names its kind in messages.
+/// Reads a small text file. `what` names the kind of file in messages.
+///
+/// # Errors
+/// The file cannot be read, is too large, or is no UTF-8.
 pub fn read(path: &Path, what: &str) -> Result<String, LoadError> {
     files::read_text(path, MAX_BYTES, what).map_err(|fault| LoadError::File { path: path.display().to_string(), fault })
 }
 
-/// The transfer function file that a layer names.
+/// The file name that `volume.transfer` of a layer's table has. None if it names no file.
 pub fn transfer_file(table: &Table) -> Option<String> {
     let name = table.get("volume")?.get("transfer")?.as_str()?;
     name.ends_with(".toml").then(|| name.to_string())
@@ -358,7 +362,7 @@ fn one_line(error: &NodeError, text: &str) -> String {
     place + &printable(error.message())
 }
 
-/// The line number of a byte in a text, from 1.
+/// The number, from 1, of the line that contains the byte at index `byte` of a text.
 pub fn line_of(text: &str, byte: usize) -> usize {
     text.bytes().take(byte).filter(|b| *b == b'\n').count() + 1
 }

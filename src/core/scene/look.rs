@@ -35,7 +35,7 @@ const OF_EXAMINATION: &[&str] = &[
     "cine",
 ];
 
-/// True if a setting belongs to a look.
+/// True if the setting at `path` belongs to a look (how things are drawn) and not to an examination (region, camera, measurements and the like).
 pub fn is_look(path: &str) -> bool {
     !OF_EXAMINATION
         .iter()
@@ -43,7 +43,7 @@ pub fn is_look(path: &str) -> bool {
 }
 
 impl Settings {
-    /// The look of these settings with the examination of other settings.
+    /// The look of `self` with everything else from `other`.
     pub fn look_over(&self, other: &Settings) -> Settings {
         let (look, kept) = (self.clone(), other.clone());
         Settings {
@@ -77,7 +77,7 @@ impl Settings {
         }
     }
 
-    /// These settings as another examination begins with them: their look, and defaults for everything else.
+    /// The look of these settings with defaults for everything else, such as another examination begins with.
     pub fn look(&self) -> Settings {
         self.look_over(&Settings::default())
     }

@@ -9,7 +9,7 @@ use glam::DVec3;
 
 /// Directions whose components differ by less are as far from one edge as from the other.
 const SAME: f64 = 1e-6;
-/// Lengths that a scale bar may have, mm.
+/// The lengths that a scale bar can have, mm.
 pub const BAR_LENGTHS: [f64; 9] = [0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0];
 
 /// An axis of the volume.
@@ -21,7 +21,7 @@ pub enum VolumeAxis {
 }
 
 impl Marks {
-    /// The patient's sides along an axis of the volume.
+    /// The patient's sides at the ends of an axis of the volume.
     pub fn sides(&self, axis: VolumeAxis) -> Sides {
         match axis {
             VolumeAxis::Lateral => self.lateral,
@@ -38,13 +38,13 @@ impl Marks {
         }
     }
 
-    /// True if the three axes have sides that only the mirror image of a patient has.
+    /// True if the sides of the three axes together fit only the mirror image of a patient.
     pub(crate) fn are_mirrored(&self) -> bool {
         self.lateral.direction().dot(self.depth.direction().cross(self.elevation.direction())) < 0.0
     }
 
-    /// These marks with other sides along an axis. A pair of sides lies along one axis: another axis that had it loses it. Two axes
-    /// determine the third. If all three are known and the probe turns, two axes are reversed: lateral and elevation, or depth and
+    /// These marks with `sides` along an axis. If another axis had that pair of sides it loses it. Two axes determine the third. If all three are
+    /// known and the result would be mirrored, a second axis is reversed too, as if the probe were turned: lateral and elevation, or depth and
     /// elevation.
     pub fn with_sides(mut self, axis: VolumeAxis, sides: Sides) -> Marks {
         for other in [&mut self.lateral, &mut self.depth, &mut self.elevation] {
@@ -70,7 +70,7 @@ impl Marks {
         self.turned_with(axis)
     }
 
-    /// These marks with L and R exchanged, as for a probe that is turned.
+    /// These marks with L and R exchanged, as for a probe turned by 180 degrees about its axis.
     pub fn left_and_right_exchanged(mut self) -> Marks {
         let is_across = |axis: &VolumeAxis| matches!(self.sides(*axis), Sides::LeftRight | Sides::RightLeft);
         let Some(axis) = [VolumeAxis::Lateral, VolumeAxis::Depth, VolumeAxis::Elevation].into_iter().find(is_across)
@@ -91,7 +91,7 @@ impl Marks {
     }
 }
 
-/// An edge of a tile.
+/// One of the four edges of a tile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Edge {
     Left,
@@ -110,7 +110,7 @@ impl Edge {
         }
     }
 
-    /// From the middle of a tile to the middle of this edge, in halves of its width and height.
+    /// The middle of this edge, relative to the middle of the tile, in halves of its width and height.
     pub fn offset(self) -> [f64; 2] {
         match self {
             Edge::Left => [-1.0, 0.0],
@@ -121,36 +121,36 @@ impl Edge {
     }
 }
 
-/// The marks of a tile.
+/// What is marked on one tile of the picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TileMarks {
-    /// Upper left corner and size of the tile, pixels of the picture.
+    /// Upper left corner (`corner`) and width and height of the tile, pixels of the picture.
     pub corner: [f64; 2],
     pub size: [f64; 2],
-    /// Size of a pixel, mm; of a rendering at the camera's target.
+    /// Size of a pixel, mm; for a rendering at the distance of the camera's target.
     pub pixel: f64,
     /// True for a rendering, false for a plane.
     pub is_rendering: bool,
-    /// Depth of its upper edge below the probe's face, mm, where depth runs straight down.
+    /// Depth below the probe's face of the tile's upper edge, mm. None if depth does not run straight down on the tile.
     pub depth_from: Option<f64>,
     pub letters: Vec<(Edge, &'static str)>,
-    /// The edge of the probe's marker.
+    /// The edge at which the dot for the probe's marker is drawn. None if it is not shown.
     pub probe: Option<Edge>,
-    /// The letter of the plane and its colour, where several planes are shown.
+    /// Letter and colour of the plane. None if only one plane is shown.
     pub plane: Option<(&'static str, [f64; 3])>,
-    /// For a curved plane, the length of its line, mm.
+    /// For a curved plane the length of its line, mm; else None.
     pub along: Option<f64>,
-    /// For a plane across an axis of the volume, the axis and the position on it, mm.
+    /// For a plane across an axis of the volume, the name of the axis and the position on it, mm; else None.
     pub place: Option<(&'static str, f64)>,
 }
 
 impl Scene {
-    /// The marks of every tile, in the order of the tiles; a rendering comes last.
+    /// The marks of every tile, in the order of the tiles; the rendering is the last one.
     pub fn marks(&self) -> Vec<TileMarks> {
         self.marks_with(&self.settings.marks)
     }
 
-    /// As [`Scene::marks`], with other settings of the marks. Those of a picture that is shown may be newer than the scene's.
+    /// As [`Scene::marks`], by these marks instead of those of the scene's settings, which may be older than the picture on display.
     pub fn marks_with(&self, marks: &Marks) -> Vec<TileMarks> {
         let mut all = Vec::new();
         if self.cuts_planes() {
@@ -252,7 +252,7 @@ fn sides(marks: &Marks, right: DVec3, down: DVec3) -> (Vec<(Edge, &'static str)>
 }
 
 impl PlaneName {
-    /// Letter of the plane.
+    /// The plane's letter: A, B or C.
     pub fn letter(self) -> &'static str {
         match self {
             PlaneName::A => "A",
@@ -263,7 +263,8 @@ impl PlaneName {
 }
 
 impl TileMarks {
-    /// The corner of the plane's letter, from the middle in halves of width and height: next to an upper edge, away from the probe's marker.
+    /// Where the plane's letter is drawn: a corner at the upper edge, away from the probe's marker, relative to the middle of the tile in halves of
+    /// its width and height.
     pub fn plane_corner(&self) -> [f64; 2] {
         match self.probe {
             Some(Edge::Right) => [-1.0, -1.0],
@@ -271,18 +272,18 @@ impl TileMarks {
         }
     }
 
-    /// The label of a curved plane: its horizontal axis is the length along its line.
+    /// The label of a curved plane, with the length of its line. None for other tiles.
     pub fn along_label(&self) -> Option<String> {
         self.along.map(|mm| format!("along the line: {mm:.1} mm"))
     }
 
-    /// The label of a plane's position, such as "elevation 2.5 mm".
+    /// The label of a plane's position, such as "elevation 2.5 mm". None for other tiles.
     pub fn place_label(&self) -> Option<String> {
         // Without the sign of a zero.
         self.place.map(|(axis, mm)| format!("{axis} {:.1} mm", (mm * 10.0).round() / 10.0 + 0.0))
     }
 
-    /// The longest scale bar of at most a share of the tile's width: its length, mm and pixels.
+    /// The longest scale bar that covers at most `share` (0..1) of the tile's width: its length in mm and in pixels. None if none fits.
     pub fn bar(&self, share: f64) -> Option<(f64, f64)> {
         let most = self.size[0] * share * self.pixel;
         let mm = BAR_LENGTHS.into_iter().rev().find(|mm| *mm <= most && self.pixel > 0.0 && self.pixel.is_finite())?;
@@ -291,7 +292,7 @@ impl TileMarks {
 }
 
 impl Mode {
-    /// The name of the mode for the user.
+    /// The name of the mode that the user reads.
     pub const fn title(self) -> &'static str {
         match self {
             Mode::Volume => "Volume",

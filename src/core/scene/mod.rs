@@ -57,9 +57,9 @@ use sizes::{Pitches, ResolvedSize, Resolver};
 
 /// Maximum width and height of a picture, pixels.
 pub const MAX_PICTURE: u32 = 16384;
-/// Maximum standard deviation of a Gaussian, pixels: 193 taps.
+/// Maximum standard deviation of a Gaussian, pixels: it has 193 taps.
 pub const MAX_DEVIATION: f64 = 32.0;
-/// Maximum window of a filter, pixels.
+/// Maximum edge of a filter's window, pixels.
 pub const MAX_WINDOW: u32 = 63;
 
 /// Maximum number of samples on a ray.
@@ -72,20 +72,20 @@ pub const MAX_CLIPS: usize = 4;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Input {
     pub stored: StoredType,
-    /// The stored values that map to 0 and 1.
+    /// The stored sample values that become 0 and 1.
     pub range: [f64; 2],
 }
 
 impl Input {
-    /// The same samples with the range that the settings ask for, if they do. `shift`: offset that signed samples are stored with
-    /// ([`SampleType::shift`](crate::probe::SampleType::shift)). The setting does not contain it.
+    /// The same samples with the range of the setting `samples.range`, if it is set. `shift`: what was added to signed samples to store them as
+    /// unsigned ([`SampleType::shift`](crate::probe::SampleType::shift)); the setting does not contain it.
     pub fn in_range_of(self, settings: &Settings, shift: f64) -> Input {
         let asked = settings.samples.range.map(|range| range.map(|value| value + shift));
         Input { range: asked.unwrap_or(self.range), ..self }
     }
 }
 
-/// The pixel grid of a slice. The centre of pixel (0, 0) lies at `origin`, in-plane (x, y) in mm.
+/// The pixel grid of a slice. The centre of pixel (0, 0) lies at `origin`, pixels are `pitch` apart; in-plane (x, y), mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SliceGrid {
     pub size: [u32; 2],
@@ -99,25 +99,25 @@ impl SliceGrid {
     }
 }
 
-/// The region, grey window and start depth of a pass of stage 2. They belong to the mode: rays that start at the probe would meet the
-/// uterine wall first.
+/// The box and grey window that a pass of stage 2 renders with. They depend on the mode, because each mode has its own start depth: rays that start
+/// at the probe would meet the uterine wall first.
 #[derive(Clone, Copy, Debug)]
 pub struct View {
     pub window: [f64; 2],
-    /// Lower corner of the region, cut at the start depth, mm in space.
+    /// Lower corner of the box, at the start depth where that is deeper than the region, mm in space.
     pub low: DVec3,
-    /// Upper corner of the region.
+    /// Upper corner of the box, mm in space.
     pub high: DVec3,
 }
 
-/// The samples that the surface detector compares at a place: a ring of two halves, each as long as an edge.
+/// The ring of samples that the surface detector compares at a place: two halves, each as long as an edge (`surface.edge`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ring {
     /// Distance between two samples of the ring, mm.
     pub step: f64,
-    /// Samples of a half, 4..=256.
+    /// Number of samples in each half, 4..=256.
     pub half: u32,
-    /// Number of samples, from the crossing of the threshold on, among which the largest difference is.
+    /// Number of samples after the crossing of the threshold among which the detector looks for the largest difference.
     pub follow: u32,
 }
 
@@ -141,24 +141,24 @@ impl Ring {
         (length / step - 1e-9).ceil().clamp(4.0, 256.0) as u32
     }
 
-    /// Samples of a half for rays with another step, mm, and the same edge.
+    /// Number of samples in each half for rays with another step, mm, and the same length of an edge.
     pub fn half_at(self, step: f64) -> u32 {
         Ring::half_of(self.step * f64::from(self.half), step)
     }
 
-    /// Number of samples (n of thesis 4-3).
+    /// Number of samples of the whole ring (n of thesis 4-3).
     pub fn samples(self) -> u32 {
         2 * self.half
     }
 }
 
-/// The pixel formats of windows. A picture in the format of the window is copied to it without a conversion.
+/// The pixel formats of a window. A picture in the window's format is copied to it without a conversion.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum WindowTexels {
     #[default]
     Rgba8,
     Bgra8,
-    /// More than 8 bits a channel.
+    /// More than 8 bits a channel: the picture has 16-bit floats.
     Deep,
 }
 
@@ -168,48 +168,47 @@ pub struct Scene {
     pub input: Input,
     pub settings: Settings,
     pub grid: SliceGrid,
-    /// Corners of the rendered box, mm in space: the bounds of the insonified region within the region of interest.
+    /// Corners of the rendered box, mm in space: the part of the insonified region's bounds within the region of interest.
     pub low: DVec3,
     pub high: DVec3,
     pub rays: Rays,
-    /// Step along a ray, mm.
+    /// Distance between samples along a ray, mm.
     pub step: f64,
-    /// Samples of the surface detector, whose step divides the length of an edge.
+    /// The ring of the surface detector, whose own step divides the length of an edge evenly.
     pub ring: Ring,
-    /// Whether rays skip bricks if no setting decides it: true, or the last choice of [`Scene::sampled`].
+    /// True if skipping bricks saves time on the device, which decides where `ray.brick` is not set. True until [`Scene::sampled`] sets it.
     pub bricks_pay: bool,
-    /// Pixel format of the picture: that of the window, so that no conversion is needed. The device resolves this.
+    /// Pixel format of the picture: that of the window, so that no conversion is needed. Set by the renderer for its device.
     pub window_texels: WindowTexels,
-    /// Bytes of shared memory of a workgroup on a GPU. AOS solves a row or a column in it, the light volume propagates light through
-    /// several layers in it, and filters keep their texels in it. 0 on a CPU, where single invocations do all this faster. The device
-    /// resolves this.
+    /// Bytes of shared memory of a workgroup on a GPU, which AOS, the light volume and filters use. 0 on a CPU, where single invocations are faster.
+    /// Set by the renderer for its device.
     pub shared_memory: u32,
-    /// True if the device truncates half-precision floats when it stores them, instead of rounding. The device resolves this.
+    /// True if the device truncates half-precision floats when it stores them, instead of rounding. Set by the renderer for its device.
     pub truncates_halves: bool,
-    /// Maximum number of frames that go through stage 1 at once, 1... The device resolves this.
+    /// Maximum number of frames that go through stage 1 at once, at least 1. Set by the renderer for its device.
     pub frames_at_once: u32,
-    /// How the volume is sampled: the setting, or for `Auto` the last choice of [`Scene::sampled`].
+    /// How the volume is sampled: the setting `ray.sampling`, or for `Auto` what [`Scene::sampled`] chose.
     pub sampling: Sampling,
-    /// Margin in pixels around the sector in which pixels take the nearest sample inside: the reach of the filters. 0 is the strict rule
-    /// of the PLUS toolkit, which keeps a pixel only if all four neighbours exist.
+    /// Margin around the sector, pixels of a slice, in which pixels take the nearest sample of the sector: as wide as the filters reach. 0 is the
+    /// strict rule of the PLUS toolkit, which keeps a pixel only if all four neighbours exist.
     pub apron: f64,
-    /// Conditioning of lines, sizes in samples.
+    /// Conditioning of lines, with sizes converted from mm to samples.
     pub conditioning: Conditioning,
-    /// Filters of slices, sizes in slice pixels; the Gaussian's as set along lateral and depth, and in slices across them.
+    /// Filters of slices, with sizes converted from mm to slice pixels. The Gaussian keeps mm along lateral and depth, and has slices across them.
     pub slice_filters: Slices,
-    /// The Gaussian of the planes' own volume, in the same units.
+    /// The Gaussian of the section volume, in the units of the one in `slice_filters`. None if planes have no volume of their own.
     pub section_smooth: Option<Smooth>,
-    /// Filters of the distance map, sizes in rays.
+    /// Filters of the distance map, with sizes converted from mm to rays.
     pub distance: Distance,
-    /// How sizes in mm were resolved, for `--explain`.
+    /// How sizes in mm were converted, for `--explain`.
     pub resolved_sizes: Vec<ResolvedSize>,
-    /// How defaults were found, for `--explain`; one line each.
+    /// How defaults were found, one line each, for `--explain`.
     pub found: Vec<String>,
-    /// The texels of the volume that stage 2 may read. Stage 1 computes only these.
+    /// The texels of the volume that stage 2 may read. Stage 1 computes no others.
     pub visible_bounds: visible_bounds::VisibleBounds,
-    /// The texels that a renderer stores beyond those that this scene shows, from an earlier scene: [`Scene::keeping`].
+    /// Texels that the renderer stores although this scene does not need them, because an earlier scene did ([`Scene::keeping`]).
     pub kept_bounds: visible_bounds::VisibleBounds,
-    /// What stage 1 must serve beyond this scene; none if no other scene draws the same volume: [`Scene::sharing`].
+    /// What stage 1 must serve beyond this scene ([`Scene::sharing`]). None if no other scene draws the same volume.
     pub shared: Option<Shared>,
 }
 
@@ -225,7 +224,7 @@ pub fn refuse<T>(field: &'static str, fault: impl Into<String>) -> Result<T, Sce
 }
 
 impl Settings {
-    /// Checks settings without a geometry.
+    /// Checks settings as far as no geometry is needed.
     ///
     /// # Errors
     /// Names the first setting that is invalid for every geometry, and its limits.
@@ -386,12 +385,13 @@ impl Scene {
         }
     }
 
-    /// A place in space, mm, as shaders get it. The subtraction is in f64: f32 would lose a voxel of 0.1 mm at 1e6 mm.
+    /// Converts a place in space, mm, to the coordinates that shaders compute with. The subtraction is in f64: f32 would lose a voxel of 0.1 mm at
+    /// 1e6 mm.
     pub fn to_local(&self, place: DVec3) -> DVec3 {
         place - self.local_origin()
     }
 
-    /// The limit w of a half-space dot(n, p) <= w in space, mm, for places as shaders get them.
+    /// Converts the limit w of a half-space dot(n, p) <= w in space, mm, to the coordinates that shaders compute with.
     pub(crate) fn limit_to_local(&self, normal: DVec3, limit: f64) -> f64 {
         limit - normal.dot(self.local_origin())
     }
@@ -403,12 +403,12 @@ impl Scene {
         }
     }
 
-    /// The place in space of a point of the settings, whose depth counts from the probe's face, mm.
+    /// The place in space, mm, of a point in the coordinates of settings: lateral, depth from the probe's face, elevation, mm.
     pub fn place_of(&self, [lateral, depth, elevation]: [f64; 3]) -> DVec3 {
         DVec3::new(lateral, depth + depth_offset(&self.geometry), elevation)
     }
 
-    /// A place in space, mm, as a point of the settings: the opposite of [`Scene::place_of`].
+    /// The opposite of [`Scene::place_of`]: a place in space, mm, as lateral, depth from the probe's face and elevation.
     pub fn point_of(&self, place: DVec3) -> [f64; 3] {
         (place - DVec3::Y * depth_offset(&self.geometry)).to_array()
     }
@@ -422,7 +422,7 @@ impl Scene {
         self.geometry.frame_size().map(|n| n as u32)
     }
 
-    /// True for a device that executes both sides of every branch and has no shared memory: a CPU, or none that is known yet.
+    /// True if the device is a CPU, or not known yet: it has no shared memory and executes both sides of every branch.
     pub(crate) fn is_for_cpu(&self) -> bool {
         self.shared_memory == 0
     }
@@ -434,12 +434,12 @@ impl Scene {
         on && self.probe().is_some()
     }
 
-    /// Decimation factor of the lines of a frame.
+    /// Decimation factor of the samples along each line of a frame; 1 for a Cartesian volume.
     pub fn decimation(&self) -> u32 {
         self.probe().map_or(1, |probe| self.settings.conditioning.factor(probe.samples))
     }
 
-    /// Samples per line and number of lines at scan conversion.
+    /// Number of samples per line after decimation, and number of lines.
     pub fn line_lattice(&self) -> [u32; 2] {
         let [samples, lines] = self.frame_size();
         [(samples - 1) / self.decimation() + 1, lines]
@@ -455,32 +455,34 @@ impl Scene {
         self.settings.picture.size
     }
 
-    /// Number of rays along each axis, the size of the pictures of stages 2 and 3: one tile of a 4-up picture, and several rays per pixel.
+    /// Number of rays along each axis, which is the size of the images of stages 2 and 3: the rendering's part of the picture, with several rays per
+    /// pixel or one for several pixels.
     pub fn ray_size(&self) -> [u32; 2] {
         camera::ray_size(&self.settings)
     }
 
-    /// Pixels of the rendering along each axis, where each has one ray or more.
+    /// Width and height of the rendering in pixels; with `ray.subsampling`, in rays.
     pub(crate) fn rendering_size(&self) -> [u32; 2] {
         self.ray_size().map(|n| n / self.settings.ray.rays)
     }
 
-    /// True if only pixels at edges have several rays. The picture must follow from the colour along each ray alone.
+    /// True if only pixels at edges have several rays (`ray.adaptive`). It needs a mode in which a pixel follows from the colours along its rays
+    /// alone.
     pub fn adapts_rays(&self) -> bool {
         let ray = &self.settings.ray;
         let is_alone = self.settings.mode == Mode::Volume && !self.lights_volume();
         ray.adaptive && ray.rays > 1 && is_alone && self.still().is_none() && !self.has_caps()
     }
 
-    /// The error that each pixel may have, levels of 8 bits, by which steps are chosen. `None` if no tolerance is set, or in scenes other
-    /// than volume rendering without a light volume and without a still.
+    /// The tolerance of `ray.tolerance`, levels of 8 bits, by which the steps of each pixel are chosen. None if it is 0, or if the scene is not
+    /// volume rendering, lights first hits, or is a still.
     pub fn tolerance(&self) -> Option<f64> {
         let is_alone = self.settings.mode == Mode::Volume && !self.lights_volume() && self.still().is_none();
         Some(self.settings.ray.tolerance).filter(|levels| *levels > 0.0 && is_alone)
     }
 
-    /// True if pixels at edges of a surface, or of a cut face, mix the near and the far side by the shares that each covers. With several
-    /// rays a pixel the rays do this.
+    /// True if pixels at edges of a surface, or of a cut face, mix the near and the far side by the share of the pixel that each covers. With several
+    /// rays a pixel it is false: the mean of the rays does this.
     pub fn antialiases(&self) -> bool {
         let ray = &self.settings.ray;
         self.settings.post.antialias
@@ -489,8 +491,8 @@ impl Scene {
             && ray.subsampling == 1
     }
 
-    /// True if stages 2 and 3 render into a slot other than the picture: several rays make a pixel, one ray makes several pixels, edges are
-    /// antialiased, or planes or the volume are shown next to the rendering.
+    /// True if stages 2 and 3 render into a slot other than the picture, which is then assembled from it: several rays make a pixel, one ray makes
+    /// several pixels, edges are antialiased, or planes or a second rendering are beside it.
     pub fn assembles(&self) -> bool {
         let ray = &self.settings.ray;
         let is_beside =
@@ -498,7 +500,7 @@ impl Scene {
         is_beside && !self.is_flat()
     }
 
-    /// True if a picture is converted to 8 bits when it is assembled, since no other pass of stage 4 reads it.
+    /// True if assembling the picture also converts it to 8 bits, because no other pass of stage 4 reads it.
     pub(crate) fn tones_assembled(&self) -> bool {
         self.assembles() && self.only_tones()
     }
@@ -510,7 +512,7 @@ impl Scene {
         !filtered && !post.floats
     }
 
-    /// Entries of the table of the transfer function; its points were checked.
+    /// Number of entries of the table of the transfer function.
     pub fn transfer_entries(&self) -> usize {
         transfer::entries(&self.settings.volume).unwrap_or(transfer::ENTRIES)
     }
@@ -520,44 +522,44 @@ impl Scene {
         matches!(self.settings.mode, Mode::Surface | Mode::Mixed)
     }
 
-    /// True if the surface is chosen among the candidates of neighbouring rays.
+    /// True if the surface of each ray is chosen among several candidates, by what neighbouring rays found.
     pub(crate) fn chooses_surface(&self) -> bool {
         self.detects_surface() && self.settings.surface.detector == Detector::Consistent
     }
 
-    /// True if stage 3 lights a distance map.
+    /// True if stage 3 lights a distance map: of a surface, or of the first hits of volume rendering.
     pub fn has_distance(&self) -> bool {
         self.detects_surface() || self.lights_volume()
     }
 
-    /// True if volume rendering lights the first hit of each ray.
+    /// True if volume rendering lights the first hit of each ray like a surface (`volume.shading`).
     pub fn lights_volume(&self) -> bool {
         self.settings.mode == Mode::Volume && self.settings.volume.shading == Shading::FirstHit
     }
 
-    /// True if steps along a ray grow with the range.
+    /// True if the steps along a ray grow with the distance from the array's apex (`ray.spread`).
     pub fn spreads(&self) -> bool {
         let curved = self.probe().is_some_and(|p| matches!(p.array, Array::Curved { .. }));
         curved && self.settings.ray.spread > 0.0
     }
 
-    /// The view of the surface detector.
+    /// The box and grey window of the surface detector.
     pub fn surface_view(&self) -> View {
         self.view(self.settings.surface.window, self.settings.surface.start_depth)
     }
 
-    /// The view of volume rendering.
+    /// The box and grey window of volume rendering.
     pub fn volume_view(&self) -> View {
         self.view(self.settings.volume.window, self.settings.volume.start_depth)
     }
 
-    /// The view of projections.
+    /// The box and grey window of projections.
     pub(crate) fn projection_view(&self) -> View {
         self.view(self.settings.projection.window, self.settings.projection.start_depth)
     }
 
-    /// Depth at which rendering starts, mm, if nothing else is in front of it. In mode mixed it is the deeper one of the surface and the
-    /// volume layer.
+    /// Y coordinate in space, mm, at which rendering starts unless the start surface or start curve is deeper. In mode mixed it is the deeper one of
+    /// surface and volume layer.
     pub fn start_depth(&self) -> f64 {
         let (surface, volume, projection) = (self.surface_view(), self.volume_view(), self.projection_view());
         match self.settings.mode {
@@ -569,7 +571,7 @@ impl Scene {
         }
     }
 
-    /// The whole region with a grey window.
+    /// The whole region with this grey window, without a start depth.
     pub(crate) fn whole_view(&self, window: [f64; 2]) -> View {
         self.view(window, None)
     }
@@ -579,7 +581,7 @@ impl Scene {
         View { window, low: self.low.with_y(self.low.y.max(start)), high: self.high }
     }
 
-    /// Clip planes (n, w) in space. Points p with dot(n, p) > w are removed.
+    /// Clip planes (n, w) in space: n is a unit vector, and points p with dot(n, p) > w are removed; mm.
     pub fn clips(&self) -> impl Iterator<Item = (DVec3, f64)> {
         let offset = depth_offset(&self.geometry);
         self.settings.clip.iter().map(move |c| {
@@ -588,12 +590,12 @@ impl Scene {
         })
     }
 
-    /// The length for which the transfer function's opacities are given: one slice pixel, mm.
+    /// The length that the transfer function's opacities refer to: one slice pixel, mm.
     pub fn reference_length(&self) -> f64 {
         self.grid.pitch[0].min(self.grid.pitch[1])
     }
 
-    /// A step of volume rendering, where steps have one length, in lengths for which opacities are given.
+    /// The step of volume rendering in units of [`Scene::reference_length`], for steps of equal lengths.
     pub(crate) fn optical_step(&self) -> f64 {
         self.step / self.reference_length()
     }
@@ -603,17 +605,17 @@ impl Scene {
         matches!(self.settings.mode, Mode::Volume | Mode::Mixed) || self.colours_surface() || self.is_pair()
     }
 
-    /// True if the volume gives the surface its colour.
+    /// True if volume rendering gives the surface its colour (`surface.colour`).
     pub(crate) fn colours_surface(&self) -> bool {
         self.settings.mode == Mode::Surface && self.settings.surface.colour != SurfaceColour::Constant
     }
 
-    /// True if the volume and the surface are shown side by side.
+    /// True if layout pair shows volume rendering and the surface side by side.
     pub fn is_pair(&self) -> bool {
         self.settings.layout == Layout::Pair
     }
 
-    /// Whether one march finds the surface and composites the whole ray, and why, or why not (thesis 4.4.2).
+    /// Whether one pass finds the surface and composites the whole ray (thesis 4.4.2): `Ok` with the reason, or `Err` with the reason why not.
     pub(crate) fn marches_once(&self) -> Result<&'static str, &'static str> {
         let settings = &self.settings;
         let is_whole = settings.surface.colour == SurfaceColour::Rendered || self.is_pair();
@@ -644,7 +646,7 @@ impl Scene {
         Ok("one march finds the surface and composites the whole ray")
     }
 
-    /// True if the mode is a projection: one value per ray.
+    /// True if the mode is a projection: the largest, smallest or mean sample of each ray.
     pub(crate) fn projects(&self) -> bool {
         matches!(self.settings.mode, Mode::Mip | Mode::MinIp | Mode::Mean)
     }
@@ -659,8 +661,8 @@ impl Scene {
         self.settings.mode.is_flat()
     }
 
-    /// Standard deviations of the 3D Gaussian in slice pixels, slice pixels and slices. Across slices it is less than the setting where
-    /// the interpolation between slices smooths more than linear interpolation.
+    /// Standard deviations of the 3D Gaussian: along columns and rows in slice pixels, across slices in slices. The last is less than the setting
+    /// where interpolation between slices smooths more than linear interpolation does.
     pub fn smoothing(&self) -> [f64; 3] {
         let [lateral, depth, elevation] = self.deviations(self.slice_filters.smooth.unwrap_or_default());
         if self.blurs() {
@@ -669,7 +671,7 @@ impl Scene {
         [lateral, depth, elevation]
     }
 
-    /// Standard deviations of the 3D Gaussian of the section volume, in slice pixels, slice pixels and slices.
+    /// Standard deviations of the 3D Gaussian of the section volume: slice pixels, slice pixels and slices.
     pub(crate) fn section_smoothing(&self) -> [f64; 3] {
         self.deviations(self.section_smooth.unwrap_or_default())
     }
@@ -694,12 +696,12 @@ impl Scene {
         }
     }
 
-    /// True if samples between slices are those of the cubic B-spline, which touch four slices.
+    /// True if samples between slices are interpolated by the cubic B-spline, which reads four slices.
     pub fn takes_bspline(&self) -> bool {
         self.settings.ray.elevation != Elevation::Linear
     }
 
-    /// True if slices are sharpened across elevation.
+    /// True if slices are sharpened across elevation, for `ray.elevation = "bspline-sharp"`.
     pub(crate) fn sharpens(&self) -> bool {
         self.settings.ray.elevation == Elevation::BsplineSharp
     }
@@ -709,7 +711,7 @@ impl Scene {
         self.smoothing_radius()[2] > 0
     }
 
-    /// Taps of the 3D Gaussian on one side, along each axis.
+    /// Number of taps of the 3D Gaussian on each side of the middle, along columns, rows and slices.
     pub fn smoothing_radius(&self) -> [u32; 3] {
         if let Some(taps) = self.slice_filters.smooth.and_then(|s| s.kernel) {
             return [taps / 2; 3];
@@ -719,7 +721,7 @@ impl Scene {
         if self.blurs() { [1, 1, elevation] } else { [lateral, depth, elevation] }
     }
 
-    /// Taps on one side of the Gaussian of the volume that planes beside a rendering are cut from.
+    /// Number of taps of the 3D Gaussian of the section volume on each side of the middle, along columns, rows and slices.
     pub(crate) fn section_smoothing_radius(&self) -> [u32; 3] {
         if let Some(taps) = self.section_smooth.and_then(|s| s.kernel) {
             return [taps / 2; 3];
@@ -728,13 +730,13 @@ impl Scene {
         [lateral, depth, if self.sharpens() { 1 } else { elevation }]
     }
 
-    /// Frames on either side that change a slice of the volume that rays are cast through: all of them where parts that float are dropped, or the
-    /// render start follows the fluid.
+    /// Number of frames on either side of a slice that can change it in the volume that rays go through: all of them where floating parts are dropped
+    /// or the start surface is searched.
     pub(crate) fn reach_to_frames(&self) -> u32 {
         if self.drops_floating() || self.unveils() { self.slices() } else { self.smoothing_radius()[2] }
     }
 
-    /// Neighbours on either side that a filtered slice is made of, in the volume with the most.
+    /// Number of neighbouring slices on either side that a filtered slice depends on; of the two volumes, the one with more.
     pub fn reach_across_slices(&self) -> u32 {
         let sections = if self.has_sections() { self.section_smoothing_radius()[2] } else { 0 };
         self.smoothing_radius()[2].max(sections)
@@ -747,13 +749,14 @@ impl Scene {
         blur && smooth.kernel.is_none() && smooth.lateral == 0.0 && smooth.depth == 0.0
     }
 
-    /// Estimator of the centre of an enhanced sigma filter: Perona-Malik for planes, the median otherwise (thesis 5.7).
+    /// The estimator of the centre in an enhanced sigma filter: as set, otherwise Perona-Malik for planes and the median for all other modes (thesis
+    /// 5.7).
     pub fn centre(&self, enhanced: EnhancedSigma) -> Estimator {
         let usual = if self.is_flat() { Estimator::PeronaMalik } else { Estimator::Median };
         enhanced.centre.unwrap_or(usual)
     }
 
-    /// Number of samples behind the surface whose mean echo skin shading needs; 0 for none.
+    /// Number of samples behind the surface that skin shading averages; 0 if it needs none.
     pub(crate) fn samples_behind(&self) -> u32 {
         match self.settings.light.skin {
             Some(skin) if skin.translucency > 0.0 => ((skin.depth / self.ring.step).ceil() as u32).clamp(1, 256),
@@ -761,28 +764,28 @@ impl Scene {
         }
     }
 
-    /// Distance between the samples behind the surface that skin shading averages, mm. Together they span the skin's depth.
+    /// Distance between the samples behind the surface that skin shading averages, mm. Together the steps span the skin's depth.
     pub(crate) fn step_behind(&self) -> f64 {
         self.settings.light.skin.map_or(0.0, |skin| skin.depth) / f64::from(self.samples_behind().max(1))
     }
 
-    /// True if the light on a surface depends on the echo there or behind it: through texture, or the translucency of skin.
+    /// True if the light on a surface depends on the echo at or behind it: by `light.texture`, or the translucency of skin.
     pub fn lights_by_echo(&self) -> bool {
         let is_translucent = self.skin().is_some_and(|s| s.translucency > 0.0);
         self.detects_surface() && (self.settings.light.texture > 0.0 || is_translucent)
     }
 
-    /// Skin shading, if it has an effect: wrap or translucency is above 0.
+    /// Skin shading, if it has an effect: wrap or translucency is above 0. Otherwise None.
     pub fn skin(&self) -> Option<Skin> {
         self.settings.light.skin.filter(|s| s.wrap > 0.0 || s.translucency > 0.0)
     }
 
-    /// Largest difference of neighbouring distances within one surface, mm.
+    /// Largest difference, mm, of the distances of neighbouring rays on one surface; a larger one is a gap between two surfaces.
     pub fn cliff(&self) -> f64 {
         self.settings.light.cliff * f64::from(self.settings.ray.subsampling)
     }
 
-    /// Position of a near light in space, mm.
+    /// Position of the near light in space, mm. None if the light is distant.
     pub fn light_place(&self) -> Option<DVec3> {
         self.settings.light.position.map(|p| self.rays.target + self.rays.out_of_camera(p))
     }
@@ -814,7 +817,7 @@ fn binomial_deviation(taps: u32) -> f64 {
     f64::from(taps - 1).sqrt() / 2.0
 }
 
-/// Taps on one side of a Gaussian, cut off at three standard deviations, which hold 99.7 % of it.
+/// Number of taps on one side of a Gaussian of `deviation` pixels or slices. It is cut off at three standard deviations, which hold 99.7 %.
 pub(crate) fn gaussian_radius(deviation: f64) -> u32 {
     if deviation > 0.0 { ((3.0 * deviation).ceil() as u32).max(1) } else { 0 }
 }

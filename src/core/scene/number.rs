@@ -5,30 +5,30 @@ use super::region::depth_offset;
 use super::{Edge, Layout, Mode, Scene, SceneError, Settings, Shading, refuse};
 use glam::DVec3;
 
-/// The largest length of a setting, mm, and what lengths may be: from a thousandth of the smallest voxel that a volume may have to a thousand of the largest. A scene may so
-/// be drawn at any size.
+/// The largest length of a setting, mm. With the smallest one this allows scenes of any size: from a thousandth of the smallest voxel that a volume
+/// may have to a thousand times the largest.
 pub(super) const LARGEST: f64 = 1e9;
 pub(super) const LENGTH: Allowed = Allowed::Range(1e-9, LARGEST);
 pub(super) const LENGTH_OR_0: Allowed = Allowed::Range(0.0, LARGEST);
-/// A place, mm.
+/// Allowed coordinates of a place, mm.
 pub(super) const PLACE: Allowed = Allowed::Range(-1e10, 1e10);
-/// An angle, degrees.
+/// Allowed angles, degrees.
 pub(super) const ANGLE: Allowed = Allowed::Range(-360.0, 360.0);
 pub(super) const SHARE: Allowed = Allowed::Range(0.0, 1.0);
-/// Infinity is allowed, and has a meaning.
+/// Numbers from 0 to infinity; infinity is allowed, and has a meaning.
 pub(super) const NOT_NEGATIVE: Allowed = Allowed::Range(0.0, f64::INFINITY);
 
-/// Values that a number may have.
+/// Which values a number of the settings may have.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Allowed {
-    /// Every number, as far as this one alone is concerned.
+    /// Every number; checks of several settings together may exclude some.
     Any,
     Range(f64, f64),
-    /// 0, which switches something off, or what lies in a range.
+    /// 0, which switches something off, or a value in this range.
     OffOr(f64, f64),
-    /// Odd, in a range.
+    /// An odd number in this range.
     Odd(f64, f64),
-    /// 0, which switches something off, or what is odd in a range.
+    /// 0, which switches something off, or an odd number in this range.
     OffOrOdd(f64, f64),
     OneOf(&'static [f64]),
 }
@@ -83,20 +83,20 @@ pub enum Group {
 /// Gives each value of a number that is there.
 type Each = fn(&Settings, &mut dyn FnMut(f64));
 
-/// A slider of the viewer.
+/// A slider of the viewer, which changes one or several settings.
 #[derive(Clone, Copy, Debug)]
 pub struct Slider {
-    /// The setting that the slider changes, or a name of its own if it changes several.
+    /// Path of the setting that the slider changes, or a name of its own if it changes several.
     pub key: &'static str,
     pub name: &'static str,
-    /// What the slider does: a sentence.
+    /// What the slider does, as a sentence for the user.
     pub hint: &'static str,
-    /// Unit of its value; may be empty.
+    /// Unit of the value; may be empty.
     pub unit: &'static str,
     pub group: Group,
-    /// Range for any volume. [`Slider::range_in`] gives the range for one scene.
+    /// Range of the slider for any volume. [`Slider::range_in`] narrows it for one scene.
     pub range: [f64; 2],
-    /// Change of the value by a key press.
+    /// How much a key press changes the value.
     pub step: f64,
     /// Values below are 0.
     least: f64,
@@ -107,7 +107,7 @@ pub struct Slider {
 }
 
 impl Slider {
-    /// A slider that sets several settings.
+    /// A slider that changes several settings by the functions `each` (gives their values) and `put` (sets them).
     pub const fn of_several(
         [key, name, unit, hint]: [&'static str; 4],
         group: Group,
@@ -133,29 +133,29 @@ impl Slider {
         }
     }
 
-    /// The same slider, which affects pictures only with some settings.
+    /// The same slider, which has an effect only with settings for which `applies` is true.
     pub const fn when(self, applies: fn(&Settings) -> bool) -> Slider {
         Slider { applies, ..self }
     }
 
-    /// The same slider with a range that depends on the scene.
+    /// The same slider, whose range is limited to what `limits` gives for a scene.
     pub const fn within(self, limits: fn(&Scene) -> [f64; 2]) -> Slider {
         Slider { limits, ..self }
     }
 
-    /// True if the slider affects the picture.
+    /// True if the slider affects the picture with these settings.
     pub fn applies(&self, settings: &Settings) -> bool {
         (self.applies)(settings)
     }
 
-    /// Value of the setting. It may lie outside of the range if a scene file set it so. 0 if it has none.
+    /// The present value of its setting. It may be outside the range if a scene file set it so. 0 if the setting is absent.
     pub fn get(&self, settings: &Settings) -> f64 {
         let mut found = None;
         (self.each)(settings, &mut |value| found = found.or(Some(value)));
         found.unwrap_or(0.0)
     }
 
-    /// Sets the nearest value in the range. NaN changes nothing.
+    /// Sets its setting to the value, clamped to the slider's range. NaN changes nothing.
     pub fn set(&self, settings: &mut Settings, value: f64) {
         if !value.is_nan() {
             let value = value.clamp(self.range[0], self.range[1]);
@@ -163,14 +163,14 @@ impl Slider {
         }
     }
 
-    /// The range for this scene; never empty.
+    /// Lowest and highest value for this scene; never empty.
     pub fn range_in(&self, scene: &Scene) -> [f64; 2] {
         let [low, high] = (self.limits)(scene);
         let low = self.range[0].max(low).min(self.range[1]);
         [low, self.range[1].min(high).max(low)]
     }
 
-    /// True if the slider is a switch: 0 is off and 1 is on.
+    /// True if the slider is shown as a switch: 0 is off and 1 is on.
     pub fn is_switch(&self) -> bool {
         self.range == [0.0, 1.0] && self.step == 1.0
     }
@@ -179,9 +179,9 @@ impl Slider {
 /// A number of the settings, or several numbers of one meaning, such as the coordinates of a point.
 #[derive(Clone, Copy, Debug)]
 pub struct Number {
-    /// Path of the number in a scene file.
+    /// Path of the number in a scene file, such as `ray.step`.
     pub key: &'static str,
-    /// Unit of its values; may be empty.
+    /// Unit of the values; may be empty.
     pub unit: &'static str,
     allowed: Allowed,
     pub slider: Option<Slider>,
@@ -199,7 +199,7 @@ impl Number {
         Number { key, unit, allowed, slider: None, each, put }
     }
 
-    /// The same number with a slider.
+    /// The same number with a slider. `applies`: with which settings the slider affects the picture; `hint`: what it does.
     pub(super) const fn slider(
         self,
         group: Group,
@@ -217,7 +217,7 @@ impl Number {
         Number { slider: Some(slider), ..self }
     }
 
-    /// The slider sets 0, or no value, below `least`.
+    /// The same number, whose slider sets values below `least` to 0, or removes an optional value.
     pub(super) const fn off_below(self, least: f64) -> Number {
         match self.slider {
             Some(slider) => self.with(Slider { least, ..slider }),
@@ -225,7 +225,7 @@ impl Number {
         }
     }
 
-    /// The slider's range depends on the scene.
+    /// The same number, whose slider is limited to what `limits` gives for a scene.
     pub(super) const fn within(self, limits: fn(&Scene) -> [f64; 2]) -> Number {
         match self.slider {
             Some(slider) => self.with(slider.within(limits)),
@@ -233,7 +233,7 @@ impl Number {
         }
     }
 
-    /// The slider sets more than the number.
+    /// The same number, whose slider sets more than this number, by `put`.
     pub(super) const fn set_by(self, put: fn(&mut Settings, f64)) -> Number {
         match self.slider {
             Some(slider) => self.with(Slider { put, ..slider }),
@@ -241,7 +241,7 @@ impl Number {
         }
     }
 
-    /// The values that are allowed, with their unit; empty for all.
+    /// The allowed values with their unit, for messages and docs; empty if all are allowed.
     pub fn allowed(&self) -> String {
         match (self.allowed.words(), self.unit) {
             (words, _) if words.is_empty() => words,
@@ -277,12 +277,12 @@ impl Settings {
         !self.mode.is_flat()
     }
 
-    /// True if rendering may start at the fluid.
+    /// True if the mode can start rendering at the fluid (`unveil`).
     pub(super) fn can_unveil(&self) -> bool {
         self.renders_rays() && self.mode != Mode::Cube
     }
 
-    /// True if each pixel may have steps of its own.
+    /// True if the settings allow each pixel steps of its own (`ray.tolerance`).
     pub(super) fn can_tolerate(&self) -> bool {
         let is_alone = self.mode == Mode::Volume && self.volume.shading != Shading::FirstHit && self.still.is_none();
         is_alone && self.ray.sliding == 0 && !self.ray.adaptive
@@ -296,7 +296,7 @@ impl Settings {
         self.mode == Mode::Cube
     }
 
-    /// True if a volume is shown with a surface: it has a window, a threshold and a start depth of its own.
+    /// True if volume rendering is shown with a surface (mode mixed, layout pair), so that it has a window, a threshold and a start depth of its own.
     pub fn has_own_volume(&self) -> bool {
         self.mode == Mode::Mixed || self.layout == Layout::Pair
     }
@@ -309,7 +309,7 @@ impl Settings {
         matches!(self.mode, Mode::Surface | Mode::Mixed) || self.is_first_hit()
     }
 
-    /// True if light goes through the volume.
+    /// True if a light volume lights what is composited.
     pub(super) fn is_lit_inside(&self) -> bool {
         self.light.volume.is_some() && matches!(self.mode, Mode::Volume | Mode::Mixed)
     }
@@ -319,17 +319,17 @@ impl Settings {
     }
 }
 
-/// The start depths that leave 1 mm of the region.
+/// Lowest and highest start depth, mm below the probe's face, that leaves at least 1 mm of the region.
 pub fn start_depths(scene: &Scene) -> [f64; 2] {
     [f64::NEG_INFINITY, scene.high.y - depth_offset(&scene.geometry) - 1.0]
 }
 
-/// Values of settings as numbers.
+/// A type of settings that consists of numbers.
 pub(super) trait Numeric: Sized {
-    /// Gives each of its numbers.
+    /// Calls `take` with each of its numbers.
     fn each(&self, take: &mut dyn FnMut(f64));
 
-    /// The value that a number stands for; none of several numbers.
+    /// The value for one number. None for types of several numbers.
     fn of(_number: f64) -> Option<Self> {
         None
     }
@@ -402,15 +402,15 @@ impl Numeric for Edge {
     }
 }
 
-/// Sets a value to a number.
+/// Sets a value to a number; nothing changes if the type consists of several numbers.
 pub(super) fn put<T: Numeric>(value: &mut T, number: f64) {
     if let Some(new) = T::of(number) {
         *value = new;
     }
 }
 
-/// The row of a number: its path, its unit and what is allowed. `=>` stands behind a table that may be absent, and behind a list. Then of its slider, if it has
-/// one: group, name, range, step, with which settings pictures depend on it, and what it does.
+/// Makes the [`Number`] of a setting from its path, its unit and the allowed values. In the path, `=>` follows a table that may be absent, or a list.
+/// After `;` follows its slider, if it has one: group, name, range, step, with which settings it affects pictures, and a hint.
 macro_rules! number {
     ($first:ident $(. $field:ident)* $(=> $table:ident $(. $below:ident)*)*, $unit:expr, $allowed:expr; $($slider:expr),+) => {
         number!($first $(. $field)* $(=> $table $(. $below)*)*, $unit, $allowed).slider($($slider),+)

@@ -3,7 +3,8 @@
 use super::{Rays, Scene};
 use glam::DVec3;
 
-/// The projection of the rendered part of the picture. Positions are in pixels of the picture from its upper left corner.
+/// Converts between pixels of the rendered part of the picture, its rays, and points in space. Positions are in pixels of the picture from its upper
+/// left corner.
 pub struct Picker<'a> {
     rays: &'a Rays,
     /// Columns and rows of the picture before the rendered part; in a pair, the surface.
@@ -25,7 +26,7 @@ impl<'a> Picker<'a> {
         }
     }
 
-    /// Columns and rows of the picture before the rendered part; in a pair, the surface.
+    /// Upper left corner of the rendered part in the picture, pixels; in a pair, of the part with the surface.
     pub fn corner(&self) -> [f64; 2] {
         self.corner
     }
@@ -35,7 +36,7 @@ impl<'a> Picker<'a> {
         self.size
     }
 
-    /// The centre of the rendered part, where the camera's target is.
+    /// The centre of the rendered part, pixels; the camera's target is there.
     pub fn centre(&self) -> [f64; 2] {
         std::array::from_fn(|a| self.corner[a] + self.size[a] / 2.0)
     }
@@ -46,7 +47,7 @@ impl<'a> Picker<'a> {
         self.rays.at(x, y)
     }
 
-    /// Origin and unit direction of the ray of a column and row.
+    /// Origin and unit direction of the ray with this column and row among the rays.
     pub fn ray_at(&self, [x, y]: [usize; 2]) -> (DVec3, DVec3) {
         self.rays.at(x as f64 + 0.5, y as f64 + 0.5)
     }
@@ -56,29 +57,28 @@ impl<'a> Picker<'a> {
         std::array::from_fn(|a| (at[a] - self.corner[a]) * self.rays_per_pixel)
     }
 
-    /// The column and row of the ray nearest to a position on the picture, pixels, and the origin and unit direction of that ray. None outside
-    /// of the rendered part. `rays`: number of rays along each axis.
+    /// Column and row of the ray nearest to a position on the picture, and origin and unit direction of that ray. None outside the rendered part.
+    /// `rays`: number of rays along each axis.
     pub fn nearest_ray(&self, at: [f64; 2], rays: [u32; 2]) -> Option<([usize; 2], (DVec3, DVec3))> {
         let place = self.in_rays(at).map(f64::floor);
         let is_in = (0..2).all(|a| place[a] >= 0.0 && place[a] < f64::from(rays[a]));
         is_in.then(|| (place.map(|n| n as usize), self.rays.at(place[0] + 0.5, place[1] + 0.5)))
     }
 
-    /// The column and row of the first of the four rays around a position on the picture, and how far it is from that to the others, 0..1; none
-    /// where one of them is not there. `rays`: their number along each axis.
+    /// Column and row of the upper left of the four rays around a position on the picture, and how far the position is from it towards the others,
+    /// 0..1. None if one of the four does not exist. `rays`: number of rays along each axis.
     pub fn rays_around(&self, at: [f64; 2], rays: [u32; 2]) -> Option<([usize; 2], [f64; 2])> {
         let place = self.in_rays(at).map(|n| n - 0.5);
         let is_in = (0..2).all(|a| place[a] >= 0.0 && place[a] + 1.0 < f64::from(rays[a]));
         is_in.then(|| (place.map(|n| n as usize), place.map(f64::fract)))
     }
 
-    /// The column and row of the pixel that contains a ray's centre. If rays are coarser than pixels, this may be the first pixel outside
-    /// of the picture.
+    /// Column and row of the pixel that contains a ray's centre. If one ray makes several pixels, it may be the first pixel outside the picture.
     pub fn pixel_of_ray(&self, ray: [usize; 2]) -> [usize; 2] {
         std::array::from_fn(|a| ((ray[a] as f64 + 0.5) / self.rays_per_pixel + self.corner[a]) as usize)
     }
 
-    /// The position on the picture of a point in space; none behind the camera.
+    /// The position on the picture of a point in space, mm. None behind the camera.
     pub fn project(&self, point: DVec3) -> Option<[f64; 2]> {
         let r = self.rays;
         let from = point - r.origin;

@@ -7,9 +7,9 @@ use glam::{DMat3, DVec2, DVec3};
 
 /// Maximum number of tiles of a picture.
 pub const MAX_TILES: u32 = 64;
-/// Maximum number of samples through a slab.
+/// Maximum number of samples through a slab (a thick plane).
 pub(crate) const MAX_SLAB: f64 = 4096.0;
-/// Points of the line of a curved plane that are closer than this share of its extent coincide.
+/// Two points of the line of a curved plane coincide if they are closer than this share of the line's extent.
 pub(super) const SAME_POINT: f64 = 1e-6;
 /// Where the line of a curved plane is drawn, a point that is closer to the last one than this share of the planes' box is none. It is more than
 /// [`SAME_POINT`] of any line that fits into ten boxes.
@@ -19,10 +19,10 @@ const ON_SECTION: f64 = 1.0 / 128.0;
 /// Distance between the places of a way along a curved plane, as a share of its line's length: 0.25 mm of 64. Chords of a circle of a tenth of the length
 /// are shorter than its arcs by 6e-5.
 const WAY_STEP: f64 = 1.0 / 256.0;
-/// Size of a tile in the buffer, in vectors of four floats.
+/// Size of a tile in the table for shaders, in vectors of four floats.
 pub(crate) const TILE_VECTORS: u32 = 9;
 
-/// A plane through the volume: a point on it and three unit axes.
+/// A plane through the volume: a point on it, mm in space, and three unit axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane {
     pub at: DVec3,
@@ -34,53 +34,53 @@ pub struct Plane {
 /// A tile of the picture and the plane that it shows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tile {
-    /// The plane. `at` is the point in the middle of the tile.
+    /// The plane that it shows. Its point `at` is in the middle of the tile.
     pub plane: Plane,
-    /// Position of the tile in the picture and its size, pixels.
+    /// Upper left corner of the tile in the picture (`corner`) and its width and height, pixels.
     pub corner: [u32; 2],
     pub size: [u32; 2],
     /// Scale of the tile, mm per pixel.
     pub pixel: f64,
-    /// Of a curved plane: the line that it follows. `plane` then goes through the middle of the line, `right` along its chord.
+    /// The line that a curved plane follows; None for a plane. `plane` then goes through the middle of the line, with `right` along its chord.
     pub section: Option<Section>,
     pub frame: Frame,
-    /// The planes whose cross-lines are drawn, and their colours.
+    /// The planes whose cross-lines are drawn on this tile, with their colours.
     pub(crate) crossed_by: Vec<(Plane, [f64; 3])>,
 }
 
-/// A curved plane: it stands on a line in a reference plane, perpendicular to that.
+/// A curved plane: it contains a line that lies in a reference plane, and is perpendicular to that plane.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Section {
     pub line: Line,
-    /// Point of the line's coordinates (0, 0), at the level of the middle of the tile, and the axes of the reference plane.
+    /// The point (0, 0) of the line's coordinates, mm in space, at the level of the middle of the tile. `axes`: the two axes of the reference plane.
     pub origin: DVec3,
     pub axes: [DVec3; 2],
 }
 
-/// A column of a curved plane: its place in the middle of the tile's height, and the unit vector across the plane.
+/// A column of pixels of a curved plane: the place at half the tile's height, mm in space, and the unit normal of the plane there.
 pub type Column = (DVec3, DVec3);
 
-/// The border of a tile.
+/// How the border of a tile is drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Frame {
     None,
-    /// A line of this colour on the outermost pixels.
+    /// As a line of this colour on the tile's outermost pixels.
     Around([f64; 3]),
-    /// A line of this colour towards the tiles above and on the left.
+    /// As a line of this colour towards the tiles above and on the left.
     Between([f64; 3]),
 }
 
-/// The tiles of a picture on a grid of columns and rows. Cells after the last tile are empty.
+/// The tiles of a picture, in a grid of columns and rows of cells. Cells after the last tile are empty.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tiling {
     pub columns: u32,
     pub rows: u32,
-    /// Scale of the planes, mm per pixel; a curved plane whose line is too long for its tile has a larger one.
+    /// Scale of all planes, mm per pixel. A curved plane whose line is too long for its tile has a larger one ([`Tile::pixel`]).
     pub pixel: f64,
     pub tiles: Vec<Tile>,
 }
 
-/// Colour of a plane's frame and cross-lines. The colours are distinguishable with any colour vision, and none is grey.
+/// Colour of a plane's border and cross-lines. The colours are distinguishable with any colour vision, and none is grey.
 pub fn colour(plane: PlaneName) -> [f64; 3] {
     match plane {
         PlaneName::A => [1.0, 0.8, 0.1],
@@ -89,20 +89,20 @@ pub fn colour(plane: PlaneName) -> [f64; 3] {
     }
 }
 
-/// Colour of a curved plane's frame and of its line.
+/// Colour of a curved plane's border and of its line.
 pub const CURVE_COLOUR: [f64; 3] = [0.9, 1.0, 0.85];
 
 /// Colour between the tiles of tomography.
 const BETWEEN: [f64; 3] = [0.35, 0.35, 0.35];
 
-/// Number of pixels before the n-th of `count` cells along an axis. Cell sizes differ by at most one pixel; of two cells the last is the
-/// larger one, like the rendering in a 4-up picture.
+/// Pixel at which the n-th of `count` cells begins along an axis of `edge` pixels. Cell sizes differ by at most one pixel; of two cells the last is
+/// the larger one, like the rendering in a 4-up picture.
 pub fn cell(edge: u32, n: u32, count: u32) -> u32 {
     (u64::from(edge) * u64::from(n) / u64::from(count.max(1))) as u32
 }
 
 impl Scene {
-    /// True if the planes beside a rendering are cut from a volume of their own: all of the sector, whatever is rendered.
+    /// True if the planes beside a rendering are cut from the section volume, which has all of the sector whatever is rendered.
     pub fn has_sections(&self) -> bool {
         self.settings.layout.has_planes() && !self.is_flat() && self.section_smooth.is_some()
     }
@@ -112,19 +112,19 @@ impl Scene {
         if self.has_sections() { insonified_box(&self.geometry) } else { (self.low, self.high) }
     }
 
-    /// The box and the window of planes.
+    /// The box and the grey window that planes show.
     pub(crate) fn planes_view(&self) -> View {
         let (low, high) = self.planes_box();
         View { window: self.settings.planes.window, low, high }
     }
 
-    /// The clip planes that cut planes: (n, w) in space.
+    /// The clip planes that cut planes: (n, w) as in [`Scene::clips`]. None cuts the section volume.
     pub(crate) fn planes_clips(&self) -> impl Iterator<Item = (DVec3, f64)> {
         let is_cut = !self.has_sections();
         self.clips().filter(move |_| is_cut)
     }
 
-    /// Number of columns and rows of tiles.
+    /// Number of columns and rows of tiles in the picture's grid.
     pub(crate) fn tile_grid(&self) -> [u32; 2] {
         match (self.settings.layout, self.settings.mode) {
             (Layout::Single, Mode::Plane) if self.has_curve() => self.grid_of_two(),
@@ -152,30 +152,30 @@ impl Scene {
         if self.shows_three() { 3 + u32::from(self.has_curve()) } else { columns.saturating_mul(rows) }
     }
 
-    /// True if three crossing planes are shown.
+    /// True if the three orthogonal planes are shown.
     pub fn shows_three(&self) -> bool {
         self.settings.layout.has_planes() || self.settings.mode == Mode::Orthogonal
     }
 
-    /// True if lines are drawn over the planes: cross-lines and frames, or the lines between tiles.
+    /// True if lines are drawn over the planes: cross-lines and borders, or lines between the tiles of tomography.
     pub fn draws_lines(&self) -> bool {
         let several = self.shows_three() || self.settings.mode == Mode::Tomography || self.has_curve();
         several && self.settings.planes.lines
     }
 
-    /// True if planes are converted to 8 bits when they are cut, since no other pass of stage 4 reads them.
+    /// True if the pass that cuts planes also converts them to 8 bits, because no other pass of stage 4 reads them.
     pub fn tones_planes(&self) -> bool {
         self.is_flat() && self.only_tones()
     }
 
-    /// Number of samples through the slab, at most one slice pixel apart, both faces included.
+    /// Number of samples through the slab, both faces included, at most one slice pixel apart; 1 for a thin plane.
     pub(crate) fn slab_samples(&self) -> f64 {
         let thickness = self.settings.planes.thickness;
         let pixel = self.grid.pitch[0].min(self.grid.pitch[1]);
         if thickness > 0.0 { (thickness / pixel).ceil() + 1.0 } else { 1.0 }
     }
 
-    /// One of the three planes through their common point.
+    /// One of the three orthogonal planes, through their common point.
     pub fn plane(&self, name: PlaneName) -> Plane {
         let settings = &self.settings.planes;
         let at = match settings.position {
@@ -194,13 +194,13 @@ impl Scene {
             * DMat3::from_rotation_z(-settings.roll.to_radians())
     }
 
-    /// Smallest distance of two points of the line of a curved plane where it is drawn, mm.
+    /// Smallest distance, mm, at which points of the line of a curved plane may be drawn from each other.
     pub fn least_apart(&self) -> f64 {
         let (low, high) = self.planes_box();
         NEXT_POINT * (high - low).length()
     }
 
-    /// The curved plane's settings, if this mode shows it.
+    /// The settings of the curved plane. None if this mode does not show it.
     pub fn curve(&self) -> Option<&Curve> {
         let planes = &self.settings.planes;
         planes.curve.as_ref().filter(|curve| match (self.settings.layout, self.settings.mode) {
@@ -215,7 +215,7 @@ impl Scene {
         self.curve().is_some()
     }
 
-    /// The plane of a tile, if that is one of the three; of a curved plane and the slices of tomography none.
+    /// Which of the three orthogonal planes a tile shows. None for a curved plane and for the slices of tomography.
     pub fn plane_of_tile(&self, tile: usize) -> Option<PlaneName> {
         match self.settings.mode {
             _ if self.shows_three() => [PlaneName::A, PlaneName::B, PlaneName::C].get(tile).copied(),
@@ -234,14 +234,14 @@ impl Scene {
         middle - turned * (right * from_face.dot(right) + down * from_face.dot(down))
     }
 
-    /// A point of a plane by its coordinates there, mm in space.
+    /// The place in space, mm, of a point given by its coordinates on a plane, mm right and down.
     pub fn place_on_plane(&self, name: PlaneName, [across, along]: [f64; 2]) -> DVec3 {
         let (plane, origin) = (self.plane(name), self.plane_origin(name));
         let place = origin + plane.right * across + plane.down * along;
         place + plane.normal * (plane.at - place).dot(plane.normal)
     }
 
-    /// The coordinates on a plane of a place in space, projected onto it.
+    /// The coordinates on a plane, mm right and down, of a place in space, mm, projected onto it.
     pub fn point_on_plane(&self, name: PlaneName, place: DVec3) -> [f64; 2] {
         let (plane, from) = (self.plane(name), place - self.plane_origin(name));
         [from.dot(plane.right), from.dot(plane.down)]
@@ -263,7 +263,7 @@ impl Scene {
         Some((Plane { at, right, down, normal: right.cross(down) }, section, base))
     }
 
-    /// The grid of tiles that this scene's picture consists of, and the plane that each tile shows.
+    /// The tiles that the planes of this scene's picture consist of, and what each shows.
     pub fn tiling(&self) -> Tiling {
         let [columns, rows] = self.tile_grid();
         let Area { corner: [left, top], size: [width, height] } = self.tile_area();
@@ -324,13 +324,13 @@ impl Scene {
         Tiling { columns, rows, pixel, tiles }
     }
 
-    /// The line of a curved plane on the tile of its plane: the tile, the line and its points, pixels of the picture. Also where the curved plane itself is not
-    /// shown.
+    /// Where the line of the curved plane lies on the tile of the plane that it is drawn on. None if there is no curved plane or no such tile. It is
+    /// there even if the curved plane itself is not shown.
     pub fn curve_line(&self, tiling: &Tiling) -> Option<CurveLine> {
         self.line_on_tile(tiling, self.settings.planes.curve.as_ref()?)
     }
 
-    /// As [`Scene::curve_line`], for a line that is not in the settings.
+    /// As [`Scene::curve_line`], for a curved plane that is not in the settings.
     pub fn line_on_tile(&self, tiling: &Tiling, curve: &Curve) -> Option<CurveLine> {
         let is_its = |n: &usize| self.plane_of_tile(*n) == Some(curve.plane);
         let number = (0..tiling.tiles.len()).find(is_its).filter(|_| self.cuts_planes())?;
@@ -344,7 +344,9 @@ impl Scene {
         })
     }
 
-    /// The places along the way between two places of the curved plane that is straight on its tile; none if one of them is not on it. The curved plane is straightened without stretching, so that the length of this way is its length on the tile.
+    /// Places in space, mm, along the way between two places of the curved plane that is straight on its tile. None if one of them is not on the
+    /// curved plane, or if the line passes there twice. The curved plane is straightened without stretching, so that the length of this way is its
+    /// length on the tile.
     pub fn way_on_section(&self, from: DVec3, to: DVec3) -> Option<Vec<DVec3>> {
         let tiling = self.tiling();
         let tile = tiling.tiles.last().filter(|tile| tile.section.is_some())?;
@@ -363,7 +365,7 @@ impl Scene {
         Some((0..=count).map(between).map(|at| section.at(at.x).0 + tile.plane.down * at.y).collect())
     }
 
-    /// True if the first tile of tomography is the plane across its slices.
+    /// True if the first tile of tomography is the plane across its slices (`planes.reference`).
     pub fn has_reference(&self) -> bool {
         let [columns, rows] = self.tile_grid();
         let is_asked = self.settings.planes.reference && self.settings.mode == Mode::Tomography;
@@ -386,17 +388,18 @@ impl Scene {
     }
 }
 
-/// The line of a curved plane on a tile, pixels of the picture.
+/// The line of a curved plane on a tile of the picture: the number of the tile, and points to draw the line through, pixels of the picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CurveLine {
     pub tile: usize,
     pub line: Vec<[f64; 2]>,
-    /// The points that it was drawn through.
+    /// The points of the settings that the line was made from, pixels of the picture.
     pub points: Vec<[f64; 2]>,
 }
 
 impl CurveLine {
-    /// The end of the line and a place before it, for an arrow that tells its direction: on the curved plane the line runs to the right.
+    /// The end of the line and the point before it, pixels, for an arrow that shows its direction: on the curved plane the line runs to the right.
+    /// None for a line of fewer than two points.
     pub fn head(&self) -> Option<[[f64; 2]; 2]> {
         match self.line[..] {
             [.., before, end] => Some([end, before]),
@@ -419,12 +422,12 @@ impl Section {
         self.axes[0] * direction.x + self.axes[1] * direction.y
     }
 
-    /// The direction that all of the line keeps to within 45 degrees; zero if it bends more.
+    /// The direction in space, a unit vector, from which all of the line deviates by at most 45 degrees; zero if the line bends more.
     pub fn heading(&self) -> DVec3 {
         self.line.heading().map_or(DVec3::ZERO, |heading| self.in_space(heading))
     }
 
-    /// The place at a distance along the line, at the level of the middle of the tile, and the direction of the line there.
+    /// The place at a distance along the line, mm in space, at the level of the middle of the tile, and the unit direction of the line there.
     pub fn at(&self, along: f64) -> (DVec3, DVec3) {
         let (at, direction) = self.line.at(along);
         (self.origin + self.in_space(at), self.in_space(direction))
@@ -454,7 +457,7 @@ impl Tile {
         std::array::from_fn(|a| f64::from(self.corner[a]) + f64::from(self.size[a]) / 2.0)
     }
 
-    /// The columns of a curved plane, from the left; none beyond the ends of its line. Nothing for a plane.
+    /// The columns of a curved plane's tile, from the left; None beyond the ends of its line. Empty for a plane.
     pub fn columns(&self) -> Vec<Option<Column>> {
         let Some(section) = &self.section else { return Vec::new() };
         let length = section.line.length();
@@ -472,8 +475,8 @@ impl Tile {
 }
 
 impl Tiling {
-    /// Where the planes of the other tiles cut the first one, which is perpendicular to them: the ends of a line for each, pixels of the picture.
-    /// They reach beyond the tile.
+    /// The lines at which the planes of the other tiles cut the first one, which is perpendicular to them: two ends each, pixels of the picture. They
+    /// reach beyond the tile.
     pub fn slice_lines(&self) -> Vec<[[f64; 2]; 2]> {
         let Some((reference, slices)) = self.tiles.split_first() else { return Vec::new() };
         let middle = reference.middle();
@@ -488,7 +491,7 @@ impl Tiling {
         slices.iter().map(line).collect()
     }
 
-    /// The tile that holds a pixel; none where the grid has more cells than tiles.
+    /// The tile that contains a pixel. None in an empty cell of the grid.
     pub fn tile_at(&self, x: usize, y: usize) -> Option<&Tile> {
         self.tiles.iter().find(|tile| {
             let within = |at: usize, axis: usize| {
@@ -499,7 +502,7 @@ impl Tiling {
         })
     }
 
-    /// The place in the tile's plane that a pixel's centre shows, mm in space; of a curved plane that of the plane through its chord.
+    /// The place in space, mm, that a pixel's centre shows on the tile's plane; for a curved plane, on the plane through its chord.
     pub fn place(&self, tile: &Tile, x: usize, y: usize) -> DVec3 {
         let from_middle = |at: usize, axis: usize| {
             let middle = f64::from(tile.corner[axis]) + f64::from(tile.size[axis]) / 2.0;
@@ -508,7 +511,7 @@ impl Tiling {
         tile.plane.at + tile.plane.right * from_middle(x, 0) + tile.plane.down * from_middle(y, 1)
     }
 
-    /// The point of a tile's plane that a position on the picture shows, mm in space; of a curved plane the nearest that its line reaches.
+    /// The place in space, mm, that a position on the picture shows on a tile; for a curved plane, the nearest one that its line reaches.
     pub fn point(&self, tile: &Tile, at: [f64; 2]) -> DVec3 {
         let [x, y]: [f64; 2] =
             std::array::from_fn(|a| at[a] - f64::from(tile.corner[a]) - f64::from(tile.size[a]) / 2.0);
@@ -534,7 +537,7 @@ impl Tiling {
         (std::array::from_fn(|a| middle[a] + along[a] / tile.pixel), off)
     }
 
-    /// The upper left corner of a tile in space, and the vectors of one pixel right, of one down, and through the slab, mm.
+    /// The upper left corner of a tile, and the vectors of one pixel right, of one pixel down and through the slab of `thickness` mm; mm in space.
     pub fn vectors(&self, tile: &Tile, thickness: f64) -> [DVec3; 4] {
         let Plane { at, right, down, normal } = tile.plane;
         let (dx, dy) = (right * tile.pixel, down * tile.pixel);
@@ -542,8 +545,8 @@ impl Tiling {
         [at - dx * (width / 2.0) - dy * (height / 2.0), dx, dy, normal * thickness]
     }
 
-    /// The columns of the curved plane for the shaders: the place at the tile's upper edge and 1, or 0 beyond the ends of the line; and the vector through the
-    /// slab.
+    /// The columns of the curved plane for shaders, eight floats each: the place at the tile's upper edge and 1 (0 beyond the ends of the line), then
+    /// the vector through the slab of `thickness` mm and 0.
     pub(crate) fn column_table(&self, thickness: f64) -> Vec<f64> {
         let Some(tile) = self.tiles.last() else { return Vec::new() };
         let up = tile.plane.down * (tile.pixel * f64::from(tile.size[1]) / 2.0);
@@ -557,9 +560,9 @@ impl Tiling {
         tile.columns().into_iter().flat_map(entry).collect()
     }
 
-    /// The data of each tile for the shaders: the upper left corner in space and the vectors of one pixel right and down, the vector through
-    /// the slab, the frame's colour and kind, and two cross-lines (a, b, c, present) with their colours, where a x + b y + c is the distance
-    /// from the line in pixels, with (x, y) relative to the tile's corner.
+    /// The tiles for shaders, `TILE_VECTORS` vectors each: the upper left corner in space and the vectors of one pixel right, one down and through
+    /// the slab; the border's colour and kind; two cross-lines (a, b, c, present) and their colours. a x + b y + c is the distance from the line in
+    /// pixels, with (x, y) relative to the tile's corner.
     pub fn table(&self, thickness: f64) -> Vec<f64> {
         let mut table = Vec::with_capacity(self.tiles.len() * 4 * TILE_VECTORS as usize);
         for tile in &self.tiles {
@@ -587,7 +590,7 @@ impl Tiling {
 }
 
 impl Slab {
-    /// The value of the shader's constant.
+    /// The value of the shaders' specialization constant for this slab.
     pub fn number(self) -> i32 {
         match self {
             Slab::Mean => 0,

@@ -4,7 +4,7 @@ use super::{Mode, SceneError, Settings, SliceGrid, refuse};
 use crate::probe::{Geometry, Motion, Probe};
 use glam::DVec3;
 
-/// Offset from a depth below the probe's face to Y, mm.
+/// Y coordinate in space of the probe's face, mm: what is added to a depth below the face to get Y. 0 for a Cartesian volume.
 pub fn depth_offset(geometry: &Geometry) -> f64 {
     match geometry {
         Geometry::Sweep(probe) => probe.array_radius(),
@@ -16,7 +16,7 @@ pub(super) fn is_still(geometry: &Geometry) -> bool {
     matches!(geometry, Geometry::Sweep(Probe { motion: Motion::Still { .. }, .. }))
 }
 
-/// Corners of the insonified region in space.
+/// Lower and upper corner of the box around the insonified region, mm in space.
 pub fn insonified_box(geometry: &Geometry) -> (DVec3, DVec3) {
     match geometry {
         Geometry::Sweep(probe) => probe.bounds(),
@@ -71,7 +71,10 @@ pub(super) fn visible_box(geometry: &Geometry, settings: &Settings) -> Result<(D
     Ok((low, high))
 }
 
-/// Upper bound of the box that the camera frames: the shallowest start depth that the mode uses.
+/// Lower corner of the box that the camera frames: `low`, moved to the shallowest start depth that the mode uses.
+///
+/// # Errors
+/// A start depth is not a number, or leaves nothing of the region.
 pub(super) fn framed_low(
     geometry: &Geometry,
     settings: &Settings,

@@ -28,8 +28,8 @@ const EXTREME_SAVING: f64 = 1.4;
 const NO_SAVING: f64 = 0.0;
 
 impl Scene {
-    /// The stored format of the volume: the setting, or the meaning of `auto` on the device. R16F has 11 bits, and a store that truncates
-    /// loses one more of them, always downwards. R16 has 16 bits of 0..1, the range of frames and filter results.
+    /// The texel format of the volume: as set, or for `auto` R16F; or R16 on a device that truncates what it stores, if values stay within 0..1. R16F
+    /// has 11 bits, of which truncation loses one, always downwards. R16 has 16 bits for 0..1.
     pub fn volume_format(&self) -> VolumeFormat {
         match self.settings.slices.format {
             VolumeFormat::Auto if self.truncates_halves && !self.may_overshoot() => VolumeFormat::R16,
@@ -43,7 +43,7 @@ impl Scene {
         self.slice_filters.perona_malik.is_some_and(|p| p.scheme == Scheme::AosRichardson)
     }
 
-    /// How the volume is stored and why, for `--explain`.
+    /// A line on the texel format of the volume and the reason for it, for `--explain`.
     pub(crate) fn format_choice(&self) -> String {
         let why = match (self.settings.slices.format, self.truncates_halves, self.may_overshoot()) {
             (VolumeFormat::Auto, true, true) => {
@@ -56,8 +56,8 @@ impl Scene {
         format!("format of the volume: {}, {why}", self.volume_format().name())
     }
 
-    /// The scene with `auto` replaced by `fastest`, the fastest sampling of the device; and without bricks if they cost more than they
-    /// save. What they cost is known of a CPU only, whose fastest sampling is packed neighbours.
+    /// The scene with `ray.sampling = "auto"` replaced by `fastest`, the fastest sampling of the device, and without bricks where they cost more time
+    /// than they save. Their cost is only known for a CPU, which is recognised by packed neighbours as its fastest sampling.
     pub fn sampled(mut self, fastest: Sampling) -> Scene {
         self.bricks_pay = fastest != Sampling::PackedNeighbours || self.settings.slices.still || {
             let [cost, saving] = self.brick_balance();
@@ -106,7 +106,7 @@ impl Scene {
         [cost, of_mode * self.expected_samples()]
     }
 
-    /// Why rays skip bricks, or why not, for `--explain`; none if no ray is cast.
+    /// A line on whether rays skip bricks and why, for `--explain`. None if no ray takes samples.
     pub(crate) fn brick_choice(&self) -> Option<String> {
         if !(self.composites() || self.detects_surface() || self.projects()) {
             return None;
@@ -123,7 +123,7 @@ impl Scene {
         })
     }
 
-    /// The scene without packed neighbours, unless the setting requires them. For devices that lack the memory.
+    /// The scene without packed neighbours, unless the setting requires them: for devices that lack the memory.
     pub fn without_quads(mut self) -> Scene {
         if self.settings.ray.sampling == Sampling::Auto && self.sampling == Sampling::PackedNeighbours {
             self.sampling = Sampling::Exact;
@@ -136,7 +136,8 @@ impl Scene {
         matches!(self.sampling, Sampling::Auto | Sampling::Hardware)
     }
 
-    /// True if rays sample packed neighbours: texels that hold four neighbours of a slice. Not for 32-bit floats, which would take 16 bytes.
+    /// True if rays sample packed neighbours, texels that hold four neighbours of a slice. Never for volumes of 32-bit floats, whose packed texels
+    /// would take 16 bytes.
     pub fn packs(&self) -> bool {
         let stored = self.volume_format() != VolumeFormat::R32f;
         self.sampling == Sampling::PackedNeighbours

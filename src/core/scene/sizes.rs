@@ -11,7 +11,7 @@ use std::fmt;
 /// Maximum number of steps of a diffusion.
 const MAX_STEPS: f64 = 1000.0;
 
-/// A size that was given in mm, and the size that is used for it.
+/// A size that a setting gives in mm, and the size in pixels, slices, samples or rays that is used for it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ResolvedSize {
     /// The setting.
@@ -36,21 +36,21 @@ impl fmt::Display for ResolvedSize {
     }
 }
 
-/// Pitches at the middle of the region, mm.
+/// What is one unit of each size at the middle of the region, mm.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pitches {
-    /// Samples of a line; 0 for a Cartesian volume, which has none.
+    /// Distance of neighbouring samples of a line; 0 for a Cartesian volume, which has no lines.
     pub sample: f64,
-    /// Pixels of a slice: the mean of both axes.
+    /// Distance of neighbouring pixels of a slice: the mean of both axes.
     pub slice_pixel: f64,
-    /// Slices; 0 if there is one.
+    /// Distance of neighbouring slices; 0 if there is only one.
     pub slice: f64,
-    /// Rays of a picture with full resolution.
+    /// Distance of neighbouring rays of a picture with full resolution.
     pub ray: f64,
 }
 
 impl Pitches {
-    /// `apart`: pixels from ray to ray where a pixel has at most one.
+    /// `apart`: pixels from one ray to the next, for a picture with at most one ray a pixel. `middle`: middle of the region, mm in space.
     pub fn new(geometry: &Geometry, grid: &SliceGrid, rays: &Rays, apart: u32, middle: DVec3) -> Pitches {
         let (sample, slice) = match geometry {
             Geometry::Cartesian(volume) => (0.0, volume.spacing[2]),
@@ -75,7 +75,7 @@ impl Pitches {
     }
 }
 
-/// Resolves sizes, and keeps what became of them.
+/// Converts sizes in mm, and records each for [`ResolvedSize`].
 pub(super) struct Resolver {
     pub pitches: Pitches,
     pub resolved: Vec<ResolvedSize>,
@@ -166,7 +166,7 @@ impl Resolver {
         Conditioning { low_pass, low_pass_mm: None, ..c.clone() }
     }
 
-    /// A Gaussian with its deviation across slices in slices.
+    /// Converts a Gaussian's deviation across slices to slices. `key`: path of the setting.
     pub fn smooth(&mut self, key: &'static str, smooth: Smooth) -> Smooth {
         let Some(mm) = smooth.elevation_mm else { return smooth };
         let elevation = self.length(key, mm, Unit(self.pitches.slice, "slices"), MAX_DEVIATION);
@@ -189,7 +189,7 @@ impl Resolver {
         }
     }
 
-    /// Of the filters of a picture with full resolution.
+    /// Converts the filters of the distance map, for a picture with full resolution.
     pub fn distance(&mut self, d: &Distance) -> Distance {
         let unit = self.of_rays();
         let median = match d.median_mm.map(|mm| self.window("distance.median_mm", mm, unit)) {

@@ -5,23 +5,24 @@ use super::{Scene, SliceIndex};
 use crate::probe::{Motion, Probe};
 use std::f64::consts::{FRAC_PI_2, PI};
 
-/// Error bound of the polynomial, slices. An index in f32 is less exact from 16 slices on.
+/// Largest error of the polynomial, slices. From slice 16 on f32 itself is less exact.
 pub(crate) const MAX_ERROR: f64 = 1e-6;
 /// Terms that the shaders have parameters for.
 const MAX_TERMS: usize = 10;
 
-/// Slice index in mean pitches: `offset + t (terms[0] + terms[1] t^2 + terms[2] t^4 ...)` at a position t within the limits.
+/// A polynomial for the slice index, in mean slice pitches: `offset + t (terms[0] + terms[1] t^2 + terms[2] t^4 ...)` at a position t within the
+/// limits.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct SlicePolynomial {
-    /// The lowest and the highest position, a little beyond the sweep: mm, or of a fan the tangent of half the angle about the wobble axis.
+    /// Lowest and highest position t, a little beyond the sweep: mm, or for a fan the tangent of half the angle about the wobble axis.
     pub limits: [f64; 2],
     pub offset: f64,
     pub terms: Vec<f64>,
 }
 
 impl Scene {
-    /// Terms of the polynomial that takes the place of the sweep's look-up table; 0 where the table stays: it was asked for, a fan is
-    /// wider than 180 degrees, more than 10 would be needed, or there is no sweep.
+    /// Number of terms of the polynomial that replaces the sweep's look-up table. 0 where the table is used: it was asked for, a fan is wider than
+    /// 180 degrees, more than 10 terms would be needed, or there is no sweep.
     pub fn slice_terms(&self) -> usize {
         match self.probe() {
             Some(probe) if self.settings.ray.slice_index == SliceIndex::Auto => term_count(probe),
@@ -29,7 +30,7 @@ impl Scene {
         }
     }
 
-    /// The polynomial, where there is one.
+    /// The polynomial that replaces the sweep's look-up table. None where the table is used.
     pub(crate) fn slice_polynomial(&self) -> Option<SlicePolynomial> {
         let count = self.slice_terms();
         self.probe().filter(|_| count > 0).map(|probe| polynomial(probe, count))

@@ -10,7 +10,7 @@ use glam::DVec3;
 /// Least lateral distance of neighbouring points, as a share of the distance from the first to the last: a micrometre of a curve over 100 mm.
 const LEAST_GAP: f64 = 1e-5;
 
-/// A render start in space.
+/// The start curve: the depth at which rendering starts as a smooth function of the lateral position, at any elevation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StartCurve {
     /// Lateral, and depth from wherever depths count: mm, ascending.
@@ -20,7 +20,7 @@ pub struct StartCurve {
 }
 
 impl StartCurve {
-    /// The curve through points that ascend.
+    /// The monotone cubic through points (lateral, depth), mm, whose lateral positions ascend.
     pub fn new(points: &[[f64; 2]]) -> StartCurve {
         let spans: Vec<(f64, f64)> = points.windows(2).map(|two| span(two[0], two[1])).collect();
         let slope = |n: usize| match (n.checked_sub(1).and_then(|before| spans.get(before)), spans.get(n)) {
@@ -32,7 +32,7 @@ impl StartCurve {
         StartCurve { points: points.to_vec(), slopes: (0..points.len()).map(slope).collect() }
     }
 
-    /// The depth at which rendering starts at a lateral position.
+    /// The depth at which rendering starts at a lateral position, mm; counted like the depths of the points.
     pub fn depth(&self, lateral: f64) -> f64 {
         let behind = self.points.partition_point(|point| point[0] <= lateral);
         let Some(n) = behind.checked_sub(1) else { return self.points.first().map_or(0.0, |first| first[1]) };
@@ -75,12 +75,12 @@ fn end_slope((h0, d0): (f64, f64), (h1, d1): (f64, f64)) -> f64 {
 }
 
 impl Scene {
-    /// True if a rendering starts at a curve. Planes and the block of mode cube show everything.
+    /// True if the rendering starts at a curve (`region.start_curve`). Planes and the block of mode cube show everything.
     pub(crate) fn starts_at_curve(&self) -> bool {
         self.settings.region.start_curve.is_some() && self.renders()
     }
 
-    /// The curve at which renderings start, in space: depths are Y.
+    /// The start curve with depths converted to Y in space. None if the rendering has none.
     pub fn start_curve(&self) -> Option<StartCurve> {
         let points = self.settings.region.start_curve.as_ref().filter(|_| self.starts_at_curve())?;
         let offset = region::depth_offset(&self.geometry);
@@ -109,18 +109,18 @@ impl Scene {
             .collect()
     }
 
-    /// True if the start curve makes other rows in two scenes.
+    /// True if the start curve gives the other scene other start rows.
     pub(crate) fn start_curve_differs(&self, other: &Scene) -> bool {
         self.start_curve() != other.start_curve() || self.geometry != other.geometry || self.grid != other.grid
     }
 }
 
-/// True if a place in space is nearer to the probe than the curve.
+/// True if a place in space, mm, is nearer to the probe than the curve, which is one of [`Scene::start_curve`].
 pub fn is_before(curve: &StartCurve, place: DVec3) -> bool {
     place.y < curve.depth(place.x)
 }
 
-/// Checks that need no geometry.
+/// Checks the points of the curve as far as no geometry is needed.
 pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     const FIELD: &str = "region.start_curve";
     let Some(points) = &settings.region.start_curve else { return Ok(()) };
@@ -144,8 +144,10 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     Ok(())
 }
 
+/// Checks whether the start curve can remove anything.
+///
 /// # Errors
-/// The rendering draws both what is dark and what is bright.
+/// The rendering draws both dark and bright matter, so that no value of a texel is invisible.
 pub(super) fn check_drawn(scene: &Scene) -> Result<(), SceneError> {
     cuts::check_removal(scene, scene.starts_at_curve(), "region.start_curve", "set region.start_curve=none")
 }

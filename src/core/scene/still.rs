@@ -12,28 +12,31 @@ const MAX_EXTINCTION: f64 = 40.0;
 pub struct DistantLight {
     /// Unit direction to the light.
     pub towards: DVec3,
-    /// Irradiance of what faces it.
+    /// Irradiance (red, green, blue) on a surface that faces the light.
     pub irradiance: [f64; 3],
 }
 
-/// The lights of a still.
+/// The lights of a still: key light, back light and surroundings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StillLights {
     pub key: DistantLight,
     pub back: DistantLight,
-    /// Radiance from all around.
+    /// Radiance (red, green, blue) that comes from all directions.
     pub environment: [f64; 3],
 }
 
 impl StillLights {
-    /// The probability with which a collision takes light from the back light: its share of both.
+    /// The probability with which a path samples the back light at a collision: its part of the irradiance of both lights.
     pub(crate) fn back_share(&self) -> f64 {
         let [key, back] = [self.key, self.back].map(|light| light.irradiance.into_iter().fold(0.0, f64::max));
         if back > 0.0 { back / (key + back) } else { 0.0 }
     }
 }
 
-/// Checks a still and what it is asked to show.
+/// Checks whether the other settings go with a still; without one there is nothing to check.
+///
+/// # Errors
+/// A setting that a still cannot show.
 pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     if settings.still.is_none() {
         return Ok(());
@@ -65,12 +68,12 @@ fn albedo_of(colour: f64, g: f64) -> f64 {
 }
 
 impl Scene {
-    /// The still that the scene shows, if it is one.
+    /// The settings of the still, if the scene is one.
     pub fn still(&self) -> Option<&Still> {
         self.settings.still.as_ref()
     }
 
-    /// The medium over the sample value: albedo of red, green and blue, and extinction, 1/mm.
+    /// The medium of the still at the entries of a transfer function: albedo of red, green and blue, and extinction, 1/mm.
     pub(crate) fn still_medium(&self, transfer: &[[f64; 4]]) -> Vec<[f64; 4]> {
         let still = self.still().copied().unwrap_or_default();
         let of = |[r, g, b, absorption]: &[f64; 4]| {

@@ -4,8 +4,8 @@ use crate::probe::{Geometry, Grid, StoredType};
 use crate::scene::load::Layers;
 use crate::scene::{Input, Scene};
 
-/// The scene of settings `key=value` and a Cartesian volume of bytes. It has `size` voxels of 1 mm along each axis (lateral, depth, elevation),
-/// the first at (-20, 0, -10) mm.
+/// A scene for tests: settings given as `key=value` lines, and a Cartesian volume of bytes with `size` voxels of 1 mm along each axis (lateral,
+/// depth, elevation), the first at (-20, 0, -10) mm.
 ///
 /// # Panics
 /// A setting is unknown or out of its range, or no scene can be made of them.

@@ -2,7 +2,7 @@
 
 use super::settings::{ColourMap, Compositing, Transfer, TransferName, TransferPoint, Volume};
 
-/// Entries of the transfer table unless the setting or narrow points ask for others. The shader interpolates between them.
+/// Entries of the transfer table, unless the setting or points close to each other require more. The shader interpolates between them.
 pub const ENTRIES: usize = 256;
 /// Smallest and largest table that can be asked for.
 const ENTRIES_RANGE: [usize; 2] = [16, 4096];
@@ -22,24 +22,24 @@ pub fn absorption(opacity: f64) -> f64 {
 /// though they interpolate between different values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Absorption {
-    /// Absorption per mm of opacity 1, in proportion to the opacity; none: opacities are those of one reference length.
+    /// Absorption where the opacity is 1, 1/mm; elsewhere in proportion to the opacity. None: opacities are those of one reference length.
     pub extinction: Option<f64>,
     /// Reference length, mm.
     pub reference_length: f64,
 }
 
 impl Absorption {
-    /// Absorption by opacities of one reference length, mm.
+    /// Absorption by opacities that refer to one reference length, mm.
     pub fn of_length(reference_length: f64) -> Absorption {
         Absorption { extinction: None, reference_length }
     }
 
-    /// Absorption of volume rendering. `reference_length`: mm.
+    /// The absorption that the settings of volume rendering ask for. `reference_length`: mm.
     pub fn of(volume: &Volume, reference_length: f64) -> Absorption {
         Absorption { extinction: volume.extinction, reference_length }
     }
 
-    /// Absorption of an opacity in 0..1 over one reference length, at most [`OPAQUE`].
+    /// Absorption over one reference length for an opacity in 0..1; at most [`OPAQUE`].
     pub fn over_length(self, opacity: f64) -> f64 {
         match self.extinction {
             Some(extinction) => (opacity * extinction * self.reference_length).min(OPAQUE),
@@ -47,7 +47,7 @@ impl Absorption {
         }
     }
 
-    /// The opacity from which on the absorption is [`OPAQUE`] and rises no more; 1 or more if there is none.
+    /// The opacity from which on the absorption is [`OPAQUE`] and does not rise further; 1 or more if it never is.
     pub fn opaque_from(self) -> f64 {
         self.extinction.map_or(1.0, |extinction| OPAQUE / (extinction * self.reference_length))
     }
@@ -58,7 +58,7 @@ pub fn opacity(y: f64) -> f64 {
     -(-y).exp_m1()
 }
 
-/// The points of a transfer function, those of its name if it has one.
+/// The control points of a transfer function; for a named one, those of that name.
 pub fn resolved(transfer: &Transfer) -> Vec<TransferPoint> {
     match transfer {
         Transfer::Named(name) => named(*name),
@@ -66,8 +66,8 @@ pub fn resolved(transfer: &Transfer) -> Vec<TransferPoint> {
     }
 }
 
-/// The points of a volume's transfer function. If `volume.colour` or `volume.opacity` names another function, colours or opacities are those of
-/// that one.
+/// The control points of volume rendering's transfer function (`volume.transfer`), with the colours and the opacities of other named functions where
+/// `volume.colour` and `volume.opacity` are set.
 pub fn of(volume: &Volume) -> Vec<TransferPoint> {
     let whole = resolved(&volume.transfer);
     if volume.colour.is_none() && volume.opacity.is_none() {
@@ -85,8 +85,8 @@ pub fn of(volume: &Volume) -> Vec<TransferPoint> {
     places.into_iter().map(point).collect()
 }
 
-/// Entries of the table of a scene's transfer function: those of the setting; without it [`ENTRIES`], or more if two points are closer
-/// than an entry, which would miss what lies between them: then the fewest that meet every point, or four between the closest points.
+/// Number of entries of the transfer function's table: as set; otherwise [`ENTRIES`], or more if two points are so close that the table would miss
+/// what lies between them: the fewest that meet every point, or four between the closest points.
 ///
 /// # Errors
 /// The end of a sentence: the size is out of its range, or two points are closer than one entry of the largest table or of the size set.
@@ -134,7 +134,8 @@ pub fn table(points: &[TransferPoint], threshold: f64, entries: usize) -> Vec<[f
     table_by(points, threshold, entries, Absorption::of_length(1.0))
 }
 
-/// The same for volume rendering: with [`Volume::extinction`] in place of opacities of one reference length, mm.
+/// As [`table`], for the settings of volume rendering: with [`Volume::extinction`] in place of opacities of one reference length. `reference_length`:
+/// mm.
 pub(crate) fn table_of(volume: &Volume, reference_length: f64, entries: usize) -> Vec<[f64; 4]> {
     table_by(&of(volume), volume.threshold, entries, Absorption::of(volume, reference_length))
 }
@@ -183,7 +184,7 @@ pub fn pre_integrated(table: &[[f64; 4]]) -> Vec<[f64; 4]> {
     (0..n * n).map(|i| between(i / n, i % n)).collect()
 }
 
-/// The fault of an invalid transfer function, if any.
+/// What is wrong with an invalid transfer function, as the end of a sentence. None if it is valid.
 pub fn fault(transfer: &Transfer) -> Option<String> {
     let Transfer::Points(points) = transfer else { return None };
     if points.is_empty() {
@@ -257,7 +258,7 @@ fn named(name: TransferName) -> Vec<TransferPoint> {
     }
 }
 
-/// Control points of a colour map at equidistant brightness from dark to bright, interpolated linearly.
+/// Control points of a colour map at equidistant brightness from dark to bright, red, green and blue in 0..1; between them it is linear.
 pub fn colour_map(map: ColourMap) -> [[f64; 3]; 5] {
     match map {
         ColourMap::None | ColourMap::Grey => std::array::from_fn(|i| [i as f64 / 4.0; 3]),

@@ -10,11 +10,11 @@ use super::{Scene, SceneError, camera, refuse};
 use glam::DVec3;
 
 impl Scene {
-    /// The cameras of `count` pictures of one turn, the first of which looks as the scene's camera does. From each to the next, and from the
-    /// last to the first, the view turns by 360 / `count` degrees about the picture's vertical axis through the target.
+    /// The cameras of `count` pictures of one turn; the first is the scene's camera. From each to the next, and from the last to the first, the view
+    /// turns by 360 / `count` degrees about the picture's vertical axis through the target.
     ///
     /// # Errors
-    /// A mode that shows planes, which do not turn with the view; as [`Scene::new`], a region without volume.
+    /// The mode shows planes, which do not turn with the view; or, as [`Scene::new`], the region has no volume.
     pub fn turntable(&self, count: u32) -> Result<Vec<Camera>, SceneError> {
         if self.is_flat() {
             return refuse("mode", "shows planes, which do not turn with the view: a turntable needs a rendering");

@@ -11,27 +11,28 @@ const CELL: f64 = 1.0;
 /// Standard deviation of the Gaussian that cells are seen through, with that of the volume itself, mm.
 const SMOOTH: f64 = 1.2;
 
-/// The lattice that fluid is looked for in. Lengths are integers from here on, so that the same volume gives the same surface on every machine.
+/// The lattice of cells in which the pocket of fluid is searched. Its sizes are integers, so that the same volume gives the same start surface on
+/// every machine.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct FluidLattice {
-    /// Texels of a cell along columns and rows. Across slices it has one.
+    /// Texels of a cell along columns and rows. Across slices a cell has one texel.
     pub cell: [usize; 2],
-    /// Cells along columns, rows and slices.
+    /// Number of cells along columns, rows and slices.
     pub size: [usize; 3],
     /// Size of a cell along columns, rows and slices in the middle of the region, mm.
     pub pitch: [f64; 3],
-    /// Passes of the kernel 1 2 1 within slices that the cells are smoothed by.
+    /// How often the kernel 1 2 1 is applied to the cells within slices.
     pub smoothing: u32,
 }
 
 impl Scene {
-    /// True if the render start follows the fluid: it is asked for, and something is rendered from a volume of several slices.
+    /// True if rendering starts at the start surface: `unveil` is enabled, and something is rendered from a volume of several slices.
     pub fn unveils(&self) -> bool {
         let is_still = self.probe().is_some_and(|probe| matches!(probe.motion, Motion::Still { .. }));
         self.settings.unveil.enabled && self.renders() && self.slices() > 1 && !is_still
     }
 
-    /// The cells that fluid is looked for in.
+    /// The lattice of cells in which the pocket of fluid is searched.
     pub(crate) fn fluid_lattice(&self) -> FluidLattice {
         let cell = self.grid.pitch.map(|pitch| (CELL / pitch).round().clamp(1.0, 64.0) as usize);
         let [columns, rows, slices] = self.volume_size().map(|n| n as usize);
@@ -58,7 +59,7 @@ impl Scene {
         row.round().clamp(0.0, f64::from(self.grid.size[1] - 1)) as u32
     }
 
-    /// True for each texel of a slice within the sector, the column fastest.
+    /// For each texel of a slice, the column fastest: true if it lies within the sector.
     pub fn sector_mask(&self) -> Vec<bool> {
         let [columns, rows] = self.grid.size;
         let texels = (0..rows).flat_map(|row| (0..columns).map(move |column| (column, row)));
@@ -72,7 +73,7 @@ impl Scene {
         texels.map(is_inside).collect()
     }
 
-    /// By column of cells, then slice: true if the column crosses the middle of the region's depth within the region.
+    /// For each column of cells and slice, the column fastest: true if it lies within the region at the middle of the region's depth.
     pub(crate) fn columns_in_view(&self, lattice: &FluidLattice) -> Vec<bool> {
         let depth = (self.low.y + self.high.y) / 2.0;
         let is_in_view = |column: usize, slice: u32| {
@@ -95,7 +96,8 @@ impl Scene {
         (0..slices as u32).flat_map(|z| (0..columns).map(move |x| (x, z))).map(|(x, z)| is_in_view(x, z)).collect()
     }
 
-    /// What decides where rendering starts, besides the volume: of the region only the columns that are in view.
+    /// A key of the settings that decide where rendering starts: scenes with equal keys find the same start surface in the same volume. Of the region
+    /// only the columns in view count.
     pub(crate) fn unveil_basis(&self) -> impl PartialEq + use<> {
         let lattice = self.unveils().then(|| self.fluid_lattice());
         let in_view = lattice.as_ref().map(|lattice| self.columns_in_view(lattice));
@@ -103,8 +105,10 @@ impl Scene {
     }
 }
 
+/// Checks whether the start surface can remove anything.
+///
 /// # Errors
-/// The rendering draws both what is dark and what is bright.
+/// The rendering draws both dark and bright matter, so that no value of a texel is invisible.
 pub(super) fn check_unveiled(scene: &Scene) -> Result<(), SceneError> {
     cuts::check_removal(scene, scene.unveils(), "unveil.enabled", "set unveil.enabled=false")
 }

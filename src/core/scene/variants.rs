@@ -4,7 +4,7 @@ use super::load::{Layers, PRESETS};
 use super::{Layout, Mode, Settings};
 use std::path::Path;
 
-/// Settings with a name.
+/// Settings that a user may switch to, with a name for messages.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Variant {
     pub name: String,
@@ -90,9 +90,9 @@ const CHOICES: [&str; 53] = [
     "mode = 'vr'\nvolume.shading = 'depth-coded'",
 ];
 
-/// The settings that a user may switch to from these by one choice, beginning with these: each mode alone, each mode that casts rays with
-/// planes beside it too, the pair of surface and volume, and each preset laid over these. `follow` adds the settings that follow from another mode or
-/// layout; presets do not go through it.
+/// The settings that a user may switch to from `from` by one choice, and `from` itself first: each mode alone, each mode that casts rays with planes
+/// beside it, the pair of surface and volume, and each preset laid over `from`. `follow` adds the settings that follow from another mode or layout;
+/// presets do not go through it.
 pub fn switches(from: &Settings, follow: impl Fn(Settings) -> Settings) -> Vec<Variant> {
     let mut variants = vec![Variant::new("as it is", from.clone())];
     for (mode, name) in MODES {
@@ -113,7 +113,7 @@ pub fn switches(from: &Settings, follow: impl Fn(Settings) -> Settings) -> Vec<V
     variants
 }
 
-/// [`switches`], each way to sample the volume in every mode, every mode of every preset, and every filter and light.
+/// As [`switches`], and also every way to sample the volume in every mode, every mode of every preset, and every filter and light.
 pub fn all(from: &Settings) -> Vec<Variant> {
     let mut variants = switches(from, |settings| settings);
     for sampling in SAMPLINGS {

@@ -49,13 +49,12 @@ impl VisibleBounds {
     }
 }
 
-/// What one run of stage 1 must serve if several scenes draw the same volume alternately, such as a view at rest and in motion:
-/// [`Scene::sharing`].
+/// What stage 1 must serve if several scenes draw the same volume alternately, such as a view at rest and in motion ([`Scene::sharing`]).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shared {
-    /// Step along a ray of the picture at rest, mm.
+    /// Step along a ray of the picture at rest, mm; the sampling is chosen by it.
     pub(super) step: f64,
-    /// Corners of the box that holds every sample of every ray, mm in space; none if it may grow at any time, or no ray is cast.
+    /// Corners of the box that holds every sample of every ray of these scenes, mm in space. None if it may grow at any time, or if no ray is cast.
     pub(super) marched: Option<(DVec3, DVec3)>,
     /// Longest reach of the sliding filter, mm.
     pub(super) taps: f64,
@@ -69,7 +68,7 @@ pub struct Rectangle {
 }
 
 impl Rectangle {
-    /// Texels, a multiple of which each edge of a part of a slice lies at: that of the workgroups that make it, and of tiles.
+    /// Multiple of texels at which each edge of a rectangle lies: that of the workgroups that make it, and of tiles.
     pub(crate) const ALIGNMENT: u32 = 32;
 }
 
@@ -90,7 +89,7 @@ impl Scene {
         self
     }
 
-    /// The frames that stage 1 needs: those of the visible slices, and the neighbours within reach of smoothing across slices.
+    /// The frames (as slices) that stage 1 needs: those of the visible slices, and the neighbours that smoothing across slices reads.
     pub fn visible_frames(&self) -> Range<u32> {
         let reach = self.reach_across_slices();
         let Range { start, end } = self.visible_bounds.slices();
@@ -101,7 +100,7 @@ impl Scene {
         }
     }
 
-    /// The visible columns and rows of a slice and so many around them, extended to complete workgroups or the slice's border.
+    /// The visible columns and rows of a slice and `around` more on each side, extended to complete workgroups or to the slice's border.
     pub(crate) fn visible_rectangle(&self, around: [u32; 2]) -> Rectangle {
         let cut = |axis: usize| {
             let (low, high) = (self.visible_bounds.low[axis], self.visible_bounds.high[axis]);
@@ -114,8 +113,8 @@ impl Scene {
         Rectangle { first: [columns.0, rows.0], size: [columns.1, rows.1] }
     }
 
-    /// The texels of the volume that the device stores: the visible rectangle of the slices that stage 1 needs, at least one texel. Texel
-    /// coordinates are those of the whole volume everywhere; only where an image is accessed, its first texel is subtracted.
+    /// The texels of the volume that the device stores: the visible rectangle of all slices that stage 1 needs, at least one texel. Texel coordinates
+    /// everywhere are those of the whole volume; only where an image is accessed, its first texel is subtracted.
     pub fn stored_bounds(&self) -> VisibleBounds {
         let (Rectangle { first, size }, slices) = (self.visible_rectangle([0; 2]), self.visible_frames());
         let shown = VisibleBounds {
@@ -126,8 +125,8 @@ impl Scene {
         if all.is_empty() { VisibleBounds::all([1; 3]) } else { all }
     }
 
-    /// The scene with the stored bounds of `before`, if these hold everything that this scene shows. A region that shrinks then needs no
-    /// other memory and keeps its slices.
+    /// The scene with the stored bounds of `before`, if these hold everything that this scene shows. A region that shrinks then needs no new memory
+    /// and keeps its slices.
     pub fn keeping(self, before: &Scene) -> Scene {
         let stored = before.stored_bounds();
         let shown = Scene { kept_bounds: VisibleBounds::default(), ..self };
@@ -136,8 +135,8 @@ impl Scene {
         Scene { kept_bounds: if is_kept { stored } else { VisibleBounds::default() }, ..shown }
     }
 
-    /// The scene with a stage 1 that serves `full`, itself and `others`, which are scenes of the same volume with the same filters. Values
-    /// that follow from the number of samples are those of `full`, so that a change among these scenes needs no frame again.
+    /// The scene with a stage 1 that also serves `full` and `others`, which draw the same volume with the same filters. What depends on the number of
+    /// samples follows `full`, so that changing from one of these scenes to another needs no frame again.
     pub fn sharing(self, full: &Scene, others: &[&Scene]) -> Scene {
         let all = || others.iter().copied().chain([full, &self]);
         let visible_bounds = all().map(|scene| scene.visible_bounds).fold(self.visible_bounds, VisibleBounds::with);
@@ -151,7 +150,7 @@ impl Scene {
         Scene { visible_bounds, shared: Some(shared), ..self }
     }
 
-    /// Share of the volume's texels within the visible bounds.
+    /// Share (0..1) of the volume's texels that lie within the visible bounds.
     pub fn visible_share(&self) -> f64 {
         let texels = |size: [u32; 3]| size.map(f64::from).iter().product::<f64>();
         texels(std::array::from_fn(|a| self.visible_bounds.high[a] - self.visible_bounds.low[a]))
@@ -159,7 +158,7 @@ impl Scene {
     }
 }
 
-/// The visible bounds of a scene.
+/// Computes the visible bounds of a scene.
 pub(super) fn of(scene: &Scene) -> VisibleBounds {
     let counts_growth = scene.settings.slices.enhanced_sigma.is_some_and(|e| e.growth);
     // A part is as large as it is in all of the sector, and fluid lies where it does whatever the region is.
@@ -169,7 +168,7 @@ pub(super) fn of(scene: &Scene) -> VisibleBounds {
     looks(scene).iter().filter_map(|look| touched(scene, look)).fold(VisibleBounds::default(), VisibleBounds::with)
 }
 
-/// Corners of the box that holds every sample of every ray, mm in space; none if it may grow at any time, or no ray is cast.
+/// Corners of the box that holds every sample of every ray, mm in space. None if it may grow at any time, or if no ray is cast.
 pub(super) fn marched_box(scene: &Scene) -> Option<(DVec3, DVec3)> {
     if scene.settings.slices.everything {
         return None;
@@ -247,7 +246,7 @@ fn tile_faces(scene: &Scene, tile: &Tile) -> Vec<(DVec3, f64)> {
     sides.into_iter().flat_map(faces).collect()
 }
 
-/// Maximum length of `steps` steps of a ray that are `step` mm long, mm. Growing steps keep growing outside the region.
+/// Largest length, mm, of `steps` steps of a ray whose step is `step` mm. Growing steps keep growing outside the region.
 pub(super) fn reach(scene: &Scene, step: f64, steps: u32) -> f64 {
     let steps = f64::from(steps);
     let (mut widest, mut growth) = (1.0, 0.0);

@@ -5,10 +5,10 @@
 use super::module::{HEADER_WORDS, Instruction, Op, SpirvError, decode, encode, error};
 use std::collections::{HashMap, HashSet};
 
-/// The module without branches that its constants never take, and without values that nothing uses. It computes the same.
+/// Removes branches that the module's constants never take, and values that nothing uses. The module computes the same.
 ///
 /// # Errors
-/// A module that breaks the format.
+/// The module is invalid.
 pub fn remove_dead_code(words: &[u32]) -> Result<Vec<u32>, SpirvError> {
     let instructions = decode(words)?;
     let Some(begin) = instructions.iter().position(|i| i.opcode == Op::Function) else {

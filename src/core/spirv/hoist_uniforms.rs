@@ -17,11 +17,11 @@ struct Member {
     path: Vec<u32>,
 }
 
-/// The module with every member of its uniform blocks loaded once, at the start. It computes the same values. A module with
-/// several functions is returned unchanged.
+/// Loads every member of the module's uniform blocks once, at the start. It computes the same values. A module with several functions is returned
+/// unchanged.
 ///
 /// # Errors
-/// A module that breaks the format.
+/// The module is invalid.
 pub(crate) fn hoist_uniforms(words: &[u32]) -> Result<Vec<u32>, SpirvError> {
     let instructions = decode(words)?;
     let loads = UniformLoads::find(&instructions);

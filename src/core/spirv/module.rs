@@ -3,10 +3,10 @@
 
 pub(super) use ::spirv::Op;
 
-/// Every embedded shader: its name and variant, and its words as bytes.
+/// Every embedded shader: its path below glsl/ with its variant, and its words as bytes.
 pub const EMBEDDED: &[(&str, &[u8])] = include!("../../../spirv/embedded.rs");
 
-/// Decorations.
+/// Numbers of SPIR-V decorations.
 pub(super) mod decoration {
     use ::spirv::Decoration;
 
@@ -18,7 +18,7 @@ pub(super) mod decoration {
     pub(crate) const ARRAY_STRIDE: u32 = Decoration::ArrayStride as u32;
 }
 
-/// Capabilities.
+/// Numbers of SPIR-V capabilities.
 pub(super) mod capability {
     use ::spirv::Capability;
 
@@ -26,7 +26,7 @@ pub(super) mod capability {
     pub(crate) const STORAGE_IMAGE_EXTENDED_FORMATS: u32 = Capability::StorageImageExtendedFormats as u32;
 }
 
-/// Storage classes.
+/// Numbers of SPIR-V storage classes.
 pub(super) mod storage_class {
     use ::spirv::StorageClass;
 
@@ -35,20 +35,20 @@ pub(super) mod storage_class {
     pub const STORAGE_BUFFER: u32 = StorageClass::StorageBuffer as u32;
 }
 
-/// The upper limit of identifiers that every consumer of SPIR-V accepts.
+/// The largest bound of identifiers that every consumer of SPIR-V accepts.
 pub(super) const MAX_BOUND: u32 = 0x3f_ffff;
-/// Words of a module's header; word 3 is the bound of its identifiers.
+/// Number of words in a module's header; word 3 is the bound of its identifiers.
 pub(super) const HEADER_WORDS: usize = 5;
 pub(super) const BOUND: usize = 3;
 
-/// The hash of each shader's expanded source, one line each.
+/// The hash of each shader's expanded source, one line a shader.
 pub const SOURCES: &str = include_str!("../../../spirv/SOURCES");
 
 /// Word of a module's header that names the tool that made it; the lower half is the tool's version.
 const GENERATOR: usize = 2;
 
-/// Changes the tool version in the header of a module, which has no meaning for the code. Changing this word invalidates the driver's cache
-/// entry. `number` differs between runs of the program.
+/// Changes the tool version in the header of a module, which does not affect the code, but invalidates the driver's cache entry. `number` differs
+/// between runs of the program.
 pub fn set_tool_version(words: &mut [u32], number: u16) {
     if let Some(word) = words.get_mut(GENERATOR) {
         // Versions from 0x8000 on are later than any that a driver works around.
@@ -56,7 +56,7 @@ pub fn set_tool_version(words: &mut [u32], number: u16) {
     }
 }
 
-/// A module that breaks the format, or that a rewrite cannot handle.
+/// Why a module is invalid, or cannot be rewritten: one line.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("SPIR-V: {0}")]
 pub struct SpirvError(String);
@@ -71,8 +71,9 @@ pub fn embedded(name: &str) -> Option<&'static [u8]> {
     EMBEDDED.iter().find(|(n, _)| *n == name).map(|(_, bytes)| *bytes)
 }
 
-/// Small modules and every so many words of a ray caster, because the time is that of the square of their length: cut before a word and with
-/// that word changed, `read` ends without a panic. It is given a texture that the module has and a table, if it has one, and returns whether it is read.
+/// Test helper: `read` must not panic on malformed modules. They are small modules, and a ray caster at some of its words (the time grows with the
+/// square of the length), cut before a word and with that word changed. `read` gets the words, a texture and a table of the module, and returns
+/// whether it read them.
 #[cfg(test)]
 pub(super) fn malformed(read: impl Fn(&[u32], &str, &str) -> bool) {
     let modules = [
@@ -96,7 +97,7 @@ pub(super) fn error<T>(fault: impl Into<String>) -> Result<T, SpirvError> {
     Err(SpirvError(fault.into()))
 }
 
-/// A literal string: UTF-8, terminated by a zero byte.
+/// Decodes a literal string: UTF-8, terminated by a zero byte.
 pub(super) fn text(words: &[u32]) -> String {
     let bytes: Vec<u8> = words.iter().flat_map(|w| w.to_le_bytes()).take_while(|b| *b != 0).collect();
     String::from_utf8_lossy(&bytes).into_owned()
@@ -108,7 +109,10 @@ pub(super) struct Instruction<'a> {
     pub operands: &'a [u32],
 }
 
-/// Decodes every instruction. Each has at least the operands that the code of this module indexes without a check.
+/// Decodes every instruction of a module. Each has at least the operands that this crate indexes without a check.
+///
+/// # Errors
+/// The module is invalid.
 pub(super) fn decode(words: &[u32]) -> Result<Vec<Instruction<'_>>, SpirvError> {
     if words.len() < HEADER_WORDS || words[0] != 0x0723_0203 {
         return error("not a SPIR-V module");
@@ -155,7 +159,7 @@ pub(super) fn decode(words: &[u32]) -> Result<Vec<Instruction<'_>>, SpirvError> 
     Ok(instructions)
 }
 
-/// True of operations on images: samples, fetches, reads, writes and queries.
+/// True for instructions on images: samples, fetches, reads, writes and queries.
 pub(super) fn is_of_images(opcode: Op) -> bool {
     (Op::SampledImage..=Op::ImageQuerySamples).contains(&opcode)
 }

@@ -23,7 +23,7 @@ enum Change {
     Rounded,
 }
 
-/// A fault in how the instructions of a class are translated.
+/// A way to translate the instructions of one class wrongly.
 pub struct Mutation {
     pub class: &'static str,
     pub what: &'static str,
@@ -48,7 +48,7 @@ const fn of(class: &'static str, what: &'static str, change: fn(Op, &[u32]) -> O
     Mutation { class, what, spares_loops: false, change }
 }
 
-/// One fault for each class. A class that is not here has none that leaves every module valid.
+/// One mutation for each class of instructions. A class without one has none that keeps every module valid.
 pub const MUTATIONS: &[Mutation] = &[
     of("comparisons of floats", "equal numbers compare the other way", |opcode, _| {
         paired(
@@ -213,15 +213,15 @@ fn yields(operation: Op) -> bool {
     runs.iter().any(|run| run.contains(&operation))
 }
 
-/// Number of mutants of a module by this mutation. 0 if the words are not a module.
+/// Number of mutants that this mutation makes of a module: one for each instruction that it can change. 0 if the words are no module.
 pub fn count(words: &[u32], mutation: &Mutation) -> usize {
     decode(words).map_or(0, |instructions| sites(&instructions, mutation).len())
 }
 
-/// The mutant of a module with this number, which is below [`count`].
+/// The mutant of a module with this number, from 0 to below [`count`].
 ///
 /// # Errors
-/// A module that breaks the format, or has no such mutant.
+/// The module is invalid, or has no such mutant.
 pub fn mutant(words: &[u32], mutation: &Mutation, number: usize) -> Result<Vec<u32>, SpirvError> {
     let instructions = decode(words)?;
     let Some(site) = sites(&instructions, mutation).get(number).copied() else {

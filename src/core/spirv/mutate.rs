@@ -6,18 +6,18 @@ use std::collections::HashSet;
 
 /// Number of the instruction FMin in the extended set GLSL.std.450: the smaller of two floats.
 pub const FMIN: u32 = 37;
-/// Number of FMax in that set: the larger of two floats.
+/// Number of the instruction FMax in the extended set GLSL.std.450: the larger of two floats.
 pub const FMAX: u32 = 40;
 
-/// The addition of floats.
+/// The opcode for the addition of floats.
 pub const F_ADD: Op = Op::FAdd;
-/// The subtraction of floats.
+/// The opcode for the subtraction of floats.
 pub const F_SUB: Op = Op::FSub;
 
-/// The module with the last instruction `from` of the extended set replaced by `to`, which takes the same operands.
+/// Replaces the last instruction `from` of the extended set by `to`, which takes the same operands.
 ///
 /// # Errors
-/// A module that breaks the format or has no such instruction.
+/// The module is invalid or has no such instruction.
 pub fn replace_last(words: &[u32], from: u32, to: u32) -> Result<Vec<u32>, SpirvError> {
     let instructions = decode(words)?;
     let matches = |i: &Instruction| i.opcode == Op::ExtInst && i.operands.get(3) == Some(&from);
@@ -33,10 +33,10 @@ pub fn replace_last(words: &[u32], from: u32, to: u32) -> Result<Vec<u32>, Spirv
     Ok(out)
 }
 
-/// The module with the last instruction of opcode `from` replaced by `to`, which takes the same operands.
+/// Replaces the last instruction of opcode `from` by `to`, which takes the same operands.
 ///
 /// # Errors
-/// A module that breaks the format or has no such instruction.
+/// The module is invalid or has no such instruction.
 pub fn replace_last_opcode(words: &[u32], from: Op, to: Op) -> Result<Vec<u32>, SpirvError> {
     let instructions = decode(words)?;
     let Some(last) = instructions.iter().rposition(|i| i.opcode == from) else { return error("no such instruction") };
@@ -47,10 +47,10 @@ pub fn replace_last_opcode(words: &[u32], from: Op, to: Op) -> Result<Vec<u32>, 
     Ok(out)
 }
 
-/// The module with `amount` added to every texel that it writes to the image of that name.
+/// Adds `amount` to every texel that the module writes to the image of that name.
 ///
 /// # Errors
-/// A module that breaks the format or does not write to such an image.
+/// The module is invalid or does not write to such an image.
 pub fn add_to_writes(words: &[u32], image: &str, amount: [f32; 4]) -> Result<Vec<u32>, SpirvError> {
     let instructions = decode(words)?;
     let mut images = HashSet::new();
@@ -97,10 +97,10 @@ pub fn add_to_writes(words: &[u32], image: &str, amount: [f32; 4]) -> Result<Vec
     if writes == 0 { error(format!("the module does not write to '{image}'")) } else { Ok(out) }
 }
 
-/// The module with every sum, difference, product and quotient of floats rounded to half precision.
+/// Rounds every sum, difference, product and quotient of floats in the module to half precision.
 ///
 /// # Errors
-/// A module that breaks the format or computes nothing with floats.
+/// The module is invalid or computes nothing with floats.
 pub fn round_to_half(words: &[u32]) -> Result<Vec<u32>, SpirvError> {
     let instructions = decode(words)?;
     let mut bound = words[BOUND];

@@ -8,11 +8,11 @@ use std::collections::{HashMap, HashSet};
 const ARRAYED: usize = 4;
 const DIMENSION_2D: u32 = 1;
 
-/// The module with a single image for each array of two-dimensional ones. Whatever layer it names is that image, and the array has one
-/// layer: it computes the same if it runs on one layer alone.
+/// Replaces each array of 2D images in the module by a single 2D image, whatever layer the code names. It computes the same if it runs on an array of
+/// one layer.
 ///
 /// # Errors
-/// A module that breaks the format, or an array of images that is used other than by texels read and written, and by queries of its size.
+/// The module is invalid, or uses an array of images other than by texels read and written, and by queries of its size.
 pub fn one_layer(words: &[u32]) -> Result<Vec<u32>, SpirvError> {
     let instructions = decode(words)?;
     // Two new identifiers for an instruction at most: with this many of both, the bound stays in its limit.

@@ -8,20 +8,20 @@ use std::collections::HashMap;
 /// Name of the uniform block that holds the numbers of a pass.
 const PARAMS: &str = "Params";
 
-/// What a binding is.
+/// What kind of resource a binding is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// The uniform block with the numbers of a pass.
+    /// The uniform block with the parameters of a pass.
     Params,
     /// A texture read texel by texel, without a sampler.
     Sampled,
     /// A texture read through a linear sampler.
     Filtered,
-    /// A storage image.
+    /// An image that is read or written without a sampler.
     Storage,
     /// A storage buffer.
     Buffer,
-    /// A storage texel buffer; its texels have this many floats (1, 2 or 4).
+    /// A storage texel buffer; each texel has this many floats (1, 2 or 4).
     Texels(u32),
 }
 
@@ -54,7 +54,7 @@ pub struct Binding {
     pub dimension: Dimension,
 }
 
-/// A scalar, vector or array of 32-bit words in the parameter block; `offset` is in bytes.
+/// A member of the parameter block: a scalar, vector or array of 32-bit words. `offset` is in bytes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Member {
     pub name: String,
@@ -68,19 +68,19 @@ pub struct Member {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Constant {
     pub name: String,
-    /// The `constant_id` of the constant.
+    /// The constant's `constant_id` (`SpecId`).
     pub id: u32,
 }
 
-/// The interface of a module.
+/// The interface of a shader module, by reflection.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Module {
-    /// Bindings in the order of their numbers.
+    /// Bindings in the order of their binding numbers.
     pub bindings: Vec<Binding>,
     pub params: Vec<Member>,
     /// Size of the parameter block, bytes.
     pub params_size: u32,
-    /// Constants in the order of their ids.
+    /// Specialization constants in the order of their ids.
     pub constants: Vec<Constant>,
     /// Invocations of a workgroup along x, y, z.
     pub local_size: [u32; 3],
@@ -136,7 +136,7 @@ struct Declarations {
 /// Reads the interface of a module.
 ///
 /// # Errors
-/// A module that breaks the format, or declares something that no pass uses.
+/// The module is invalid, or declares something that no pass uses.
 pub fn reflect(words: &[u32]) -> Result<Module, SpirvError> {
     let declared = scan(words)?;
     let mut module = Module { local_size: declared.local_size, ..Module::default() };

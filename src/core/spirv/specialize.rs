@@ -12,11 +12,11 @@ enum Value {
     Word(u32),
 }
 
-/// The module with the values of its specialization constants, by `SpecId`: constants that are not named keep their defaults. Expressions
-/// of constants are evaluated.
+/// Writes values of specialization constants, given by `SpecId`, into a module, and evaluates expressions of constants. Constants without a value
+/// keep their defaults.
 ///
 /// # Errors
-/// A module that breaks the format, or an expression that no shader of this project has.
+/// The module is invalid, or has an expression that no shader of this project has.
 pub fn specialize(words: &[u32], values: &[(u32, i32)]) -> Result<Vec<u32>, SpirvError> {
     let instructions = decode(words)?;
     let (mut given, mut known) = (HashMap::new(), HashMap::new());

@@ -31,11 +31,11 @@ impl Entry {
     }
 }
 
-/// The module with its tables as storage texel buffers, if `is_selected` is true for their name. A table is a read-only
-/// storage buffer that holds a single array of floats or of vectors of two or four floats.
+/// Makes storage texel buffers of the module's tables for whose names `is_selected` is true. A table is a read-only storage buffer that holds a
+/// single array of floats or of vectors of two or four floats.
 ///
 /// # Errors
-/// A table that is used other than by reading entries and querying its length.
+/// The module is invalid, or uses such a table other than by reading entries and querying its length.
 pub(crate) fn storage_to_texel_buffer(
     words: &[u32],
     is_selected: impl Fn(&str) -> bool,

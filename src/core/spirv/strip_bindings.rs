@@ -6,12 +6,12 @@ use super::module::{
 };
 use std::collections::HashSet;
 
-/// The module without the textures and storage buffers of these names. Texels fetched, samples taken, numbers loaded and lengths become
-/// undefined values, so no code that runs may use one; texels stored are left out. Names that the module does not have are ignored.
+/// Removes the textures and storage buffers of these names from a module. Texels fetched, samples taken, numbers loaded and lengths become undefined
+/// values, so no code that runs may use one; texels stored are left out. Names that the module does not have are ignored.
 ///
 /// # Errors
-/// A module that breaks the format, a texture that is used other than by fetches, samples of a given level, stores of texels and size queries, or a
-/// buffer that is used other than by loads and queries of its length.
+/// The module is invalid, uses such a texture other than by fetches, samples of a given level, stores of texels and size queries, or uses such a
+/// buffer other than by loads and queries of its length.
 pub(crate) fn strip_bindings(words: &[u32], names: &[&str]) -> Result<Vec<u32>, SpirvError> {
     let instructions = decode(words)?;
     let stripped = Stripped::find(&instructions, names);

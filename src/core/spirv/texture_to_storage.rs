@@ -38,11 +38,11 @@ const LOD: u32 = 2;
 /// Image operands SignExtend and ZeroExtend.
 const EXTEND: u32 = 0x3000;
 
-/// The module with the textures of these names as read-only storage images. Filtered samples of them, which a specialization
-/// constant prevents, become undefined values. Everything else computes the same values.
+/// Makes read-only storage images of the textures of these names. Their filtered samples, which a specialization constant prevents, become undefined
+/// values. Everything else computes the same values.
 ///
 /// # Errors
-/// A name that is not a texture, or a texture that is used other than by fetches without offset and size queries.
+/// The module is invalid, a name is not that of a texture, or a texture is used other than by fetches without offset and size queries.
 pub(crate) fn texture_to_storage(words: &[u32], textures: &[(&str, ImageFormat)]) -> Result<Vec<u32>, SpirvError> {
     if textures.is_empty() {
         return Ok(words.to_vec());

@@ -11,12 +11,11 @@ const ARRAYED: usize = 4;
 const DIMENSION_2D: u32 = 1;
 const DIMENSION_3D: u32 = 2;
 
-/// The module with the three-dimensional textures and storage images of these names as arrays of two-dimensional ones. Names of other
-/// variables, and names that the module does not have, are ignored.
+/// Makes arrays of 2D images of the 3D textures and storage images of these names. Names of other variables, and names that the module does not have,
+/// are ignored.
 ///
 /// # Errors
-/// A module that breaks the format, a type that such an image shares with one that stays three-dimensional, a filtered sample, or two types that
-/// would become the same.
+/// The module is invalid, such an image shares its type with one that stays 3D or is sampled with a filter, or two types would become the same.
 pub(crate) fn volumes_to_layers(words: &[u32], names: &[&str]) -> Result<Vec<u32>, SpirvError> {
     let instructions = decode(words)?;
     let layered = layered_types(&instructions, names)?;

@@ -11,7 +11,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use stored::{CacheFile, checksum};
 
-/// The cache of a device. Null without a folder: pipelines are then compiled without one.
+/// The Vulkan pipeline cache of a device. Without a folder the handle is null: pipelines are compiled without a cache.
 pub(crate) struct PipelineCache {
     handle: vk::PipelineCache,
     file: Option<CacheFile>,
@@ -22,7 +22,7 @@ pub(crate) struct PipelineCache {
 }
 
 impl PipelineCache {
-    /// A cache with what the folder has for this driver. Never fails.
+    /// Opens a cache with the data that the folder has for this driver, or an empty one. Never fails.
     pub fn open(device: &ash::Device, identity: &DriverIdentity, folder: Option<&Path>) -> PipelineCache {
         let file = folder.map(|folder| CacheFile::new(folder, identity));
         let mut cache = PipelineCache {
@@ -53,19 +53,19 @@ impl PipelineCache {
         cache
     }
 
-    /// For vkCreateComputePipelines; null without a cache. Several threads may use it at the same time.
+    /// The handle for vkCreateComputePipelines; null without a cache. Several threads may use it at the same time.
     pub fn handle(&self) -> vk::PipelineCache {
         self.handle
     }
 
-    /// A pipeline was made with this cache. `hit`: the driver says that it came from there, `None` if it does not say.
+    /// Notes that a pipeline was made with this cache. `hit`: the driver says that it took the pipeline from the cache; `None` if it does not say.
     pub fn used(&self, hit: Option<bool>) {
         if hit != Some(true) {
             self.has_grown.store(true, Ordering::Relaxed);
         }
     }
 
-    /// Writes the file if pipelines were compiled that it does not have. What another program added meanwhile is kept.
+    /// Writes the cache to its file, if pipelines were compiled that the file lacks. What another program added since is kept.
     pub fn store(&self, device: &ash::Device) {
         let Some(file) = &self.file else { return };
         let mut stored = self.stored.lock().unwrap_or_else(|e| e.into_inner());
@@ -111,7 +111,7 @@ impl PipelineCache {
         data
     }
 
-    /// Frees the cache. No pipeline may be in the making.
+    /// Destroys the cache. No pipeline may be being compiled.
     pub fn destroy(&mut self, device: &ash::Device) {
         // SAFETY: the caller owns the cache, so that no thread makes a pipeline with it; null is allowed.
         unsafe { device.destroy_pipeline_cache(self.handle, None) };
@@ -120,7 +120,7 @@ impl PipelineCache {
     }
 }
 
-/// A cache with data that [`CacheFile::read`] accepted, or that this driver has just handed out; empty: with none.
+/// Creates a Vulkan pipeline cache. `data`: what [`CacheFile::read`] accepted, or what this driver has just returned; empty for an empty cache.
 pub fn create(device: &ash::Device, data: &[u8]) -> Result<vk::PipelineCache, vk::Result> {
     let create = vk::PipelineCacheCreateInfo::default().initial_data(data);
     // SAFETY: the structure and the data outlive the call; the data is of this driver, complete and unchanged.

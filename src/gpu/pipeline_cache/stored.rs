@@ -26,12 +26,12 @@ const VULKAN_VERSION: u32 = 1;
 
 static CRC: Crc<u64, Table<16>> = Crc::<u64, Table<16>>::new(&CRC_64_ECMA_182);
 
-/// The CRC-64 of data.
+/// The CRC-64 of some bytes.
 pub fn checksum(data: &[u8]) -> u64 {
     CRC.checksum(data)
 }
 
-/// Identity of a cache: another device or driver cannot use it.
+/// Identity of the device and driver that a stored cache belongs to; others cannot use it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct DriverIdentity {
     pub vendor: u32,
@@ -48,7 +48,7 @@ impl DriverIdentity {
     }
 }
 
-/// The file of a driver, in a folder that need not exist.
+/// The file of a driver's pipeline cache, in a folder that need not exist.
 #[derive(Clone, Debug)]
 pub(crate) struct CacheFile {
     path: PathBuf,
@@ -67,7 +67,7 @@ impl CacheFile {
         &self.path
     }
 
-    /// The driver's data; `None` without a file.
+    /// Reads the driver's data from the file. `None` if there is no file.
     ///
     /// # Errors
     /// Why the file cannot be used, in one line.
@@ -79,8 +79,8 @@ impl CacheFile {
         self.decode(&bytes).map(|data| Some(data.to_vec()))
     }
 
-    /// Replaces the file, and removes excess files from its folder. Data that is too large removes the file instead, and the next program
-    /// begins with an empty cache.
+    /// Replaces the file, and removes the oldest files if the folder has too many. Data that is too large removes the file instead, and the next
+    /// program begins with an empty cache.
     ///
     /// # Errors
     /// The folder or the disk cannot be written, or the data is too large.

@@ -45,7 +45,7 @@ impl Renderer {
         }
     }
 
-    /// True if a picture is in flight. Submits those of its held bands that are due.
+    /// True if a picture is in flight. It also submits the bands of that picture that were held back and are due.
     ///
     /// # Errors
     /// The device fails.
@@ -53,23 +53,23 @@ impl Renderer {
         self.drawing.is_drawing(&self.queues)
     }
 
-    /// Number of submissions that are held back.
+    /// Number of submissions, such as bands, that are held back.
     pub fn held_back(&self) -> usize {
         self.queues.timelines.held()
     }
 
-    /// True if the bands of the picture in flight are held back, so that other work that is submitted now begins before the picture is
-    /// done.
+    /// True if bands of a picture in flight are held back (`RendererOptions::paced`), so that other work that is submitted now begins before the
+    /// picture is done.
     pub fn is_paced(&self) -> bool {
         self.queues.timelines.is_paced()
     }
 
-    /// Time since the device last finished a submission, while it is busy; zero if it is idle.
+    /// How long the device has been busy without finishing a submission; zero if it is idle.
     pub fn busy_for(&self) -> Duration {
         self.queues.timelines.busy_for()
     }
 
-    /// The stages that were run for the last picture, even if it is still in flight.
+    /// The most expensive part of the rendering that ran for the last picture, which may still be in flight.
     pub fn drawn_work(&self) -> Work {
         self.drawing.work()
     }
@@ -79,8 +79,8 @@ impl Renderer {
         self.drawing.has_picture()
     }
 
-    /// Waits for the picture in flight and returns it. Without one, returns the last picture. If pictures stay on the device, the picture
-    /// is copied to the host now.
+    /// Waits for the picture in flight and returns it; without one, returns the last picture. If pictures stay on the device, it is copied to the
+    /// host now.
     ///
     /// # Errors
     /// The device fails.
@@ -118,7 +118,10 @@ impl Renderer {
         }
     }
 
-    /// Waits for the picture in flight. If that fails, nothing that it made is counted on.
+    /// Waits for the picture in flight. If that fails, all steps and searches run again for the next picture.
+    ///
+    /// # Errors
+    /// The device fails.
     pub(super) fn wait_drawn(&mut self) -> Result<(), GpuError> {
         self.drawing.wait(&mut self.queues).inspect_err(|_| {
             self.stale.fill(true);
@@ -166,7 +169,7 @@ impl Renderer {
 }
 
 impl Renderer {
-    /// What the CPU last found before a face in the volume that is shown, if the render start follows the fluid.
+    /// The start surface that the CPU last found in the volume that is shown. None if the scene does not search for one (`unveil`).
     pub fn unveiled(&self) -> Option<&Unveiled> {
         self.volumes.unveiled().filter(|_| self.program.scene.unveils())
     }

@@ -14,7 +14,8 @@ use crate::resources::{Image, SlotResources};
 use crate::scene::Scene;
 use std::sync::Arc;
 
-/// The picture in the making or the last one, and the buffers of copies. What returns an error fails where the device does.
+/// The picture that is being drawn or was drawn last, and the buffers of its copies. Every method that returns a [`GpuError`] does so if the device
+/// fails.
 pub(super) struct Drawing {
     // Dropped first.
     recorder: CommandRecorder,
@@ -65,7 +66,7 @@ impl Drawing {
         })
     }
 
-    /// Fits the buffer of the picture to the scene.
+    /// Makes the readback buffer as large as the scene's picture.
     pub fn fit(&mut self, scene: &Scene) -> Result<(), GpuError> {
         if self.readback.as_ref().is_some_and(|r| r.size != Slot::Screen.bytes(scene)) {
             self.readback = Some(readback(&self.context, scene)?);
@@ -73,7 +74,7 @@ impl Drawing {
         Ok(())
     }
 
-    /// Clears new images of slots. If that of the picture is among them, there is no picture any more.
+    /// Clears new images of slots. If the picture's image is among them, there is no picture any more.
     pub fn clear(
         &mut self,
         queues: &mut DeviceQueues,
@@ -89,7 +90,7 @@ impl Drawing {
         self.recorder.submit(queues)
     }
 
-    /// Uploads the texels of a slot, and waits. Nothing that reads it may be in flight.
+    /// Uploads the texels of a slot, and waits. Nothing in flight may read the slot.
     pub fn upload(
         &mut self,
         queues: &mut DeviceQueues,
@@ -111,7 +112,8 @@ impl Drawing {
         Ok(())
     }
 
-    /// The current bytes of an image slot, of this volume image where there are several, its texels along x, y, z, and their format.
+    /// Reads back an image slot; for a multibuffered slot, the copy of volume image `image`. Returns the buffers with its bytes, its number of texels
+    /// along x, y and z, and its format. None for a slot that is no image.
     pub(crate) fn bring_back(
         &mut self,
         queues: &mut DeviceQueues,
@@ -127,7 +129,7 @@ impl Drawing {
         Ok(Some((buffer, there.shape.size(), there.format)))
     }
 
-    /// Begins the recording of a picture, of which this much is drawn.
+    /// Begins the recording of a picture. `work`: the most expensive part of the rendering that it will run.
     pub fn begin(&mut self, queues: &mut DeviceQueues, work: Work) -> Result<(), GpuError> {
         self.work = work;
         self.recorder.collect(queues)?;
@@ -137,12 +139,13 @@ impl Drawing {
         Ok(())
     }
 
-    /// Records a dispatch of the picture.
+    /// Records a dispatch that belongs to the picture.
     pub fn dispatch(&mut self, queues: &mut DeviceQueues, dispatch: &Dispatch) -> Result<(), GpuError> {
         self.recorder.dispatch(queues, dispatch, self.limit.as_ref())
     }
 
-    /// Does what was recorded of the picture, and copies an image slot to the host. The recording goes on afterwards.
+    /// Submits what was recorded of the picture so far, waits for it, and copies an image slot to the host. The recording goes on afterwards.
+    /// `place`: slot and volume image. None for a slot that is no image.
     pub fn fetch(
         &mut self,
         queues: &mut DeviceQueues,
@@ -175,7 +178,7 @@ impl Drawing {
         }
     }
 
-    /// Records an upload to a slot, of this volume image where there are several, as part of the picture.
+    /// Records, as part of the picture, the upload of a slot; for a multibuffered slot, of the copy of volume image `image`.
     pub(crate) fn record_upload(
         &mut self,
         queues: &mut DeviceQueues,
@@ -214,22 +217,22 @@ impl Drawing {
         Ok(())
     }
 
-    /// A picture has been submitted and not waited for.
+    /// True if a picture has been submitted and was not waited for.
     pub(crate) fn is_in_flight(&self) -> bool {
         self.is_in_flight
     }
 
-    /// There is a picture of the current size, done or in flight.
+    /// True if there is a picture of the current size, done or in flight.
     pub(crate) fn has_picture(&self) -> bool {
         self.has_picture
     }
 
-    /// The device is at work on a picture. Submits what is held back of it and due.
+    /// True if the device is at work on a picture. It also submits what is held back of the picture and due.
     pub fn is_drawing(&self, queues: &DeviceQueues) -> Result<bool, GpuError> {
         Ok(self.is_in_flight && (!self.recorder.is_done(queues)? || self.context.faults.holds_pictures()))
     }
 
-    /// How much of the last picture was drawn.
+    /// The most expensive part of the rendering that ran for the last picture.
     pub fn work(&self) -> Work {
         self.work
     }
@@ -243,17 +246,17 @@ impl Drawing {
         Ok(())
     }
 
-    /// Adds the times of the last picture, when it is done.
+    /// Adds up the times of the last picture, if it is done.
     pub fn collect(&mut self, queues: &mut DeviceQueues) -> Result<(), GpuError> {
         self.recorder.collect(queues)
     }
 
-    /// The last picture on the host, which must have been waited for; `None` if pictures stay on the device.
+    /// The buffers with the last picture on the host, which must have been waited for. `None` if pictures stay on the device.
     pub fn readback(&self) -> Option<&Readback> {
         self.readback.as_ref()
     }
 
-    /// The picture was presented by what was submitted last.
+    /// Notes that the last submission to queue 0 presents the picture.
     #[cfg(feature = "view")]
     pub fn presented(&mut self, queues: &DeviceQueues) {
         self.presented = queues.timelines.of(0).submitted;

@@ -115,7 +115,7 @@ impl InFlight {
     }
 }
 
-/// Frames on their way into volume images. What returns an error fails where the device does, or has no memory.
+/// The staging ring: frames on their way into volume images. Every method that returns a [`GpuError`] does so if the device fails or has no memory.
 pub(super) struct Ring {
     entries: Vec<InFlight>,
     /// The entry of the batch, or of the next one.
@@ -154,21 +154,21 @@ impl Ring {
         Ok(Ring { entries, at: 0, staging, batch: None, context: context.clone(), time_stamps, spans })
     }
 
-    /// Begins again, for frames of another size. The device must be idle. The batch is given up.
+    /// Makes the ring again for frames of another size, and drops the batch. The device must be idle.
     pub fn restart(&mut self, scene: &Scene, queues: &DeviceQueues) -> Result<(), GpuError> {
         self.batch = None;
         *self = Ring::new(&self.context, scene, queues, self.time_stamps, self.spans)?;
         Ok(())
     }
 
-    /// True if a slice of a volume image can be added to the batch.
+    /// True if a slice of volume image `image` can be added to the batch.
     pub fn continues(&self, image: u32, slice: u32) -> bool {
         self.batch
             .as_ref()
             .is_some_and(|batch| batch.image == image && batch.continuations(&self.staging).any(|next| next == slice))
     }
 
-    /// True if none of these slices can follow the batch.
+    /// True if none of the `visible` slices can be added to the batch, so that it may be submitted.
     pub fn is_complete(&self, visible: Range<u32>) -> bool {
         let grows = |batch: &SliceBatch| batch.continuations(&self.staging).any(|next| visible.contains(&next));
         !self.batch.as_ref().is_some_and(grows)
@@ -187,7 +187,7 @@ impl Ring {
         }
     }
 
-    /// True if the next frame is taken without a wait for the device.
+    /// True if the next frame can be written without waiting for the device.
     pub fn is_free(&self, queues: &DeviceQueues) -> Result<bool, GpuError> {
         // The buffer of a batch that has begun was waited for; it ends with a frame that needs the next one.
         let next = if self.batch.is_some() { self.at + 1 } else { self.at };
@@ -196,12 +196,12 @@ impl Ring {
         Ok(is_copied && entry.recorder.is_done(queues)?)
     }
 
-    /// True if frames are only copied: submitting a slice takes longer than copying it.
+    /// True if frames are only copied into the volume and no pass converts them. Submitting a slice then takes longer than copying it.
     pub(crate) fn only_copies(&self) -> bool {
         self.staging.copied.is_some()
     }
 
-    /// Waits until the next entry is free, and adds up its times.
+    /// Waits until the next entry of the ring is free, and adds up the times of its last submission. `is_drawing`: a picture is in flight.
     pub fn wait(&mut self, queues: &mut DeviceQueues, is_drawing: bool) -> Result<(), GpuError> {
         let entry = &mut self.entries[self.at];
         // Reading time stamps makes lavapipe wait for the complete device (Mesa 22.3, `lvp_GetQueryPoolResults`), also for a picture in
@@ -212,7 +212,7 @@ impl Ring {
         }
     }
 
-    /// Waits until every entry is free, and adds up their times.
+    /// Waits until all entries of the ring are free, and adds up the times of their last submissions.
     pub fn collect(&mut self, queues: &mut DeviceQueues) -> Result<(), GpuError> {
         self.entries.iter_mut().try_for_each(|entry| entry.collect(queues))
     }
@@ -287,7 +287,7 @@ fn copy_of_slices(
     (place, BufferLayout { offset, row_length, image_height, ..layout })
 }
 
-/// Bytes of a frame.
+/// Size of a frame, bytes.
 pub(super) fn frame_bytes(scene: &Scene) -> u64 {
     Slot::Frames.bytes(scene) / u64::from(Slot::Frames.shape(scene).parts())
 }

@@ -31,7 +31,7 @@ use std::sync::Arc;
 use std::time::Duration;
 use volumes::Volumes;
 
-/// How a [`Renderer`] runs.
+/// How a [`Renderer`] works.
 #[derive(Clone)]
 pub struct RendererOptions {
     /// Number of volume images: 1 for a still picture, 2 or 3 (double or triple buffering) while frames arrive during rendering.
@@ -45,20 +45,20 @@ pub struct RendererOptions {
     pub cpu_times: bool,
     /// The operations that are timed on the device.
     pub time_stamps: TimeStamps,
-    /// How the passes over the volume and the picture are divided, so that no submission takes too long.
+    /// How dispatches over the volume and the picture are divided, so that no submission takes too long.
     pub bands: Bands,
-    /// Holds back bands of a picture while the device has enough work, so that a window's panels are drawn between them.
-    /// [`Renderer::is_drawing`] submits them, and so does every wait. On a device with several queues nothing is held back.
+    /// Holds back bands of a picture while the device has enough work, so that a window's panels can be drawn between them. [`Renderer::is_drawing`]
+    /// submits them, and so does every wait. On a device with several queues nothing is held back.
     pub paced: bool,
-    /// How single texels are read. `None` selects the fast way of the device.
+    /// How single texels are read. `None` selects the faster way on the device.
     pub texel_access: Option<TexelAccess>,
-    /// Most frames that go through stage 1 at once, 1... `None` selects the best number for the device.
+    /// Largest number of frames that go through stage 1 at once, at least 1. `None` selects the best number for the device.
     pub frames_at_once: Option<u32>,
     /// Number of queues, 1..=3. `None` uses all queues of the device. If the device has fewer queues, several roles share one.
     pub queues: Option<usize>,
-    /// Copies every picture to the host. Otherwise pictures stay on the device, for presentation.
+    /// True: every picture is copied to the host. False: pictures stay on the device, for presentation.
     pub readback: bool,
-    /// Called when a pipeline has been compiled in the background.
+    /// A function that is called when a pipeline has been compiled in the background.
     pub wake: Option<Wake>,
     /// Keeps a log of everything that is recorded and submitted ([`Renderer::log`]).
     pub log: bool,
@@ -85,7 +85,7 @@ impl Default for RendererOptions {
 }
 
 impl RendererOptions {
-    /// Plans scenes and compiles their pipelines as a renderer with these options does.
+    /// Makes the compiler of scenes that a renderer with these options uses.
     pub(super) fn compiler(&self, context: &Arc<Context>) -> Result<SceneCompiler, GpuError> {
         SceneCompiler::new(context, &self.shaders, self.texel_access, self.frames_at_once, self.wake.clone())
     }
@@ -107,7 +107,7 @@ impl Program {
     }
 }
 
-/// Renders one scene: frames are sent into volume images, and pictures come out. The scene can be changed at any time.
+/// Renders one scene: takes frames into volume images, and draws pictures of them. The scene can be changed at any time.
 pub struct Renderer {
     // Fields are dropped in this order, after `drop` has waited for the device.
     ring: Ring,
@@ -162,12 +162,12 @@ impl Renderer {
         Ok(renderer)
     }
 
-    /// The passes and slots of the current scene.
+    /// The plan of the current scene: its passes and slots.
     pub fn plan(&self) -> &Plan {
         &self.program.plan
     }
 
-    /// The current scene, with the fields that depend on the device.
+    /// The current scene; its fields that depend on the device are set.
     pub fn scene(&self) -> &Scene {
         &self.program.scene
     }
@@ -177,7 +177,7 @@ impl Renderer {
         self.compiler.texel_access()
     }
 
-    /// Bytes of a frame of the current scene.
+    /// Size of a frame of the current scene, bytes.
     pub fn frame_bytes(&self) -> usize {
         frame_bytes(&self.program.scene) as usize
     }
@@ -264,10 +264,10 @@ impl Renderer {
         if self.ring.is_complete(self.program.scene.visible_frames()) { self.flush() } else { Ok(()) }
     }
 
-    /// Checks slice and size of a frame.
+    /// Checks that a slice exists and that a frame has the right size.
     ///
     /// # Errors
-    /// A slice that does not exist, or a frame of the wrong size.
+    /// It does not, or it has not.
     pub fn check_frame(&self, slice: usize, bytes: &[u8]) -> Result<(), GpuError> {
         let (slices, expected) = (self.program.scene.slices(), self.frame_bytes());
         match (slice < slices as usize, bytes.len() == expected) {
@@ -301,7 +301,7 @@ impl Renderer {
 }
 
 impl Renderer {
-    /// True if `scene` differs from the current one, ignoring fields that depend on the device.
+    /// True if `scene` differs from the current one; fields that depend on the device are ignored.
     pub fn differs_from(&self, scene: &Scene) -> bool {
         let old = &self.program.scene;
         (&scene.geometry, &scene.settings, scene.input, scene.visible_bounds, &scene.shared)
@@ -331,7 +331,7 @@ impl Renderer {
         self.compiler.warm(scenes)
     }
 
-    /// Forgets the scenes of [`Renderer::warm`] that are left. A pipeline in the making is finished.
+    /// Drops the scenes of [`Renderer::warm`] that are left. A pipeline that is being compiled is finished.
     pub fn stop_warming(&self) {
         self.compiler.stop_warming();
     }
@@ -401,11 +401,11 @@ impl Renderer {
         Ok(rerun)
     }
 
-    /// Compiles the pipelines that use `shaders` again, because their source changed. Returns which stages must run again, as
+    /// Compiles the pipelines that use `shaders` again, because the source of these shaders changed. Returns what must run again, as
     /// [`Renderer::change`] does.
     ///
     /// # Errors
-    /// The shader does not exist, or disagrees with the declaration of its pass. The previous pipelines stay.
+    /// A shader does not exist, or disagrees with the declaration of its pass. The previous pipelines stay.
     pub fn reload_shaders(&mut self, shaders: &HashSet<String>) -> Result<Rerun, GpuError> {
         if let Some(fault) = &self.broken {
             return Err(GpuError::Broken(fault.clone()));
@@ -451,8 +451,8 @@ impl Renderer {
 }
 
 impl Renderer {
-    /// The current content of an image slot. For the volume it is all of it, with zeros where nothing is stored. `None` for a slot that is
-    /// not in the plan, and for a lookup table in a buffer.
+    /// Reads back the current content of an image slot. A volume is returned as a whole, with zeros where the device stores nothing. `None` for a
+    /// slot that is not in the plan, and for a lookup table in a buffer.
     ///
     /// # Errors
     /// The device fails, or the last change of the scene failed.
@@ -471,8 +471,8 @@ impl Renderer {
         self.drawing.bring_back(&mut self.queues, &self.slots, (slot, shown))
     }
 
-    /// Waits for the device, and returns the times since the last call of the operations that [`RendererOptions::time_stamps`] selects, ns.
-    /// Empty if the device has no time stamps.
+    /// Waits for the device, and returns the times, ns, since the last call of the operations that [`RendererOptions::time_stamps`] selects. Empty if
+    /// the device has no time stamps.
     pub fn take_times(&mut self) -> Result<Vec<PassTime>, GpuError> {
         self.collect()?;
         Ok(self.queues.timings.take_times())
@@ -506,7 +506,7 @@ impl Renderer {
         self.queues.timings.clock_deviation()
     }
 
-    /// The names of the passes that `work` dispatches, in order.
+    /// Runs `work` and returns the names of the passes that it dispatches, in order.
     pub fn dispatched_passes<T>(
         &mut self,
         work: impl FnOnce(&mut Renderer) -> Result<T, GpuError>,
@@ -514,7 +514,7 @@ impl Renderer {
         Ok(self.dispatch_extents(work)?.into_iter().map(|(name, _)| name).collect())
     }
 
-    /// The names of the passes that `work` dispatches, including those for frames that it leaves waiting, and their invocations along x, y
+    /// Runs `work` and returns the names of the passes that it dispatches, also for frames that it leaves waiting, with their invocations along x, y
     /// and z. With bands there is an entry for each band.
     pub fn dispatch_extents<T>(
         &mut self,
@@ -532,17 +532,17 @@ impl Renderer {
         self.skipped
     }
 
-    /// Number of barriers recorded so far.
+    /// Number of barriers that were recorded so far.
     pub fn barriers(&self) -> u32 {
         self.queues.count
     }
 
-    /// Everything recorded and submitted so far, with [`RendererOptions::log`].
+    /// The log of everything recorded and submitted so far. None without [`RendererOptions::log`].
     pub fn log(&self) -> Option<&SubmissionLog> {
         self.queues.log.as_ref()
     }
 
-    /// Fault injection: leaves out the n-th barrier (1 is the first ever recorded).
+    /// Fault injection: leaves out the barrier with this number; 1 is the first one ever recorded.
     pub fn drop_barrier(&mut self, n: u32) {
         self.queues.drop_barrier = Some(n);
     }

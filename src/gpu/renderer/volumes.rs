@@ -8,7 +8,7 @@ use crate::plan::{Step, affected};
 use crate::scene::{Scene, VisibleBounds};
 use std::ops::Range;
 
-/// The state of each volume image.
+/// Which slices of each volume image the passes over the volume have yet to process, and what the CPU has found in each volume image.
 pub(super) struct Volumes {
     count: u32,
     shown: u32,
@@ -23,7 +23,7 @@ pub(super) struct Volumes {
 }
 
 impl Volumes {
-    /// This many images, of which nothing is processed.
+    /// `count` volume images, none of whose slices is processed.
     pub fn new(count: u32, scene: &Scene) -> Volumes {
         let mut volumes = Volumes {
             count,
@@ -37,13 +37,15 @@ impl Volumes {
         volumes
     }
 
+    /// Checks that a volume image exists.
+    ///
     /// # Errors
-    /// There is no such image.
+    /// It does not.
     pub fn check(&self, image: u32) -> Result<(), GpuError> {
         if image < self.count { Ok(()) } else { Err(GpuError::VolumeImage { image, images: self.count }) }
     }
 
-    /// The image that pictures show.
+    /// The index of the volume image that pictures show.
     pub fn shown(&self) -> u32 {
         self.shown
     }
@@ -52,40 +54,41 @@ impl Volumes {
         self.shown = image;
     }
 
-    /// Every slice of every image has to be processed.
+    /// Marks every slice of every volume image as not processed.
     pub fn invalidate(&mut self, scene: &Scene) {
         self.unprocessed = vec![vec![true; scene.slices() as usize]; self.count as usize];
     }
 
-    /// A slice is replaced.
+    /// Notes that a slice of a volume image is replaced by a new frame.
     pub fn replaced(&mut self, image: u32, slice: u32) {
         self.unprocessed[image as usize][slice as usize] = true;
         self.found.retain(|(_, of)| *of != image);
     }
 
-    /// The smallest region that stage 1 has filtered for any frame since it was last set.
+    /// The smallest region that stage 1 has filtered for any frame since [`Volumes::set_filtered`].
     pub fn filtered(&self) -> VisibleBounds {
         self.filtered
     }
 
-    /// Stage 1 filters this region from now on.
+    /// Notes that stage 1 filters this region from now on.
     pub(crate) fn set_filtered(&mut self, bounds: VisibleBounds) {
         self.filtered = bounds;
     }
 
-    /// The slices of the image shown that a pass over the volume has to process.
+    /// The ranges of visible slices of the shown volume image that a pass over the volume has to process.
     pub(crate) fn due_slices(&self, step: &Step, scene: &Scene) -> Vec<Range<u32>> {
         let (low, high) = (scene.visible_bounds.low[2], scene.visible_bounds.high[2]);
         let runs = affected(&self.unprocessed[self.shown as usize], step.reach(scene)).into_iter();
         runs.map(|run| run.start.max(low)..run.end.min(high)).filter(|run| !run.is_empty()).collect()
     }
 
-    /// All passes over the volume have processed the image shown.
+    /// Notes that all passes over the volume have processed the shown volume image.
     pub fn processed(&mut self) {
         self.unprocessed[self.shown as usize].fill(false);
     }
 
-    /// What the CPU has to find in the image shown before this pass over it runs, by the slot that takes it. Forgets what these and the pass replace.
+    /// The searches that the CPU has to make in the shown volume image before this step runs over it, each with the slot for its result. Results that
+    /// these or the step will replace count as not found.
     pub(crate) fn due_searches(&mut self, step: &Step, scene: &Scene) -> Vec<(Slot, Search)> {
         let (shown, writes) = (self.shown, step.writes(scene));
         let reads = step.reads(scene).into_iter().filter_map(|slot| Some((slot, slot.search()?)));
@@ -100,18 +103,18 @@ impl Volumes {
         due
     }
 
-    /// The device has what was found in the image shown.
+    /// Notes that the slots hold the results of searches in the shown volume image.
     pub fn found(&mut self, slots: &[Slot]) {
         self.found.retain(|(slot, _)| slot.is_multibuffered() || !slots.contains(slot));
         self.found.extend(slots.iter().map(|slot| (*slot, self.shown)));
     }
 
-    /// Forgets what was found, but for these slots.
+    /// Keeps the results of searches only in the slots for which `keeps` is true.
     pub(crate) fn keep_found(&mut self, keeps: impl Fn(Slot) -> bool) {
         self.found.retain(|(slot, _)| keeps(*slot));
     }
 
-    /// What the CPU last found before a face in the image shown.
+    /// The start surface that the CPU last found in the shown volume image. None if there is none.
     pub fn unveiled(&self) -> Option<&Unveiled> {
         self.unveiled[self.shown as usize].as_ref()
     }

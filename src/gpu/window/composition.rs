@@ -8,25 +8,27 @@ use ash::vk;
 use egui::ClippedPrimitive;
 use std::sync::Arc;
 
-/// The image, and what was drawn into it last.
+/// The image in which picture and panels are composed for a window, and what was drawn into it last.
 pub(super) struct Composition {
     pub image: FlatImage,
-    /// It was drawn into, and has a layout.
+    /// True if the image was drawn into, so that its layout is no longer UNDEFINED.
     pub is_laid_out: bool,
-    /// Its content. None if it is not known.
+    /// What the image shows. None if that is not known.
     pub content: Option<Content>,
 }
 
-/// What a composition holds.
+/// What was drawn into a composition.
 pub(super) struct Content {
-    /// The panels, with the pixels per point that they were drawn with.
+    /// The panels. `scale`: the pixels per point that they were drawn with.
     pub shapes: Vec<ClippedPrimitive>,
     pub scale: f32,
-    /// Where the picture is, pixels: its corner and size.
+    /// Upper left corner of the picture and its size, pixels of the window.
     pub picture: [[u32; 2]; 2],
 }
 
 impl Composition {
+    /// Makes the image for a window of this format and size, pixels.
+    ///
     /// # Errors
     /// The device has no memory for it.
     pub(super) fn new(context: &Arc<Context>, format: vk::Format, size: [u32; 2]) -> Result<Composition, GpuError> {
@@ -37,7 +39,7 @@ impl Composition {
         Ok(Composition { image, is_laid_out: false, content: None })
     }
 
-    /// True if it fits images of the window of this format and size, pixels.
+    /// True if the image has this format and size, pixels, which are those of the window.
     pub(super) fn fits(&self, format: vk::Format, size: [u32; 2]) -> bool {
         (self.image.format, self.image.size) == (format, size)
     }

@@ -5,16 +5,17 @@ use super::composition::Content;
 use egui::epaint::{Primitive, Vertex};
 use egui::{ClippedPrimitive, Pos2, Rect, TextureId};
 
-/// What has to be drawn again over a new picture.
+/// What has to be drawn again in a composition over a new picture.
 pub(super) struct Damage {
-    /// The areas beside the picture that get the background first, pixels (from, to).
+    /// Areas outside the picture that get the background first, pixels of the window: first corner, and the corner beyond the last pixel.
     pub cleared: Vec<[[u32; 2]; 2]>,
-    /// The shapes, clipped to the picture and to these areas.
+    /// The shapes to draw, clipped to the picture and to these areas.
     pub shapes: Vec<ClippedPrimitive>,
 }
 
 impl Content {
-    /// What has to be drawn again for these panels, over a new picture in the same place, in a window of this size, pixels. None if everything has to be.
+    /// Compares panels with what the composition shows, for a new picture in the same place. `scale`: pixels per point; `picture`: its upper left
+    /// corner and its size, pixels; `size`: that of the window, pixels. None if everything has to be drawn.
     pub(super) fn damage(
         &self,
         shapes: &[ClippedPrimitive],

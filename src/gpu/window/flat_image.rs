@@ -16,12 +16,12 @@ pub(super) struct FlatImage {
     pub view: vk::ImageView,
     allocation: Option<Allocation>,
     pub format: vk::Format,
-    /// Pixels.
+    /// Width and height, pixels.
     pub size: [u32; 2],
 }
 
 impl FlatImage {
-    /// An image in layout UNDEFINED.
+    /// Makes a 2D image in layout UNDEFINED.
     ///
     /// # Errors
     /// The device has no memory for it, or fails.

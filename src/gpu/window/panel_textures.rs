@@ -19,7 +19,7 @@ const MAX_TEXTURES: u32 = 160;
 /// What egui expects: its colours are in sRGB.
 const FORMAT: vk::Format = vk::Format::R8G8B8A8_SRGB;
 
-/// The textures, by egui's number.
+/// The textures of the panels, by egui's texture ids.
 pub(super) struct PanelTextures {
     context: Arc<Context>,
     layout: vk::DescriptorSetLayout,
@@ -50,7 +50,7 @@ struct Upload {
     size: [u32; 2],
 }
 
-/// An error of the library that draws the panels.
+/// Converts an error of the library that draws the panels.
 pub(super) fn failed(error: egui_ash_renderer::RendererError) -> GpuError {
     match error {
         egui_ash_renderer::RendererError::Vulkan(result) => {
@@ -154,7 +154,7 @@ impl PanelTextures {
         }
     }
 
-    /// Puts the numbers under which the renderer draws textures into the place of egui's.
+    /// Replaces egui's texture ids in shapes by those under which the library draws the textures.
     pub(super) fn translate(&self, shapes: &mut [egui::ClippedPrimitive]) {
         for shape in shapes {
             if let Primitive::Mesh(mesh) = &mut shape.primitive
@@ -165,7 +165,7 @@ impl PanelTextures {
         }
     }
 
-    /// Records the copies of all changes, outside dynamic rendering.
+    /// Records the copies of all added and changed textures; outside dynamic rendering.
     pub(super) fn record(&mut self, commands: vk::CommandBuffer) {
         let device = &self.context.device;
         for Upload { texture, staging, at, size } in self.pending.drain(..) {

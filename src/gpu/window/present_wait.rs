@@ -16,7 +16,7 @@ const GIVE_UP: Duration = Duration::from_secs(2);
 /// Pictures that wait to be measured. Newer ones are left out.
 const MAX_WAITING: u64 = 4;
 
-/// Measures the pictures of one swapchain. It must be dropped before the swapchain is destroyed.
+/// Measures when the pictures of one swapchain are on the monitor. It must be dropped before the swapchain is destroyed.
 pub(super) struct PresentWaiter {
     next: u64,
     measured: u64,
@@ -64,13 +64,13 @@ impl PresentWaiter {
         Some(PresentWaiter { next: 0, measured: 0, jobs: Some(jobs), latencies, stop, thread: Some(thread) })
     }
 
-    /// The number of the next picture to present.
+    /// The present id of the next picture to present.
     pub(super) fn number(&mut self) -> u64 {
         self.next += 1;
         self.next
     }
 
-    /// The picture of this number was handed to the presentation at this time.
+    /// Notes that the picture with this present id was handed to the presentation at this time.
     pub(super) fn presented(&mut self, id: u64, at: Instant) {
         if self.measured < MAX_WAITING
             && let Some(jobs) = &self.jobs
@@ -80,7 +80,7 @@ impl PresentWaiter {
         }
     }
 
-    /// Times from presentation to the monitor that were measured since the last call.
+    /// The times from presentation to the monitor that were measured since the last call.
     pub(super) fn take(&mut self) -> Vec<Duration> {
         let done: Vec<Option<Duration>> = self.latencies.try_iter().collect();
         self.measured = self.measured.saturating_sub(done.len() as u64);

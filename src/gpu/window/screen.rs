@@ -31,13 +31,13 @@ pub enum PresentOutcome {
     NotPresentable,
 }
 
-/// The picture of a renderer, and the state that orders its use among the renderer's work.
+/// The picture of a renderer that is to be presented, and the queues that order its use among the renderer's work.
 pub struct Drawn<'a> {
     pub image: &'a Image,
     pub(crate) queues: &'a mut DeviceQueues,
     /// The upper left corner of the picture in the window, pixels.
     pub at: [u32; 2],
-    /// The picture is shown again while the next one is drawn.
+    /// True if the screen keeps a copy of the picture, to show it again while the next one is drawn.
     pub is_kept: bool,
 }
 
@@ -78,7 +78,7 @@ pub struct Screen {
 }
 
 impl Screen {
-    /// `size`: the size of the window, pixels; ignored for a monitor.
+    /// `size`: width and height of the window, pixels; ignored for a monitor.
     ///
     /// # Errors
     /// The device cannot present on the target.
@@ -137,7 +137,7 @@ impl Screen {
         self.shown
     }
 
-    /// Times from presentation to the monitor that were measured since the last call; none if the device cannot measure them.
+    /// The times from presentation to the monitor that were measured since the last call. Empty if the device cannot measure them.
     pub fn take_latencies(&mut self) -> Vec<Duration> {
         self.chain.take_latencies()
     }
@@ -158,7 +158,7 @@ impl Screen {
         self.show_with(Content::Picture(drawn), panels)
     }
 
-    /// Presents the picture that was kept, if there is one, with its upper left corner at pixel `at`, and panels over it.
+    /// Presents the picture of which a copy was kept, if there is one, with its upper left corner at pixel `at` of the window, and panels over it.
     ///
     /// # Errors
     /// As of [`Screen::show`].
@@ -493,10 +493,10 @@ impl Drop for Screen {
     }
 }
 
-/// Resolution of the mode that `choice` selects, pixels.
+/// Resolution of the monitor mode that `choice` selects, pixels.
 ///
 /// # Errors
-/// No such monitor or mode; a context that was not opened for a monitor.
+/// There is no such monitor or mode, or the context was not opened for a monitor.
 pub fn monitor_size(context: &Context, choice: &MonitorChoice) -> Result<[u32; 2], GpuError> {
     let displays = context.presentation.as_ref().and_then(|p| p.displays.as_ref());
     let displays = displays.ok_or_else(|| GpuError::Window("the device was not opened for a monitor".into()))?;
@@ -635,7 +635,7 @@ pub struct Panels {
     /// Textures (also of glyphs) that were added, changed or freed since the last frame. egui reports each change only once, so none may be
     /// skipped.
     pub textures: egui::TexturesDelta,
-    /// Pixels per point.
+    /// Pixels of the window per point of egui.
     pub scale: f32,
 }
 

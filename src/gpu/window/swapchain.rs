@@ -32,7 +32,7 @@ impl std::str::FromStr for PresentMode {
     }
 }
 
-/// A surface and its images, which are recreated when its size changes.
+/// A surface with its swapchain images, which are made again when its size changes.
 pub(crate) struct Swapchain {
     context: Arc<Context>,
     /// Keeps the window alive; the surface must be destroyed first.
@@ -50,7 +50,7 @@ pub(crate) struct Swapchain {
 /// An image of a swapchain.
 pub(crate) struct SwapchainImage {
     pub handle: vk::Image,
-    /// Signalled when the image has been drawn and can be presented.
+    /// Is signalled when the image has been drawn and can be presented.
     pub drawn: vk::Semaphore,
 }
 
@@ -142,8 +142,8 @@ impl Swapchain {
         Ok(())
     }
 
-    /// Recreates the images with the size of the surface, or with `wanted`, pixels, if the surface has no size of its own. Returns false if
-    /// the surface is empty, as that of a minimised window. Nothing may be in flight.
+    /// Makes the images again with the size of the surface, or with `wanted`, pixels, if the surface has no size of its own. Returns false if the
+    /// surface is empty, as that of a minimised window. No image may be in flight.
     pub fn fit(&mut self, wanted: [u32; 2]) -> Result<bool, GpuError> {
         // It waits with the swapchain that is replaced.
         self.waiter = None;
@@ -219,7 +219,7 @@ impl Swapchain {
         Ok(SwapchainImage { handle, drawn })
     }
 
-    /// Acquires the next image, and waits at most `nanoseconds` for it. The semaphore is signalled when the image may be written.
+    /// Acquires the next image; returns its index. It waits at most `nanoseconds`. `free` is signalled when the image may be written.
     pub fn acquire(&self, nanoseconds: u64, free: vk::Semaphore) -> Result<u32, vk::Result> {
         let Some(presentation) = &self.context.presentation else { return Err(vk::Result::ERROR_SURFACE_LOST_KHR) };
         self.context.faults.check(InjectionPoint::Acquire)?;
@@ -250,7 +250,7 @@ impl Swapchain {
         outcome
     }
 
-    /// Times from presentation to the monitor that were measured since the last call.
+    /// The times from presentation to the monitor that were measured since the last call.
     pub fn take_latencies(&mut self) -> Vec<Duration> {
         self.waiter.as_mut().map(PresentWaiter::take).unwrap_or_default()
     }

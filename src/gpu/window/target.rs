@@ -7,7 +7,7 @@ use raw_window_handle::{HasDisplayHandle, HasWindowHandle};
 use std::ffi::CStr;
 use std::sync::Arc;
 
-/// A window of any windowing library. It lives as long as the surface on it.
+/// A window of any windowing library. The surface on it keeps it alive.
 pub trait WindowHandles: HasWindowHandle + HasDisplayHandle {}
 
 impl<T: HasWindowHandle + HasDisplayHandle> WindowHandles for T {}
@@ -24,7 +24,7 @@ impl Target {
     /// The instance extensions that a surface on this target needs.
     ///
     /// # Errors
-    /// A windowing system that Vulkan does not support here.
+    /// The window system is one that Vulkan does not support here.
     pub fn extensions(&self, entry: &Entry) -> Result<Vec<&'static CStr>, GpuError> {
         let wanted: Vec<&'static CStr> = match self {
             Target::Window(window) => {
@@ -70,7 +70,7 @@ impl Target {
             .context(|| "create a surface on the window".into())
     }
 
-    /// Adds the features that the candidate lacks for presentation on this target to its missing features.
+    /// Adds to the candidate's missing features those that presentation on this target needs.
     pub(crate) fn check_support(&self, entry: &Entry, instance: &Instance, candidate: &mut Candidate) {
         if !candidate.can_present {
             candidate.missing.push("VK_KHR_swapchain or dynamicRendering".into());
@@ -100,14 +100,14 @@ impl Target {
     }
 }
 
-/// A monitor and a mode.
+/// Which monitor to present on, and in which display mode.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MonitorChoice {
-    /// A part of its name, ignoring case; `None` for the first monitor.
+    /// A part of the monitor's name, ignoring case; `None` for the first monitor.
     pub monitor: Option<String>,
-    /// Resolution, pixels; `None` for its native one.
+    /// Resolution, pixels; `None` for the monitor's native one.
     pub size: Option<[u32; 2]>,
-    /// Refresh rate, Hz; `None` for the highest at that resolution.
+    /// Refresh rate, Hz; `None` for the highest one at that resolution.
     pub refresh: Option<f64>,
 }
 
@@ -124,15 +124,15 @@ pub struct Monitor {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mode {
     pub size: [u32; 2],
-    /// Refresh rate, mHz.
+    /// Refresh rate, mHz (thousandths of a hertz).
     pub refresh: u32,
 }
 
 impl MonitorChoice {
-    /// The indices of the monitor and of its mode.
+    /// The index in `monitors` of the chosen monitor, and the index of its mode.
     ///
     /// # Errors
-    /// No such monitor or mode; the error lists what is available.
+    /// There is no such monitor or mode; the error lists what is available.
     pub fn choose(&self, monitors: &[Monitor]) -> Result<(usize, usize), String> {
         let all = || monitors.iter().map(|m| format!("{:?}", m.name)).collect::<Vec<_>>().join(", ");
         let is_it =
@@ -203,7 +203,7 @@ fn plane(
     Ok(None)
 }
 
-/// The chosen monitor and mode.
+/// The monitor and the display mode that were chosen.
 pub(super) struct Chosen {
     name: String,
     display: vk::DisplayKHR,

@@ -13,16 +13,17 @@ use crate::passes::Texels;
 use crate::probe::{Advance, Array, Axis, Geometry, Motion, Probe};
 use std::f64::consts::FRAC_PI_2;
 
-/// The content of a part of a ray.
+/// What is proven of the samples on a part of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Content {
-    /// All of it is outside the insonified region.
+    /// The whole part is outside the insonified region.
     Outside,
-    /// The field, stretched by the grey window and clamped, is in this range wherever the part is inside.
+    /// Wherever the part is inside the insonified region, its windowed samples, clamped to 0..1, are within `values`. `surely_inside`: all of it is
+    /// inside.
     Within { values: Interval, surely_inside: bool },
 }
 
-/// The field of a volume along a line.
+/// The samples of a volume along a line, as intervals.
 pub struct Field<'a> {
     line: &'a Line<'a>,
     volume: &'a Texels,
@@ -32,12 +33,12 @@ pub struct Field<'a> {
 }
 
 impl<'a> Field<'a> {
-    /// `range`: smallest and largest value of the volume; `window`: the grey values that are mapped to 0 and 1.
+    /// `range`: smallest and largest texel of the volume; `window`: the grey values that become 0 and 1.
     pub fn new(line: &'a Line<'a>, volume: &'a Texels, window: [f64; 2], range: [f64; 2]) -> Field<'a> {
         Field { line, volume, window, range }
     }
 
-    /// The content between two positions along the ray, mm, with `from` at most `to`.
+    /// What is proven of the part of the ray between two positions, mm, with `from` at most `to`.
     pub fn content(&self, from: f64, to: f64) -> Content {
         match &self.line.scene.geometry {
             Geometry::Cartesian(_) => Content::Within { values: self.along_a_line(from, to), surely_inside: true },

@@ -6,7 +6,7 @@
 
 use std::ops::{Add, Mul, Neg, Sub};
 
-/// All numbers from `low` to `high`.
+/// A closed interval: all numbers from `low` to `high`. The result of every arithmetic operation contains all exact results, rounding included.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
     pub low: f64,
@@ -56,22 +56,22 @@ impl Interval {
         Interval { low: self.low.clamp(0.0, 1.0), high: self.high.clamp(0.0, 1.0) }
     }
 
-    /// The interval of the minimum of a number of each interval.
+    /// All minima of a number of this interval and a number of `other`.
     pub fn at_most(self, other: Interval) -> Interval {
         Interval { low: self.low.min(other.low), high: self.high.min(other.high) }
     }
 
-    /// The largest magnitude.
+    /// The largest absolute value of a number in the interval.
     pub fn magnitude(self) -> f64 {
         self.low.abs().max(self.high.abs())
     }
 
-    /// Adds up to `slack` in both directions. `slack` must not be negative.
+    /// Extends the interval by `slack` at both ends. `slack` must not be negative.
     pub fn widened(self, slack: f64) -> Interval {
         Interval { low: (self.low - slack).next_down(), high: (self.high + slack).next_up() }
     }
 
-    /// The quotient by numbers above 0. If the divisor may be 0, the interval of all numbers.
+    /// Divides by positive numbers. If the divisor may be 0 or less, the result is the interval of all numbers.
     pub fn over(self, divisor: Interval) -> Interval {
         if divisor.low <= 0.0 {
             return Interval { low: f64::NEG_INFINITY, high: f64::INFINITY };
@@ -93,21 +93,21 @@ impl Interval {
         Interval { low: root(self.low).next_down().max(0.0), high: root(self.high).next_up() }
     }
 
-    /// 1 - exp(-y) for non-negative numbers: 0..1.
+    /// 1 - exp(-y), a number of 0..1, for the numbers y of the interval; negative ones count as 0.
     pub fn opacity(self) -> Interval {
         let opacity = |y: f64| -(-y.max(0.0)).exp_m1();
         let (low, high) = (opacity(self.low), opacity(self.high));
         Interval { low: down(low, LIBRARY).max(0.0), high: up(high, LIBRARY).min(1.0) }
     }
 
-    /// -ln(1 - a) for numbers in 0..1, limited to `most`.
+    /// -ln(1 - a), at most `most`, for the numbers a of the interval, 0..1.
     pub fn absorption(self, most: f64) -> Interval {
         let of = |a: f64| if a >= 1.0 { most } else { (-(-a).ln_1p()).min(most) };
         let (low, high) = (of(self.low.max(0.0)), of(self.high.max(0.0)));
         Interval { low: down(low, LIBRARY).max(0.0), high: up(high, LIBRARY) }
     }
 
-    /// The angle of (y, x) for x above 0, -pi/2..pi/2. It rises with y, and its extremes are at corners.
+    /// The angle atan(y / x), -pi/2..pi/2, for the numbers y of this interval and x of the other, which must be above 0.
     pub fn angle(self, x: Interval) -> Interval {
         let corners = [self.low, self.high].map(|y| [x.low.max(0.0), x.high.max(0.0)].map(|x| y.atan2(x)));
         let all = corners.iter().flatten();

@@ -19,27 +19,27 @@ use glam::DVec3;
 use interval::Interval;
 use rayon::prelude::*;
 
-/// Limits of the work on the bounds of a ray.
+/// When to stop refining the bounds of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Effort {
-    /// Sufficient width of the widest channel, 0..1.
+    /// The width (upper less lower bound, 0..1) of the widest channel that is narrow enough.
     pub width: f64,
-    /// Largest number of parts of a ray.
+    /// Largest number of parts that a ray is divided into.
     pub parts: usize,
 }
 
-/// Bounds of every ray of a picture.
+/// Proven bounds of the light of every ray of a picture.
 #[derive(Clone, Debug)]
 pub struct PictureBounds {
-    /// Lower bounds of red, green, blue and opacity, before postprocessing (stage 4). `high`: upper bounds.
+    /// Lower bounds of red, green, blue and opacity before stage 4; `high` has the upper bounds.
     pub low: Texels,
     pub high: Texels,
-    /// Number of parts of all rays.
+    /// Number of parts into which all rays were divided.
     pub parts: u64,
 }
 
 impl PictureBounds {
-    /// Width of the widest channel of every ray.
+    /// For each ray the width, upper less lower bound, of its widest channel.
     pub fn widths(&self) -> Vec<f64> {
         let pairs = self.low.values.chunks_exact(4).zip(self.high.values.chunks_exact(4));
         pairs.map(|(low, high)| (0..4).map(|c| high[c] - low[c]).fold(0.0, f64::max)).collect()
@@ -47,19 +47,19 @@ impl PictureBounds {
 }
 
 impl PictureBounds {
-    /// Widths of the rays whose opacity may be above 0, as in [`PictureBounds::widths`]. Other rays have no width.
+    /// As [`PictureBounds::widths`], only for the rays whose opacity may be above 0; the others have no width.
     pub fn widths_of_hits(&self) -> Vec<f64> {
         let hits = self.high.values.chunks_exact(4).map(|high| high[3] > 0.0);
         self.widths().into_iter().zip(hits).filter(|(_, hit)| *hit).map(|(width, _)| width).collect()
     }
 }
 
-/// What the bounds prove about a drawn pixel.
+/// What the bounds prove about the error of a drawn pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Proof {
-    /// Its error is within the tolerance.
+    /// The error is within the tolerance.
     Kept,
-    /// Its error is beyond the tolerance.
+    /// The error is beyond the tolerance.
     Broken,
     /// The bounds are too wide to tell.
     Open,
@@ -85,8 +85,8 @@ impl Proof {
     }
 }
 
-/// The reason why a scene has no bounds, with the setting to use instead, as the end of a sentence. None if it has bounds. Every setting
-/// that affects a ray of volume rendering is respected by [`picture`] or named here (tests/unit_pure/ray_keys.rs).
+/// Why a scene has no bounds, and which setting to use instead, as the end of a sentence. None if it has bounds. Every setting that affects a ray of
+/// volume rendering is respected by [`picture`] or named here (tests/unit_pure/ray_keys.rs).
 pub fn fault(scene: &Scene) -> Option<&'static str> {
     match scene.settings.mode {
         Mode::Volume if scene.still().is_some() => Some("a still is a mean of random paths: set still=none"),
@@ -110,13 +110,13 @@ pub fn fault(scene: &Scene) -> Option<&'static str> {
     }
 }
 
-/// Bounds of all rays of a scene through a volume, given by the texels that stage 1 makes.
+/// The bounds of all rays of a scene. `volume`: the texels that stage 1 makes.
 pub fn picture(scene: &Scene, volume: &Texels, effort: Effort) -> PictureBounds {
     enclosed(scene, volume, effort, |_, _| false)
 }
 
-/// Bounds as narrow as needed to prove for each pixel of a drawn picture (red, green, blue and opacity before stage 4) that it keeps a
-/// tolerance, levels of 255 after toning, or that it does not.
+/// Bounds that are as narrow as needed to prove for each pixel of the picture `drawn` (red, green, blue and opacity before stage 4) that its error is
+/// within `tolerance`, levels of 255 after toning, or that it is not.
 ///
 /// # Errors
 /// One line: the toning of the scene does not keep the order of values, or the picture has another size.

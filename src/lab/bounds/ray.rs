@@ -8,7 +8,7 @@ use crate::scene::TransferPoint;
 use crate::scene::transfer::{self, Absorption};
 use glam::DVec3;
 
-/// The transfer function as ranges.
+/// The transfer function, evaluated on intervals of sample values.
 #[derive(Clone, Debug)]
 pub struct Medium {
     points: Vec<TransferPoint>,
@@ -25,12 +25,12 @@ impl Medium {
         Medium { points, threshold, absorption, tint: None, fade: None }
     }
 
-    /// The medium with colours that are multiplied by a factor which is linear along the ray.
+    /// The medium with a tint: at s mm along the ray its colours are multiplied by start + rate s.
     pub fn tinted(self, start: [Interval; 3], rate: [Interval; 3]) -> Medium {
         Medium { tint: Some([start, rate]), ..self }
     }
 
-    /// The medium with matter that fades towards the faces of a box.
+    /// The medium with `region.fade`; None: without.
     pub fn faded(self, fade: Option<Fade>) -> Medium {
         Medium { fade, ..self }
     }
@@ -81,7 +81,7 @@ impl Medium {
     }
 }
 
-/// The remaining share of the matter along a ray under `region.fade` ([`Scene::faded`](crate::scene::Scene::faded)).
+/// The factor 0..1 by which `region.fade` scales the matter along a ray ([`Scene::faded`](crate::scene::Scene::faded)), as intervals.
 #[derive(Clone, Copy, Debug)]
 pub struct Fade {
     /// The place at 0 mm along the ray, and its unit direction.
@@ -131,24 +131,24 @@ struct Part {
     colour: [Interval; 4],
 }
 
-/// Bounds of a ray.
+/// Proven bounds of the light of one ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
-    /// Red, green, blue, opacity.
+    /// Bounds of red, green, blue and opacity.
     pub rgba: [Interval; 4],
-    /// Number of parts at the end.
+    /// Number of parts into which the ray was divided.
     pub parts: usize,
 }
 
 impl Bounds {
-    /// The width of the widest channel.
+    /// Width, upper less lower bound, of the widest channel.
     pub fn width(&self) -> f64 {
         self.rgba.iter().map(|c| c.width()).fold(0.0, f64::max)
     }
 }
 
-/// Halves parts until the widest channel is narrower than `target`, the bounds are sufficient, or there are `most` parts. `hints`:
-/// positions in rising order at which a part should end, such as the faces of cells; the bounds hold for any hints.
+/// The bounds of a ray. Parts of the ray are halved until the widest channel is narrower than `target`, `enough` is true for the bounds, or there are
+/// `most` parts. `hints`: positions in rising order, mm, at which parts end at first, such as the faces of cells; the bounds hold for any hints.
 pub fn bounds(
     field: &Field,
     medium: &Medium,

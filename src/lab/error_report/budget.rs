@@ -8,52 +8,52 @@ use super::{Errors, Kind, OwnError, Reference};
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
 
-/// Name of the error that remains with the finest setting of every source: the device's arithmetic in f32, and its formats.
+/// Name of the share that remains with the finest setting of every source: the device's arithmetic in f32, and its texel formats.
 pub const FLOOR: &str = "device";
 
-/// The contribution of each approximation of a scene.
+/// How much each approximation contributes to the error of a scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Budget {
     pub reference: Reference,
     pub reference_error: OwnError,
-    /// Each source alone; the last is [`FLOOR`].
+    /// Each source of error alone; the last entry is [`FLOOR`].
     pub shares: Vec<Share>,
-    /// Errors of the scene with its own settings.
+    /// Errors of the scene with its own setting of every source.
     pub total: Errors,
 }
 
-/// An approximation of a scene, while all others have their finest settings.
+/// The error of one source: it has the scene's own setting, while all others have their finest.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Share {
-    /// The name of its dial.
+    /// The name of the dial that is the source.
     pub source: String,
-    /// Label of its setting in the scene.
+    /// Label of the scene's own setting of that dial.
     pub label: String,
     pub errors: Errors,
 }
 
 impl Budget {
-    /// Root of the sum of the squares of the shares' RMSE. It equals the total if the errors are independent.
+    /// Root of the sum of the squares of the shares' RMSE. If the errors are independent, it equals the RMSE of `total`.
     pub fn sum(&self) -> f64 {
         self.shares.iter().map(|share| share.errors.rmse.powi(2)).sum::<f64>().sqrt()
     }
 }
 
-/// A source of error in a scene.
+/// A source of error in a scene: a dial that makes the picture more or less accurate.
 pub struct Source {
     pub name: &'static str,
-    /// Label of its setting in the scene.
+    /// Label of the scene's own setting of the dial.
     pub label: String,
-    /// Assignments of its finest setting, of its own keys alone.
+    /// Assignments `key=value` of its finest setting, only of keys of its own.
     pub finest: Vec<String>,
-    /// Assignments of the next coarser setting.
+    /// Assignments `key=value` of the setting next to the finest.
     pub nearly: Vec<String>,
 }
 
-/// The sources of error of a scene: its numerical dials, with three exceptions. The rule of compositing chooses how fast the picture
-/// converges, bricks change no picture, and the samples in a cell of a light volume converge with the cells.
+/// The sources of error of a scene: its numerical dials, with three exceptions. The rule of compositing only decides how fast the picture converges,
+/// bricks change no picture, and the samples in a cell of a light volume converge with the cells.
 pub fn sources(scene: &Scene) -> Vec<Source> {
     let numerical = dials::NAMES.iter().filter_map(|name| dials::dial(name, scene).ok());
     let numerical = numerical

@@ -11,27 +11,27 @@ use std::fmt::Write as _;
 
 /// Relative difference below which two predicted times count as equal. It bounds the number of proposals.
 const SAME_TIME: f64 = 1e-4;
-/// Margin by which the 95th percentile of a choice must stay below a time bound, because another run may be slower. With a tenth, 3 of 39
+/// Margin of a time bound: 1.25 times the 95th percentile of a choice must be within it, because another run may be slower. With a tenth, 3 of 39
 /// choices on random scenes took longer when they were measured again (lavapipe, two cores).
 pub const TIME_MARGIN: f64 = 0.25;
 
-/// The bound of a choice.
+/// What a chosen combination has to keep.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Bound {
-    /// Largest error by the measure, in its unit.
+    /// A largest error, in the unit of the measure.
     Error(f64),
-    /// Longest time of a volume and its picture, ns.
+    /// A longest time for a volume and its picture, ns.
     Time(f64),
 }
 
-/// Most combinations that are measured again to find the fastest.
+/// Largest number of combinations that are measured again to find the fastest.
 pub const MAX_CONTENDERS: usize = 6;
 
-/// The index of the chosen combination: with an error bound the fastest that keeps it, by the median, and with a time bound the most
-/// accurate. `refused`: indices of combinations that must not be chosen.
+/// Chooses a combination; returns its index in [`Report::choices`]. With an error bound it is the one with the shortest median time that keeps the
+/// bound, with a time bound the most accurate one. `refused`: indices of combinations that must not be chosen.
 ///
 /// # Errors
-/// One line: no times were measured, or no measured combination keeps the bound. It names the nearest one.
+/// One line: no times were measured, or no measured combination keeps the bound; it names the nearest one.
 pub fn choose(report: &Report, measure: Measure, bound: Bound, refused: &[usize]) -> Result<usize, String> {
     let all: Vec<Candidate> = candidates(report, measure).collect();
     if all.is_empty() {
@@ -69,8 +69,9 @@ pub fn choose(report: &Report, measure: Measure, bound: Bound, refused: &[usize]
     }
 }
 
-/// The combinations that may be the fastest within an error bound: those that keep it and whose confidence interval of the time overlaps
-/// that of the fastest. The fastest is first, and there are at most [`MAX_CONTENDERS`]. More runs decide between them.
+/// The combinations that may be the fastest with an error of at most `error`, as indices of [`Report::choices`]: those that keep it and whose
+/// confidence interval of the time overlaps that of the fastest. The fastest is first; there are at most [`MAX_CONTENDERS`]. More runs have to decide
+/// between them.
 pub fn contenders(report: &Report, measure: Measure, error: f64, refused: &[usize]) -> Vec<usize> {
     let mut kept: Vec<Candidate> =
         candidates(report, measure).filter(|c| c.error <= error && !refused.contains(&c.index)).collect();
@@ -79,7 +80,7 @@ pub fn contenders(report: &Report, measure: Measure, error: f64, refused: &[usiz
     kept.into_iter().filter(|c| c.times[0] <= reach).map(|c| c.index).take(MAX_CONTENDERS).collect()
 }
 
-/// The Pareto front of the measured combinations, from the fastest to the most accurate, as indices into the report's choices.
+/// The Pareto front of the measured combinations, from the fastest to the most accurate, as indices of [`Report::choices`].
 pub fn front(report: &Report, measure: Measure) -> Vec<usize> {
     let all: Vec<Candidate> = candidates(report, measure).collect();
     let pairs: Vec<[f64; 2]> = all.iter().map(|c| [c.times[1], c.error]).collect();
@@ -103,8 +104,8 @@ fn candidates(report: &Report, measure: Measure) -> impl Iterator<Item = Candida
 }
 
 impl Combination {
-    /// The error plus that of its reference. This is an upper limit by the triangle inequality, and for levels nearly one. For distances
-    /// and normals, whose reference has no error estimate, it is the error alone.
+    /// An upper limit of the combination's error by the triangle inequality: its error plus that of its reference. For levels it is nearly one. For
+    /// distances and normals, whose reference has no error estimate, it is the error alone. None if the measure was not taken.
     pub(crate) fn error_limit(&self, measure: Measure) -> Option<f64> {
         let own = match measure {
             Measure::Rmse => self.reference_error.rmse,
@@ -114,7 +115,7 @@ impl Combination {
         measure.of(&self.errors).map(|error| error + own)
     }
 
-    /// One line for users, such as "(ray.step=0.25): RMSE 1.0e-3, 12.000 ms (95th percentile 13.100)".
+    /// One line for the user, such as "(ray.step=0.25): RMSE 1.0e-3, 12.000 ms (95th percentile 13.100)".
     pub fn describe(&self, measure: Measure) -> String {
         let mut text =
             format!("({})", if self.set.is_empty() { "the scene as it is".into() } else { self.set.join(" ") });
@@ -138,12 +139,12 @@ fn keeps_surfaces(report: &Report, choice: &Combination) -> bool {
     changed(choice) <= report.choices.first().map_or(0.0, changed).max(FEW_RAYS)
 }
 
-/// Changes of several dials at once: for each the index of the dial and of its point.
+/// Changes of several dials at once: index of the dial, and index of its point.
 pub type Changes = Vec<(usize, usize)>;
 
-/// At most `most` combinations that may lie on the Pareto front, spread evenly over their predicted time. The prediction adds squared
-/// errors, as for independent errors, and multiplies the time by the factor of each change. The first combination is the scene with its own
-/// settings. With a bound, combinations near it come first.
+/// At most `most` combinations that may lie on the Pareto front, spread evenly over their predicted time. The prediction adds squares of errors, as
+/// for independent errors, and multiplies the time by the factor of each change. The first combination is the scene with its own settings. With a
+/// bound, combinations near it come first.
 pub fn proposals(dials: &[Dial], bound: Option<Bound>, most: usize) -> Vec<Changes> {
     let turned: Vec<usize> =
         (0..dials.len()).filter(|d| dials[*d].kind == Kind::Numerical && default(&dials[*d]).is_some()).collect();

@@ -7,15 +7,15 @@ use crate::scene::transfer;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-/// The range of a fit. The order is visible only between steps that are too coarse for the asymptotic range and errors that are too small
-/// to be caused by the step.
+/// The points that an order is fitted to. The order shows only between steps that are too coarse for the asymptotic behaviour and errors that are too
+/// small to be caused by the step.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Range {
-    /// Minimum and maximum step, in the dial's unit.
+    /// Smallest and largest step, in the unit of the dial.
     pub step: [f64; 2],
-    /// Limit of the error for small steps, due to rounding and the texture format. Points below `ABOVE_FLOOR` times this value are left
-    /// out, because the limit bends the line there by more than 5 %.
+    /// The error that remains for small steps, by rounding and the texel format. Points below `ABOVE_FLOOR` times this error are left out, because it
+    /// bends the line there by more than 5 %.
     pub floor: f64,
 }
 
@@ -23,7 +23,7 @@ pub struct Range {
 /// sqrt(1 - 1/9) = 94 % of the total.
 const ABOVE_FLOOR: f64 = 3.0;
 
-/// error = coefficient * step^order, by least squares on the logarithms.
+/// The fit error = coefficient * step^order, by least squares on the logarithms.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Fit {
@@ -31,20 +31,20 @@ pub struct Fit {
     /// Standard error of the order, from the residuals of the fit.
     pub standard_error: f64,
     pub coefficient: f64,
-    /// The range of the fit.
+    /// The range that the points were taken from.
     pub range: Range,
-    /// Number of points in the range.
+    /// Number of points that were fitted.
     pub points: usize,
 }
 
 impl Fit {
-    /// The fitted error at a step.
+    /// The error at a step by the fit.
     pub fn at(&self, step: f64) -> f64 {
         self.coefficient * step.powf(self.order)
     }
 }
 
-/// Fits an order to pairs of step and error within a range.
+/// Fits an order to pairs of step and error, of which those within `range` are used.
 ///
 /// # Errors
 /// One line: fewer than three different steps are in the range. A line through two points has no standard error.
@@ -76,13 +76,13 @@ pub fn fit(pairs: &[[f64; 2]], range: Range) -> Result<Fit, String> {
     Ok(Fit { order, standard_error, coefficient: level.exp(), range, points: logs.len() })
 }
 
-/// Radius of the ball that rays pass through, voxels. All lengths here are in voxels; absorption is per voxel.
+/// Radius of the ball of the test field that rays pass through, voxels. All lengths of this module are in voxels; absorption is per voxel.
 pub const RADIUS: f64 = 12.0;
 
-/// The field inside the ball.
+/// A test field inside the ball, whose values are sample values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Field {
-    /// Waves of 10 to 20 voxels on a slope, 0.25..0.85: not zero where rays enter and leave.
+    /// Waves of 10 to 20 voxels on a slope, with values of 0.25..0.85; it is not zero where rays enter and leave.
     Open,
     /// [`Field::Open`] multiplied by a factor that vanishes at the surface of the ball, so that a missing last step has no effect.
     Vanishing,
@@ -117,18 +117,18 @@ const GAUSS: [[f64; 2]; 4] = [
     [0.930_568_155_797_026_3, 0.173_927_422_568_726_93],
 ];
 
-/// A deliberate error in the compositing.
+/// Deliberate errors in compositing, to see that the measured order shows them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Flaw {
-    /// The last, partial step is left out.
+    /// True: the last, partial step is left out.
     pub drops_last_step: bool,
-    /// Weights of the trilinear filter have this many bits: positions are rounded to 2^-bits voxels along each axis.
+    /// Number of bits of the weights of a trilinear filter: positions are rounded to 2^-bits voxels along each axis. None: exact positions.
     pub weight_bits: Option<i32>,
-    /// Factor on the absorption; 1 is correct.
+    /// Factor of the absorption; 1 is correct.
     pub absorption: f64,
 }
 
-/// Correct compositing.
+/// No flaw: correct compositing.
 pub const NONE: Flaw = Flaw { drops_last_step: false, weight_bits: None, absorption: 1.0 };
 
 /// A ray through the ball, from its entry point.
@@ -273,13 +273,13 @@ fn rms(differences: impl Iterator<Item = f64>) -> f64 {
     f64::sqrt(sum / n)
 }
 
-/// `count` steps from `low` to `high` voxels, logarithmically spaced.
+/// `count` step lengths from `low` to `high` voxels, logarithmically spaced.
 pub fn steps(low: f64, high: f64, count: usize) -> Vec<f64> {
     (0..count).map(|i| low * (high / low).powf(i as f64 / (count - 1) as f64)).collect()
 }
 
-/// RMSE of the light of `count` rays at each step. Returns pairs of step and error, and the error of the exact solution (its difference
-/// from the solution at half the step).
+/// The RMSE of the light of `count` rays for each step length. Returns pairs of step and error, and the error of the exact solution (its difference
+/// from the solution at twice the step).
 pub fn errors(rule: Rule, field: Field, flaw: Flaw, steps: &[f64], count: usize) -> (Vec<[f64; 2]>, f64) {
     const FINE: f64 = 1.0 / 32.0;
     let rays = rays(count);
@@ -300,23 +300,23 @@ pub fn errors(rule: Rule, field: Field, flaw: Flaw, steps: &[f64], count: usize)
     (pairs.collect(), own)
 }
 
-/// The error of a rule at one optical depth of a step.
+/// The error of a rule for one optical depth of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StiffPoint {
-    /// Optical depth of a step, kappa h, at the field's mean value.
+    /// Optical depth kappa h of a step of length h at the field's mean value.
     pub depth: f64,
-    /// RMSE of the light with steps of h.
+    /// RMSE of the light with steps of length h.
     pub error: f64,
-    /// log2 of that error over the error with steps of h/2 through the same matter.
+    /// Local order: log2 of `error` over the error with steps of h/2 through the same matter.
     pub order: f64,
 }
 
 /// Value of the field about which its waves are.
 const MEAN_VALUE: f64 = 0.55;
 
-/// The local order of a rule against the optical depth of a step: `count` rays through the open field in steps of `step` voxels and of half
-/// of that. The absorption is scaled so that a step has each of `depths`. The order of 2 for thin steps falls to that of a rule that
-/// samples the wrong position of an opaque step.
+/// The local order of a rule for steps of different optical depths: `count` rays through [`Field::Open`] in steps of `step` voxels and of half of
+/// that. The absorption is scaled so that a step has each of `depths`. The order of 2 for thin steps falls to that of a rule that samples the wrong
+/// position of an opaque step.
 pub fn stiffness(rule: Rule, step: f64, depths: &[f64], count: usize) -> Vec<StiffPoint> {
     let rays = rays(count);
     let point = |depth: &f64| {

@@ -10,33 +10,33 @@ use crate::scene::{Compositing, Edge, Mode, PeronaMalik, Sampling, Scene, Scheme
 /// One setting of a dial.
 #[derive(Clone, Debug)]
 pub struct DialSetting {
-    /// Short label for plots.
+    /// Short label of the setting, for plots.
     pub label: String,
-    /// Assignments `key=value` as for `--set`. Empty for the scene's own setting.
+    /// Assignments `key=value` as for `--set`; empty for the scene's own setting.
     pub set: Vec<String>,
-    /// Value on the dial's axis, in its unit.
+    /// Value on the dial's axis, in the dial's unit.
     pub value: f64,
 }
 
-/// A setting that trades error for time, or chooses a look.
+/// One or a few settings that are varied together to trade error for time, or to choose a look.
 #[derive(Clone, Debug)]
 pub struct Dial {
     pub name: &'static str,
     pub unit: &'static str,
-    /// The settings to measure. The first is the scene's own.
+    /// The settings to measure; the first is the scene's own.
     pub settings: Vec<DialSetting>,
     pub kind: Kind,
     /// True if the values lie on an axis; false if they are names.
     pub is_ordered: bool,
-    /// Assignments of the reference. Empty for a look.
+    /// Assignments `key=value` of the reference that errors are measured against. Empty for a look.
     pub best: Vec<String>,
-    /// Assignments of the next coarser setting. Its difference from the reference estimates the error of the reference if the device
-    /// renders it.
+    /// Assignments `key=value` of the setting next to the reference. If the device renders the reference, the difference of both estimates the error
+    /// of the reference.
     pub nearly: Vec<String>,
 }
 
 impl Dial {
-    /// True if its settings are ways of taking samples along rays: then exact rays are its reference.
+    /// True if its settings are ways to take samples along rays, so that exact rays can be its reference.
     pub(crate) fn samples_rays(&self) -> bool {
         [
             "step",
@@ -75,7 +75,7 @@ fn fineness(scene: &Scene) -> [f64; 2] {
     [most, most / 2.0]
 }
 
-/// Names of all dials.
+/// The names of all dials.
 pub const NAMES: &[&str] = &[
     "step",
     "tolerance",
@@ -99,10 +99,10 @@ pub const NAMES: &[&str] = &[
     "pipeline",
 ];
 
-/// The dial of a name.
+/// The dial with this name, for a scene.
 ///
 /// # Errors
-/// The reason why this scene has no such dial, as the end of a sentence that begins with "this scene".
+/// Why this scene has no such dial, as the end of a sentence that begins with "this scene".
 pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
     let s = &scene.settings;
     let step = scene.step;

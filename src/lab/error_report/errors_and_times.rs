@@ -23,7 +23,7 @@ use crate::scene::{Layout, Scene};
 use crate::source::Frame;
 use std::sync::Arc;
 
-/// The reason why a measurement failed.
+/// Why a measurement failed.
 #[derive(Debug, thiserror::Error)]
 pub enum MeasureError {
     #[error("{0}")]
@@ -43,30 +43,31 @@ const MAX_EXACT_SEGMENTS: f64 = 5e7;
 /// How many times more accurate than a point its reference must be, if the point takes part in the fit of an order.
 const BETTER: f64 = 10.0;
 
-/// Most combinations of several dials that are measured.
+/// Largest number of combinations of several dials that are measured.
 pub const MAX_COMBINATIONS: usize = 24;
 
-/// The reference to compare with.
+/// Which reference errors are measured against.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ReferenceChoice {
-    /// Exact rays for dials of rays if they exist, else f64, each if it takes about a minute or less; otherwise a converged picture.
+    /// For dials of rays exact rays if they exist, for others f64, each if it takes about a minute or less; otherwise a converged picture of the
+    /// device.
     Auto,
-    /// Exact rays for every dial. An error if they do not exist.
+    /// Exact rays for every dial; an error if they do not exist.
     Exact,
     F64,
     Converged,
 }
 
-/// The subject of a measurement, and its device.
+/// What to measure, and on which device.
 pub struct ErrorMeasurement<'a> {
     pub context: &'a Arc<Context>,
     /// The recording from which every scene of the report is made.
     pub recorded: &'a Recorded,
-    /// The settings before any dial is changed and before they are completed.
+    /// The layers of settings before any dial is changed and before defaults complete them.
     pub layers: &'a Layers,
     pub scene: &'a Scene,
     pub frames: &'a [Frame],
-    /// Description of the input.
+    /// Description of the input, for the report.
     pub input: &'a str,
     pub repeats: u32,
     pub reference: ReferenceChoice,
@@ -81,7 +82,7 @@ enum Kind {
     Converged,
 }
 
-/// The picture of a scene with the finest setting of every numerical dial. Combinations are compared with it.
+/// The picture of a scene with the finest setting of every numerical dial, against which combinations are measured.
 pub struct Finest {
     rendering: Rendering,
     reference: Reference,
@@ -89,19 +90,19 @@ pub struct Finest {
     error: OwnError,
 }
 
-/// A choice that kept its bound when it was measured again.
+/// A chosen combination that kept its bound when it was measured again.
 pub struct Verified {
-    /// The second measurement of the choice.
+    /// The combination with its second measurement.
     pub choice: Combination,
-    /// Times of the scene with its own settings, measured alternately with the choice. None without time stamps.
+    /// Times of the scene with its own settings, measured alternately with the combination. None without time stamps.
     pub unchanged: Option<Times>,
-    /// The combinations that did not keep the bound in the second measurement.
+    /// The combinations that were chosen first, and did not keep the bound in their second measurement.
     pub failed: Vec<Combination>,
 }
 
 impl ErrorMeasurement<'_> {
-    /// Measures the dials one after the other, then combinations of them. `progress` is called with dial and label before each setting is
-    /// rendered. With a bound, more of the combinations are near it.
+    /// Measures the dials one after the other, then combinations of them. `progress` is called before each setting is rendered, with the names of the
+    /// dial and the setting. With a bound, more of the combinations are near it.
     ///
     /// # Errors
     /// A setting is refused, or the device fails.
@@ -142,7 +143,7 @@ impl ErrorMeasurement<'_> {
         })
     }
 
-    /// The picture that combinations are compared with. It has the finest setting of every numerical dial of the scene, including dials
+    /// Renders the picture against which combinations are measured. It has the finest setting of every numerical dial of the scene, also of dials
     /// that are not measured.
     ///
     /// # Errors
@@ -263,9 +264,8 @@ impl ErrorMeasurement<'_> {
         Ok((Combination { errors, times, reference_error: finest.error, ..choice.clone() }, Times::of(&runs.default)))
     }
 
-    /// Chooses a combination of the report, and measures it again. A combination that does not keep the bound in the second measurement is
-    /// discarded, and the next best is tried. A time bound is kept if the 95th percentile, increased by [`choose::TIME_MARGIN`], is within
-    /// it.
+    /// Chooses a combination of the report, and measures it again `runs` times. A combination that does not keep the bound then is discarded, and the
+    /// next best is tried. A time bound is kept if the 95th percentile, increased by [`choose::TIME_MARGIN`], is within it.
     ///
     /// # Errors
     /// As [`choose::choose`], or the device fails.

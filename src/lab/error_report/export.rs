@@ -131,8 +131,8 @@ fn errors_row(e: &Errors, measure: Measure, has_surface: bool) -> String {
     text
 }
 
-/// The report as tables: for each point of a dial its errors, its time, and the ratio of the time to that of the default; then the error
-/// budget and the best combinations.
+/// The report as tables of text: for each point of a dial its errors, its time, and the ratio of that to the time of the scene's own setting; then
+/// the error budget and the best combinations.
 pub fn summary_table(report: &Report, measure: Measure) -> String {
     let mut text = String::new();
     let [w, h, k] = report.sizes.volume;

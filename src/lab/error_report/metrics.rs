@@ -13,7 +13,7 @@ const C2: f64 = 0.03 * 0.03;
 /// Luminance of red, green and blue (Rec. ITU-R BT.709), applied to the stored values.
 const LUMINANCE: [f64; 3] = [0.2126, 0.7152, 0.0722];
 
-/// Differences of two pictures over red, green and blue. Alpha is not visible on a screen and is ignored.
+/// Differences of two pictures over red, green and blue, 0..1. Alpha is not visible on a screen and is ignored.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PictureError {
     pub rmse: f64,
@@ -21,55 +21,55 @@ pub struct PictureError {
     pub max: f64,
     /// 20 log10(1 / rmse), dB; None (infinite) if the pictures are equal.
     pub psnr: Option<f64>,
-    /// Mean structural similarity of the luminance over all windows within the picture, at most 1; None if the picture
-    /// is smaller than the window of 11 x 11 pixels.
+    /// Mean structural similarity of the luminance over all windows within the picture, at most 1. None if the picture is smaller than the window of
+    /// 11 x 11 pixels.
     pub ssim: Option<f64>,
 }
 
-/// Statistics of the magnitudes of errors.
+/// Statistics of the absolute values of errors.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ErrorStatistics {
     pub rms: f64,
     pub median: f64,
-    /// 95th percentile, interpolated linearly.
+    /// 95th percentile, interpolated linearly between values.
     pub p95: f64,
     pub max: f64,
-    /// Number of pixels compared.
+    /// Number of pixels that were compared.
     pub count: usize,
 }
 
-/// Differences of two pictures as displayed, in levels of 255, not rounded. The difference of a pixel is that of its channel that differs
+/// Differences of two pictures as the screen shows them, in levels of 255, not rounded. The difference of a pixel is that of its channel that differs
 /// most.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Levels {
     pub rms: f64,
     pub median: f64,
-    /// 95th percentile, interpolated linearly.
+    /// 95th percentile over the pixels, interpolated linearly between values.
     pub p95: f64,
     pub max: f64,
-    /// Share of the pixels that differ by more than 1 level.
+    /// Share (0..1) of the pixels that differ by more than 1 level.
     pub over_1: f64,
-    /// Share of the pixels that differ by more than 8 levels.
+    /// Share (0..1) of the pixels that differ by more than 8 levels.
     pub over_8: f64,
 }
 
-/// Differences of two maps of a surface.
+/// Differences of two maps of a surface: of distances, mm, or of normals, degrees.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SurfaceError {
-    /// Error over the pixels that are hit in both and do not jump, mm or degrees. None if there are no such pixels.
+    /// Error over the pixels that are hit in both maps and are no jumps, mm or degrees. None if there are no such pixels.
     pub error: Option<ErrorStatistics>,
-    /// Share of all pixels that are hit here, but missed in the reference.
+    /// Share (0..1) of all pixels that are hit in the measured map, but missed in the reference.
     pub false_hits: f64,
-    /// Share of all pixels that are missed here, but hit in the reference.
+    /// Share (0..1) of all pixels that are missed in the measured map, but hit in the reference.
     pub missed_hits: f64,
-    /// Share of all pixels that are hit in both, but on different surfaces.
+    /// Share (0..1) of all pixels that are hit in both maps, but on different surfaces.
     pub jumps: f64,
 }
 
-/// Compares toned pictures, values in 0..1. Pixels that are true in `left_out` do not count.
+/// Compares two toned pictures with values in 0..1. `left_out`: pixels for which it is true do not count.
 ///
 /// # Errors
 /// As [`pictures`].
@@ -87,9 +87,9 @@ pub fn levels(measured: &Texels, reference: &Texels, left_out: &[bool]) -> Resul
     Ok(Levels { rms: spread.rms, median: spread.median, p95: spread.p95, max: spread.max, over_1, over_8 })
 }
 
-/// Marks the pixels of a picture of `size` whose rays differ: hits that are lost or gained, or surfaces whose distances differ by more than
-/// `cliff` mm. Their neighbours are also marked, because their normals and edges change. The maps may have other sizes than the picture;
-/// the ray through the centre of a pixel decides.
+/// For each pixel of a picture of `size`, true if the rays of both distance maps differ there: a hit that is lost or gained, or surfaces whose
+/// distances differ by more than `cliff` mm. Neighbours of such pixels are true as well, because their normals and edges change. The maps may have
+/// other sizes than the picture; the ray through the centre of a pixel decides.
 pub fn changed_rays(measured: &Texels, reference: &Texels, cliff: f64, size: [usize; 3]) -> Vec<bool> {
     let at = |map: &Texels, x: usize, y: usize| {
         let along = |n: usize, axis: usize| {
@@ -134,7 +134,7 @@ pub fn pictures(measured: &Texels, reference: &Texels) -> Result<PictureError, S
     Ok(PictureError { rmse, max, psnr, ssim: similarity(&grey(&a), &grey(&b), measured.size) })
 }
 
-/// Compares distance maps in mm.
+/// Compares two distance maps, mm.
 ///
 /// # Errors
 /// As [`pictures`].
@@ -142,7 +142,7 @@ pub fn distances(measured: &Texels, reference: &Texels) -> Result<SurfaceError, 
     surfaces(measured, reference, f64::INFINITY)
 }
 
-/// Compares distance maps in mm. Distances that differ by more than `cliff` mm count as jumps to another surface, not as errors.
+/// Compares two distance maps, mm. Distances that differ by more than `cliff` mm count as jumps to another surface, not as errors.
 ///
 /// # Errors
 /// As [`pictures`].
@@ -153,8 +153,8 @@ pub fn surfaces(measured: &Texels, reference: &Texels, cliff: f64) -> Result<Sur
     Ok(surface(&first(measured), &first(reference), difference))
 }
 
-/// Compares maps of normals (first three channels x, y, z) by the angle between them, degrees. Normals need not have unit length. A zero
-/// vector is a miss.
+/// Compares two maps of normals (the first three channels are x, y, z) by the angle between normals, degrees. Normals need not have unit length. A
+/// zero vector is a miss.
 ///
 /// # Errors
 /// As [`pictures`].
@@ -225,8 +225,8 @@ fn spread(mut errors: Vec<f64>) -> Option<ErrorStatistics> {
     Some(ErrorStatistics { rms, median: quantile(&errors, 0.5)?, p95: quantile(&errors, 0.95)?, max, count })
 }
 
-/// Mean structural similarity of two planes with values in 0..1 (SSIM; Wang et al. 2004, equation 13), weighted by the Gaussian window and
-/// averaged over all windows within the picture. None if the picture is smaller than the window.
+/// Mean structural similarity of two single-channel pictures with values in 0..1 (SSIM; Wang et al. 2004, equation 13), weighted by the Gaussian
+/// window and averaged over all windows within the picture. None if the picture is smaller than the window.
 pub fn similarity(a: &[f64], b: &[f64], [width, height, _]: [usize; 3]) -> Option<f64> {
     if width < WINDOW || height < WINDOW {
         return None;

@@ -20,108 +20,107 @@ use convergence::Fit;
 use metrics::{Levels, SurfaceError};
 use serde::{Deserialize, Serialize};
 
-/// Format version of a stored report; other versions are refused.
+/// Name and version of the format of a stored report; other versions are refused.
 pub const FORMAT: &str = "echolume error report 3";
 
-/// A measurement of one scene on one device.
+/// The measured errors and times of one scene on one device.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Report {
-    /// [`FORMAT`].
+    /// The name of the format: [`FORMAT`].
     pub format: String,
     pub device: String,
     pub driver: String,
-    /// Time of the measurement, ISO 8601.
+    /// When it was measured, ISO 8601.
     pub date: String,
-    /// Description of the input on the first line, then all settings, resolved, as TOML.
+    /// Description of the input on the first line, then all settings as TOML, with defaults filled in.
     pub scene: String,
     pub sizes: Sizes,
-    /// Number of runs whose median each time is.
+    /// Number of runs over which each time is a median.
     pub repeats: u32,
     pub dials: Vec<Dial>,
-    /// Settings of one dial and of several, each rendered and compared with the scene's finest picture. The first is the scene with its own
-    /// settings.
+    /// Combinations of settings of one dial or of several, each rendered and compared with the scene's finest picture. The first is the scene with
+    /// its own settings.
     pub choices: Vec<Combination>,
-    /// Contribution of each approximation of the scene to its error.
+    /// How much each approximation of the scene contributes to its error.
     pub budget: Budget,
 }
 
-/// Settings of several dials at once, and their measurements.
+/// Settings of several dials at once, with their errors and times.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Combination {
-    /// Changes from the scene's own settings: name of the dial and label of the point.
+    /// What differs from the scene's own settings: name of the dial, and label of its point.
     pub changed: Vec<(String, String)>,
-    /// Their assignments, "key=value" as for `--set`.
+    /// The assignments of these changes, `key=value` as for `--set`.
     pub set: Vec<String>,
-    /// Errors against the scene's own picture with the finest numerical settings.
+    /// Errors against the reference: the scene's picture with the finest numerical settings.
     pub errors: Errors,
-    /// Error of that picture itself. 0 if it is an f64 reference.
+    /// Error of that reference itself; 0 if it was computed in f64.
     pub reference_error: OwnError,
-    /// None without time stamps.
+    /// Times of the combination. None without time stamps.
     pub times: Option<Times>,
 }
 
-/// The error of a reference.
+/// An estimate of the error of a reference.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct OwnError {
-    /// RMSE of its picture, 0..1.
+    /// RMSE of the reference's picture, 0..1.
     pub rmse: f64,
-    /// 95th percentile of its pixels after tone, levels of 255.
+    /// 95th percentile over its pixels after toning, levels of 255.
     pub levels: f64,
 }
 
 impl OwnError {
-    /// The upper limit from two pictures of a converging sequence: the difference of the last two.
+    /// The upper limit for the last picture of a converging sequence. `errors`: the difference of the last two pictures.
     pub fn of(errors: &Errors) -> OwnError {
         OwnError { rmse: errors.rmse, levels: errors.levels.p95 }
     }
 }
 
-/// How the settings of a dial are related to one another.
+/// What the settings of a dial have in common.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
-    /// One setting that computes the same picture more or less accurately. A choice may vary it together with others.
+    /// They are values of one setting and compute the same picture more or less accurately. A choice may vary the dial together with others.
     Numerical,
-    /// Several such settings at once. A choice may vary it, but not together with others.
+    /// They change several such settings at once. A choice may vary the dial, but not together with others.
     Several,
-    /// The number of pixels, or of rays in a pixel: a different picture, with an error of its own.
+    /// They change the number of pixels, or of rays in a pixel: another picture, with an error of its own.
     Pixels,
-    /// A different look: its differences from the scene's own setting are not errors.
+    /// They change the look: differences from the scene's own setting are not errors.
     Look,
 }
 
-/// Sizes of the rendered data.
+/// Sizes of the volume and of the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sizes {
-    /// Texels of the volume.
+    /// Columns, rows and slices of the volume, texels.
     pub volume: [u32; 3],
-    /// Default size of the picture, pixels. A dial may change it.
+    /// Size of the picture with the scene's own settings, pixels. A dial may change it.
     pub picture: [u32; 2],
 }
 
-/// Measurements of one approximation, varied while all other settings keep their defaults.
+/// Measurements of one dial, an approximation or look that is varied while all other settings stay the scene's own.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Dial {
     pub name: String,
     pub kind: Kind,
-    /// True if its points lie on an axis, so that a line may join them; false for names.
+    /// True if the points lie on an axis, so that a line may join them; false if they are names.
     pub is_ordered: bool,
-    /// Unit of the values of the points; empty for counts and names.
+    /// Unit of the points' values; empty for counts and names.
     pub unit: String,
     pub reference: Reference,
     pub points: Vec<Point>,
-    /// Order of the error in the value, if there is one.
+    /// The order with which the error depends on the value. None if no order could be fitted.
     pub order: Option<Fit>,
-    /// RMSE, 0..1, of the device with the finest settings: what its arithmetic and formats alone cause. None for other dials than the step, and without
-    /// a reference in f64.
+    /// RMSE, 0..1, of the device against f64 with the same settings: what arithmetic and texel formats alone make. None if it was not measured.
     #[serde(default)]
     pub floor: Option<f64>,
-    /// The reason why the reference is not the exact one, if the dial is one of rays.
+    /// For a dial of rays, why its reference is not exact rays. None if it is.
     #[serde(default)]
     pub note: Option<String>,
 }
@@ -133,95 +132,95 @@ impl Dial {
     }
 }
 
-/// The reference of the errors of a dial.
+/// What the errors of a dial are measured against.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Reference {
-    /// The four stages in f64 on the CPU.
+    /// The picture of the reference renderer, in f64 on the CPU.
     F64,
-    /// The stages in f64 with exact rays in place of stage 2: no step, no table of the transfer function.
+    /// The picture of the reference renderer with exact rays in place of stage 2: without steps, and without a table of the transfer function.
     Exact {
-        /// Their own estimate of their error, RMS over the rays; not a bound. It is that of the picture, or of the distance map in mm if
-        /// the scene shows surfaces.
+        /// The exact rays' own estimate of their error, root mean square over the rays; not a bound. It is that of the picture, or of the distance
+        /// map in mm if the scene shows surfaces.
         estimate: f64,
-        /// Number of parts of rays that were integrated.
+        /// Number of pieces of rays that were integrated.
         pieces: u64,
     },
-    /// The device's picture with the scene's own settings: the settings differ in look, and the differences are not errors.
+    /// The device's picture with the scene's own settings. The dial's settings differ in look, and the differences are not errors.
     AsItIs,
-    /// A picture by the device itself, converged as far as possible.
+    /// A picture of the device itself, as accurate as the settings allow.
     Converged {
-        /// Its assignments.
+        /// Assignments `key=value` of that picture.
         set: Vec<String>,
-        /// Its RMSE against the next coarser picture: an upper bound of its error if the pictures converge.
+        /// RMSE of that picture against one with the next coarser settings: an upper bound of its error if the pictures converge.
         rmse: f64,
     },
-    /// The limit of such pictures for ever smaller cells of the light volume, by Richardson extrapolation ([`richardson`]).
+    /// The limit of pictures of the device for ever smaller cells of the light volume, by Richardson extrapolation ([`richardson`]).
     Extrapolated {
-        /// The assignments of the picture with the smallest cells.
+        /// Assignments `key=value` of the picture with the smallest cells.
         set: Vec<String>,
         /// Edges of the cells, mm, descending.
         cells: [f64; 3],
-        /// The observed order in the size of the cell.
+        /// The observed order of the error in the size of the cells.
         order: f64,
-        /// Its RMSE: the root of the sum of two squares, the differences from the limit of the two coarser pictures alone and from the next
-        /// coarser setting of everything else. An upper bound of its error if the pictures converge.
+        /// RMSE of the limit: the root of the sum of the squares of two differences, from the limit of the two coarser pictures alone and from the
+        /// next coarser setting of everything else. It is an upper bound of the limit's error if the pictures converge.
         rmse: f64,
     },
 }
 
-/// One setting of a dial.
+/// A measured setting of a dial.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Point {
     /// Short label for plots: "0.25", "pre-integrated".
     pub label: String,
-    /// Its assignments, each "key=value" as for `--set`.
+    /// Assignments of the setting, each `key=value` as for `--set`.
     pub set: Vec<String>,
-    /// Value on the dial's axis, in the dial's unit. For names it is their index.
+    /// Value on the dial's axis, in the dial's unit. For names it is the index of the point.
     pub value: f64,
     pub errors: Errors,
-    /// None without time stamps.
+    /// Times with this setting. None without time stamps.
     pub times: Option<Times>,
-    /// Times relative to the default, from alternate runs of both. None without time stamps.
+    /// Times divided by those of the scene's own setting, from alternate runs of both. None without time stamps.
     pub ratios: Option<Times>,
-    /// True for the setting of the scene itself, without assignments.
+    /// True for the scene's own setting, which has no assignments.
     pub is_default: bool,
 }
 
-/// Errors of a picture, and of the surface if there is one. Pixels whose rays hit another surface than those of the reference, or none, are
-/// left out of the errors of the picture, and so are their neighbours. Their shares are in `mm`.
+/// Errors of a picture, and of the surface if it shows one. Pixels whose rays hit another surface than in the reference, or none, are left out of the
+/// errors of the picture, and so are their neighbours. Their shares are in `mm`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Errors {
-    /// Of red, green and blue before tone, 0..1.
+    /// Root mean square difference of red, green and blue before toning, 0..1.
     pub rmse: f64,
     pub max: f64,
     /// Peak signal-to-noise ratio, dB; None (infinite) for equal pictures.
     pub psnr: Option<f64>,
     pub ssim: Option<f64>,
-    /// Differences as displayed.
+    /// Differences of the pictures as displayed.
     pub levels: Levels,
-    /// Error of the distance map, mm.
+    /// Error of the distance map, mm. None without one.
     pub mm: Option<SurfaceError>,
-    /// Error of the normals, degrees.
+    /// Error of the normals, degrees. None without a distance map.
     pub degrees: Option<SurfaceError>,
 }
 
-/// A time over several runs, ns, or the ratio of two.
+/// Statistics of a time over several runs, ns, or of the ratio of two times.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Time {
     pub median: f64,
-    /// Confidence interval of the median: 95 % by order statistics. With fewer than 6 runs it is from the shortest to the longest.
+    /// Confidence interval of the median (`low`, `high`): 95 % by order statistics. With fewer than 6 runs it is from the shortest to the longest.
     pub low: f64,
     pub high: f64,
-    /// 95th percentile by the nearest rank. With fewer than 20 runs it is the longest.
+    /// 95th percentile by the nearest rank. With fewer than 20 runs it is the longest run.
     pub p95: f64,
 }
 
 impl Time {
-    /// The statistics of the runs; None without runs.
+    /// The statistics of the values of several runs. None without runs.
     pub fn of(runs: &[f64]) -> Option<Time> {
         let mut sorted = runs.to_vec();
         sorted.sort_by(f64::total_cmp);
@@ -242,32 +241,32 @@ impl Time {
     }
 }
 
-/// Times on the device, ns.
+/// GPU times, ns, or ratios of them.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Times {
-    /// Work of each frame and volume: upload and stage 1.
+    /// Work for each frame and volume: upload and stage 1.
     pub volume: Time,
-    /// Work of each picture: stages 2 to 4, and the structures for skipping empty space.
+    /// Work for each picture: stages 2 to 4, and the structures for empty-space skipping.
     pub picture: Time,
-    /// The sum of both.
+    /// `volume` and `picture` together.
     pub total: Time,
 }
 
 impl Times {
-    /// The statistics of runs of [volume, picture], ns; None without runs.
+    /// The statistics of several runs, each with the times [volume, picture], ns. None without runs.
     pub fn of(runs: &[[f64; 2]]) -> Option<Times> {
         let of = |part: fn(&[f64; 2]) -> f64| Time::of(&runs.iter().map(part).collect::<Vec<_>>());
         Some(Times { volume: of(|r| r[0])?, picture: of(|r| r[1])?, total: of(|r| r[0] + r[1])? })
     }
 }
 
-/// The error measure of a plot or choice.
+/// By which error settings are compared in a plot or a choice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Measure {
-    /// RMSE of the picture before tone, 0..1.
+    /// RMSE of the picture before toning, 0..1.
     Rmse,
-    /// 95th percentile of the pixels after tone, levels of 255.
+    /// 95th percentile over the pixels after toning, levels of 255.
     Levels,
     /// RMS error of the distance map, mm.
     Mm,
@@ -276,7 +275,7 @@ pub enum Measure {
 }
 
 impl Measure {
-    /// The error by this measure; None if it was not measured or is not finite.
+    /// The error by this measure. None if it was not measured or is not finite.
     pub fn of(self, errors: &Errors) -> Option<f64> {
         let rms = |surface: &Option<SurfaceError>| surface.and_then(|s| s.error).map(|e| e.rms);
         let error = match self {
@@ -297,7 +296,7 @@ impl Measure {
         }
     }
 
-    /// An error with its name and unit, for messages.
+    /// An error by this measure as text, with name and unit, for messages.
     pub fn format(self, error: f64) -> String {
         match self {
             Measure::Rmse => format!("RMSE {error:.3e}"),
@@ -316,7 +315,7 @@ impl Dial {
 }
 
 impl Report {
-    /// True if the report was measured with the settings of `scene`, and with volumes and pictures of its size.
+    /// True if the report was measured with the settings of `scene`, and with a volume and a picture of its sizes.
     pub fn is_of(&self, scene: &Scene) -> bool {
         let settings = self.scene.split_once('\n').map_or("", |(_, settings)| settings);
         let sizes = Sizes { volume: scene.volume_size(), picture: scene.picture_size() };
@@ -387,8 +386,8 @@ impl Report {
         Ok(())
     }
 
-    /// The Pareto front over all dials: indices of dial and point, from the fastest to the most accurate. Points without a time or without
-    /// this error are not on it, nor are points of another look.
+    /// The Pareto front over the points of all dials: indices of dial and point, from the fastest to the most accurate. Points without a time or
+    /// without this error are not on it, nor are points of another look.
     pub fn pareto_front(&self, measure: Measure) -> Vec<(usize, usize)> {
         let mut indices = Vec::new();
         let mut pairs = Vec::new();
@@ -419,8 +418,8 @@ fn wrong_result(e: &Errors, times: &[Option<Times>], other: f64) -> Option<f64> 
     wrong.or_else(|| [e.psnr, e.ssim].into_iter().flatten().find(|v| !v.is_finite()))
 }
 
-/// The Pareto front: indices of the pairs that no other pair dominates (at most as large in both values and smaller in one), in order of
-/// the first value. All equal pairs stay, in the given order. Pairs that are not finite are never on the front.
+/// The Pareto front of pairs: indices of the pairs that no other pair dominates (at most as large in both values and smaller in one), in order of the
+/// first value. All equal pairs stay, in the given order. Pairs that are not finite are never on the front.
 pub fn pareto_front(pairs: &[[f64; 2]]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..pairs.len()).filter(|i| pairs[*i].iter().all(|v| v.is_finite())).collect();
     // A stable sort: equal pairs keep their order.

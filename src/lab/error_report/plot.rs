@@ -27,12 +27,12 @@ const MIN_SIZE: [u32; 2] = [640, 400];
 /// Maximum width and height, pixels.
 const MAX_SIZE: u32 = 4096;
 
-/// The content of a figure.
+/// Which dials a diagram shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Figure {
-    /// Errors: the dials of one picture, and the choices among their settings.
+    /// Dials whose differences are errors, and the combinations of their settings.
     Errors,
-    /// Differences of looks from the scene's own look.
+    /// Dials whose settings differ in look, by their differences from the scene's own look.
     Looks,
 }
 
@@ -42,13 +42,13 @@ impl Figure {
         report.dials.iter().enumerate().filter(move |(_, dial)| (dial.kind == Kind::Look) == (self == Figure::Looks))
     }
 
-    /// True if the report has dials of this figure.
+    /// True if the report has dials that this diagram shows.
     pub fn is_in(self, report: &Report) -> bool {
         self.dials(report).next().is_some()
     }
 }
 
-/// The diagram as SVG. `size`: width and height, pixels.
+/// The diagram as SVG, time against the error by `measure`. `size`: width and height, pixels.
 ///
 /// # Errors
 /// One line: no point has both a time and this error, or the size is not within 640x400..4096x4096.
@@ -74,7 +74,7 @@ fn check([width, height]: [u32; 2]) -> Result<(), String> {
     Ok(())
 }
 
-/// The size at which every panel has room for the names of its points, pixels.
+/// The size, pixels, at which every panel of the diagram has room for the names of its points.
 pub fn size(report: &Report, figure: Figure) -> [u32; 2] {
     let panels = panels(report, figure, Measure::Rmse);
     let rows = panels.len().div_ceil(COLUMNS).clamp(1, 12) as u32;

@@ -15,27 +15,26 @@ use crate::passes::Texels;
 /// Orders that are looked for. Below, the differences hardly shrink; above, they vanish at once, and the picture with the smallest cells is as good.
 const ORDERS: [f64; 2] = [0.25, 8.0];
 
-/// The limit of a sequence of pictures.
+/// The limit of a sequence of pictures, by Richardson extrapolation.
 #[derive(Clone, Debug)]
 pub struct Extrapolated {
     pub picture: Texels,
-    /// The limit of the two coarser pictures alone, with this order.
+    /// The limit that the two coarser pictures alone give with the same order.
     pub coarser: Texels,
-    /// The observed order. Infinite if the two finest pictures are equal.
+    /// The observed order of the error in the size of the cells. Infinite if the two finest pictures are equal.
     pub order: f64,
-    /// RMS difference of `picture` and `coarser`, over all values. It is the error of the coarser one as far as the next term is known, and
-    /// so an upper bound of this picture's error if the pictures converge.
+    /// RMS difference of `picture` and `coarser`, over all values. It is the error of `coarser` as far as the next term is known, and so an upper
+    /// bound of the error of `picture` if the pictures converge.
     pub error: f64,
-    /// RMS difference of the picture with the smallest cells from the limit: an estimate of its error.
+    /// RMS difference of the picture with the smallest cells from the limit: an estimate of the error of that picture.
     pub finest: f64,
 }
 
-/// Extrapolates pictures to cells of size 0. `cells`: the edges of their cells, descending, in any unit. They must be the cells of the
-/// actual lattices, not the requested ones.
+/// Extrapolates three pictures to cells of size 0. `cells`: the edges of their cells, descending, in any unit. They must be the cells of the actual
+/// lattices, not the requested ones.
 ///
 /// # Errors
-/// One line: the pictures differ in size, the cells do not descend, a value is not finite, or the differences do not shrink as a power of
-/// the cell.
+/// One line: the pictures differ in size, the cells do not descend, a value is not finite, or the differences do not shrink as a power of the cell.
 pub fn extrapolated(pictures: [&Texels; 3], cells: [f64; 3]) -> Result<Extrapolated, String> {
     let [coarse, middle, fine] = pictures;
     let is_alike = |other: &Texels| (other.size, other.channels) == (fine.size, fine.channels);

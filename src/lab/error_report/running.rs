@@ -10,7 +10,7 @@ use crate::scene::Scene;
 use crate::source::Frame;
 use std::sync::Arc;
 
-/// A rendered scene: the picture before the tone mapping of stage 4, and the filtered distance map.
+/// What a scene renders: the picture before the toning of stage 4, and the distance map after its filters (None without one).
 pub(super) struct Rendering {
     pub scene: Scene,
     pub picture: Texels,
@@ -18,7 +18,7 @@ pub(super) struct Rendering {
 }
 
 impl Rendering {
-    /// The scene by its f64 references, some of which `replace` takes the place of.
+    /// Renders a scene by the references of its passes; `replace` may compute some of them instead.
     pub(crate) fn in_f64(scene: &Scene, frames: &[Frame], replace: &mut reference::Replacement) -> Rendering {
         let scene = in_floats(scene);
         let frames = reference::decoded(&scene, frames);
@@ -28,7 +28,7 @@ impl Rendering {
         Rendering { scene, picture, distance }
     }
 
-    /// The picture as the screen shows it, values in 0..1, not rounded.
+    /// A picture after the toning of stage 4, as the screen shows it: values in 0..1, not rounded.
     pub fn toned(&self, picture: &Texels) -> Texels {
         let channels = picture.channels;
         let pixel = |p: &[f64]| match p {
@@ -42,7 +42,7 @@ impl Rendering {
     }
 }
 
-/// A scene on the device.
+/// A scene that runs on a device.
 pub(super) struct Running<'a> {
     renderer: Renderer,
     frames: &'a [Frame],
@@ -51,7 +51,10 @@ pub(super) struct Running<'a> {
 }
 
 impl<'a> Running<'a> {
-    /// The scene on the device, after a first run that compiles its shaders.
+    /// Makes the renderer, and runs it once, so that its shaders are compiled.
+    ///
+    /// # Errors
+    /// As [`Running::run`].
     pub fn new(context: &Arc<Context>, frames: &'a [Frame], scene: &Scene) -> Result<Running<'a>, GpuError> {
         // A stamp at every pass: only so are the times of the volume and of the picture told apart.
         let options = RendererOptions { time_stamps: TimeStamps::EachPass, ..RendererOptions::default() };
@@ -62,7 +65,8 @@ impl<'a> Running<'a> {
         Ok(running)
     }
 
-    /// Ingests the volume and renders a picture. Returns the times of both, ns; none without time stamps.
+    /// Sends the frames through stage 1 and renders a picture. Returns the GPU times of volume and picture, ns. None if the device has no time
+    /// stamps.
     ///
     /// # Errors
     /// The device fails, or it has time stamps and the time of a part is missing.
@@ -114,7 +118,7 @@ fn split(taken: &[PassTime]) -> [f64; 2] {
     [sum(false), sum(true)]
 }
 
-/// Runs of a scene in turn with the default: [volume, picture], ns.
+/// Times of alternate runs of a scene (`own`) and of the scene's own settings (`default`): [volume, picture], ns.
 #[derive(Default)]
 pub(super) struct Runs {
     pub own: Vec<[f64; 2]>,
@@ -122,7 +126,10 @@ pub(super) struct Runs {
 }
 
 impl Runs {
-    /// Runs both in turn; the default goes first in every other run: what slows the machine down slows both.
+    /// Runs both scenes alternately, `count` times. The default goes first in every other pair, so that what slows the machine down slows both.
+    ///
+    /// # Errors
+    /// As [`Running::run`].
     pub fn in_turn(own: &mut Running, default: &mut Running, count: u32) -> Result<Runs, GpuError> {
         let mut all = Runs::default();
         for n in 0..count {
@@ -137,7 +144,7 @@ impl Runs {
         Ok(all)
     }
 
-    /// Times of each run relative to the default's next to it.
+    /// Times of each run divided by those of the default next to it. None without times.
     pub fn ratios(&self) -> Option<Times> {
         let of = |part: fn(&[f64; 2]) -> f64| {
             let ratios = self.own.iter().zip(&self.default).map(|(own, default)| part(own) / part(default));
@@ -147,7 +154,7 @@ impl Runs {
     }
 }
 
-/// The scene with a picture of floats: steps of 8 bits are as large as many errors.
+/// The scene with a picture of floats: steps of 8 bits would be as large as many errors.
 pub(super) fn in_floats(scene: &Scene) -> Scene {
     let mut scene = scene.clone();
     scene.settings.post.floats = true;

@@ -20,18 +20,18 @@ const PHANTOM: Areas = Areas {
     background: Area { lateral: [-15.0, 15.0], depth: [32.0, 42.0] },
 };
 
-/// Options of a measurement.
+/// What a measurement of filters covers.
 #[derive(Clone, Copy, Debug)]
 pub struct MeasureOptions<'a> {
-    /// Part of the names of the filters to measure; empty for all.
+    /// Only filters whose names contain this are measured; empty for all.
     pub only: &'a str,
     /// Pixels along the longer edge of a slice.
     pub pixels: u32,
-    /// Number of times measured for each row.
+    /// Number of time measurements for each candidate.
     pub repeats: usize,
 }
 
-/// The reason why a frame cannot be measured.
+/// Why a frame cannot be measured.
 #[derive(Debug, thiserror::Error)]
 pub enum MeasureError {
     /// An option or input cannot be used.
@@ -41,7 +41,8 @@ pub enum MeasureError {
     Gpu(#[from] GpuError),
 }
 
-/// Measures all candidates on the middle frame of the phantom, whose mean over all speckle is known.
+/// Measures all candidates on the middle frame of the phantom, whose mean over all speckle (the clean frame) is known. `after_each` is called after
+/// each candidate.
 ///
 /// # Errors
 /// The device fails.
@@ -64,10 +65,10 @@ pub fn phantom(
     Ok(subject)
 }
 
-/// Measures all candidates on the middle frame of a recording's first volume.
+/// Measures all candidates on the middle frame of a recording's first volume. `after_each` is called after each candidate.
 ///
 /// # Errors
-/// An area lies outside of the sector, or is empty; the recording cannot be read; the device fails.
+/// An area is empty or outside the sector; the recording cannot be read; the device fails.
 pub fn recording(
     context: &Arc<Context>,
     source: &mut dyn Source,
@@ -99,7 +100,7 @@ pub fn recording(
     Ok(Subject { name: name.into(), areas, frame: middle.frame, size: middle.size(), clean: None, rows })
 }
 
-/// Number of candidates: no filter, and those whose filter's name contains `only`.
+/// Number of candidates: "no filter", and those whose filter's name contains `only`.
 pub fn count(only: &str) -> usize {
     candidates([1.0; 2], only).len()
 }

@@ -1,13 +1,13 @@
 //! The filters to compare, each with several windows and strengths.
 
-/// A filter of slices with its settings.
+/// A filter of slices with settings, one of those that are compared.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Candidate {
     /// Name of the filter.
     pub filter: &'static str,
-    /// The varied values: window and strength.
+    /// What varies among candidates of the filter: window and strength.
     pub label: String,
-    /// Its settings, as for `--set`.
+    /// Assignments `key=value` of its settings, as for `--set`. Empty for no filter.
     pub set: Vec<String>,
 }
 
@@ -32,8 +32,7 @@ const AOS_STEPS: u32 = 4;
 /// Standard deviations of the Gaussian, pixels.
 const DEVIATIONS: [f64; 6] = [0.7, 1.0, 2.0, 3.0, 4.0, 6.0];
 
-/// No filter, and the candidates whose filter's name contains `only`. Candidates of one filter are consecutive. `pitch`: edges of a pixel,
-/// mm.
+/// "No filter", and the candidates whose filter's name contains `only`. Candidates of one filter are consecutive. `pitch`: size of a slice pixel, mm.
 pub fn candidates(pitch: [f64; 2], only: &str) -> Vec<Candidate> {
     let mut all = candidates_of_all(pitch);
     all.retain(|candidate| candidate.set.is_empty() || candidate.filter.contains(only));

@@ -21,7 +21,7 @@ const FIGURES: [Figure; 6] = [
     Figure { name: "ms", of: |r| r.time.map(|t| t.median), digits: 2, is_larger_better: false },
 ];
 
-/// The report as Markdown: for each frame one table of the best setting of each filter, and one of all settings.
+/// The report as Markdown: for each frame a table of the best setting of each filter, and one of all settings.
 pub fn markdown(report: &Report) -> String {
     let mut text = String::from("# Filters compared\n\n");
     let device = &report.device;
@@ -86,7 +86,7 @@ fn table(subject: &Subject, rows: &[&Row]) -> String {
     markdown_table(&lines)
 }
 
-/// The report as CSV, one line for each subject and setting. A measure that is not known is an empty field.
+/// The report as CSV, one line for each frame and candidate. A measure that is not known is an empty field.
 pub fn csv(report: &Report) -> String {
     let mut text = String::from("recording,frame,filter,setting");
     FIGURES.iter().for_each(|f| text.push_str(&format!(",{}", f.name.to_lowercase())));

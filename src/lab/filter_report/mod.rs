@@ -12,35 +12,35 @@ use crate::machine::Device;
 use crate::thesis_tables::Spread;
 use quality::Quality;
 
-/// A part of a slice, mm: lateral positions, and depths counted as in `region.depth`.
+/// A rectangle of a slice, mm: lateral positions, and depths counted as in `region.depth`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Area {
     pub lateral: [f64; 2],
     pub depth: [f64; 2],
 }
 
-/// The parts of a frame that are measured.
+/// The parts of a slice that are measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Areas {
-    /// The area of all measures except SNR and CNR, which the contact sheet also shows. It must lie inside the sector.
+    /// Where all measures except SNR and CNR are taken; the contact sheet shows it. It must lie inside the sector.
     pub crop: Area,
-    /// Tissue of one kind: for SNR, and for CNR against `background`.
+    /// Tissue of one kind, for SNR, and for CNR against `background`.
     pub region: Area,
     pub background: Area,
 }
 
-/// Measurements of one filter with its settings.
+/// The measurements of one candidate on one frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
     pub candidate: candidates::Candidate,
     pub quality: Quality,
-    /// Time of the filter's passes for one slice, ms. None without a filter and without time stamps.
+    /// GPU time of the filter's passes for one slice, ms. None without a filter and without time stamps.
     pub time: Option<Spread>,
-    /// The filtered crop, row by row, 0..1.
+    /// The filtered slice within `Areas::crop`, row by row, 0..1.
     pub pixels: Vec<f64>,
 }
 
-/// All filters on one frame.
+/// All candidates measured on one frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Subject {
     /// Name of the recording, or `phantom`.
@@ -48,29 +48,29 @@ pub struct Subject {
     pub areas: Areas,
     /// Index of the frame in the volume, from 0.
     pub frame: usize,
-    /// Pixels of the crop.
+    /// Columns and rows of the slice within `Areas::crop`.
     pub size: [usize; 2],
-    /// The crop as the mean over all speckle, row by row. None if it is not known.
+    /// The slice within `Areas::crop` as the mean over all speckle, row by row. None if it is not known.
     pub clean: Option<Vec<f64>>,
     pub rows: Vec<Row>,
 }
 
-/// The comparison on every frame.
+/// The comparison of filters on several frames.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Report {
     pub device: Device,
     /// Name, version and build of the program.
     pub program: String,
-    /// Time of the measurement, RFC 3339.
+    /// When it was measured, RFC 3339.
     pub date: String,
-    /// Number of times measured for each row.
+    /// Number of time measurements for each candidate.
     pub repeats: usize,
-    /// The frames. The first is the phantom's, which has a clean frame.
+    /// The measured frames. The first is the phantom's, which has a clean frame.
     pub subjects: Vec<Subject>,
 }
 
 impl Report {
-    /// For every filter the index of the row that is most similar to the clean frame (SSIM), in the order of the rows.
+    /// For every filter, the index in `Subject::rows` of the candidate whose slice is most similar to the clean one (SSIM), in the order of the rows.
     pub fn chosen(&self) -> Vec<usize> {
         let Some(subject) = self.subjects.iter().find(|s| s.clean.is_some()) else { return Vec::new() };
         let ssim = |n: &usize| subject.rows[*n].quality.ssim.unwrap_or(f64::NEG_INFINITY);

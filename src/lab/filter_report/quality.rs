@@ -10,23 +10,23 @@ const DISPLACEMENT: f64 = 1.0 / 9.0;
 /// Steepness that makes a pixel of the clean picture an edge, as a share of its steepest.
 const IDEAL_STEEPNESS: f64 = 0.1;
 
-/// Measures of the quality of a filtered picture.
+/// Measures of the quality of a filtered slice.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quality {
     /// Mean over standard deviation in tissue of one kind. None without noise.
     pub snr: Option<f64>,
-    /// Contrast-to-noise ratio of that tissue against a background. None without noise.
+    /// Contrast-to-noise ratio of that tissue against the background. None if there is no noise.
     pub cnr: Option<f64>,
-    /// Pratt's figure of merit, 0..1. It is 1 if all edges are where those of the clean picture are. None if the clean picture is not
-    /// known.
+    /// Pratt's figure of merit, 0..1: 1 if all edges are where those of the clean slice are. None if the clean slice is not known.
     pub edges: Option<f64>,
-    /// Root mean square difference from the clean picture, 0..1.
+    /// Root mean square difference from the clean slice, 0..1. None if that is not known.
     pub rmse: Option<f64>,
-    /// Structural similarity to the clean picture, at most 1.
+    /// Structural similarity (SSIM) to the clean slice, at most 1. None if that is not known, or too small for the window.
     pub ssim: Option<f64>,
 }
 
-/// Measures a picture of `size` pixels with values in 0..1. `levels`: the region of tissue and the background, for SNR and CNR.
+/// Measures a slice of `size` pixels with values in 0..1. `clean`: the same slice without speckle, if known; `levels`: the regions of tissue and of
+/// background, for SNR and CNR.
 pub fn quality(pixels: &[f64], clean: Option<&[f64]>, size: [usize; 2], levels: [&Region; 2]) -> Quality {
     let [tissue, behind]: [Level; 2] = levels.map(|region| region.level(pixels, size[0] as u32));
     let mean_square = |clean: &[f64]| {

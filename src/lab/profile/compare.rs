@@ -30,16 +30,16 @@ use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use toml::{Table, Value};
 
-/// Thresholds of a comparison.
+/// What counts as a difference in a comparison of profiles.
 #[derive(Clone, Copy, Debug)]
 pub struct CompareOptions {
-    /// Threshold for the ratio of medians: a pass that is slower by more is a regression.
+    /// Largest allowed ratio of the new median to the old one: a pass that is slower by more is a regression.
     pub threshold: Threshold,
-    /// Probability of any false alarm in the whole report, 0..1.
+    /// Probability, 0..1, of at least one false alarm in the whole report.
     pub alpha: f64,
-    /// Passes with a smaller share of the time of all passes (0..1) may hide a slowdown.
+    /// Passes whose share of the time of all passes (0..1) is below this may hide a slowdown without failing the comparison.
     pub minor: f64,
-    /// Compare even if the profiles ran different work.
+    /// True: compare even if the profiles ran different work.
     pub force: bool,
 }
 
@@ -49,7 +49,7 @@ impl Default for CompareOptions {
     }
 }
 
-/// The reason why two profiles cannot be compared.
+/// Why two profiles cannot be compared.
 #[derive(Debug, thiserror::Error)]
 pub enum CompareError {
     #[error("{which} profile: {fault}")]
@@ -76,67 +76,67 @@ pub enum Verdict {
     NotComparable,
 }
 
-/// The kind of times of a line.
+/// What a line's times are of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
     Pass,
-    /// A span of the host. It is reported, but never a regression: such spans are short and part of the wall time.
+    /// A span of the host. It is reported, but is never a regression: such spans are short and part of the wall time.
     Host,
-    /// Time from submission until the device is idle.
+    /// Wall time from submission until the device is idle.
     Wall,
-    /// CPU time of all threads over the same interval.
+    /// CPU time of all threads from submission until the device is idle.
     Cpu,
 }
 
-/// Ratio of the new time to the old one. Below 1 is faster.
+/// Ratio of the new times to the old ones; below 1 is faster.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Ratio {
     pub estimate: f64,
-    /// Confidence interval of this line alone, not corrected for the other lines.
+    /// Confidence interval of the ratio (`low`, `high`), of this line alone and not corrected for the other lines.
     pub low: f64,
     pub high: f64,
     pub coverage: f64,
-    /// Uncorrected p value.
+    /// p value of the test, not corrected for the other lines.
     pub p: f64,
-    /// p value corrected by Holm over all lines.
+    /// p value after Holm's correction over all lines.
     pub p_holm: f64,
-    /// Noise floor as a ratio, at least 1. A smaller difference is noise.
+    /// Noise floor as a ratio, at least 1: a difference below it is noise.
     pub floor: f64,
 }
 
-/// Comparison of one pass, host span or wall time.
+/// The comparison of one pass, host span, or of the wall or CPU time.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Line {
     pub name: String,
     pub stage: String,
     pub kind: Kind,
     pub verdict: Verdict,
-    /// Median of the old run, ns.
+    /// Median of the old profile, ns. None if it lacks the line.
     pub old_ns: Option<f64>,
-    /// Median of the new run, ns.
+    /// Median of the new profile, ns. None if it lacks the line.
     pub new_ns: Option<f64>,
-    /// None if there was nothing to compare.
+    /// How the times differ. None if there was nothing to compare.
     pub ratio: Option<Ratio>,
-    /// The reason why the line is not comparable, or another remark.
+    /// Why the line is not comparable, or another remark.
     pub note: Option<String>,
     /// True if the line is slower by more than the threshold.
     pub is_regression: bool,
-    /// The smallest slowdown, as a ratio, that would have been reported as slower with this noise. None if none would.
+    /// The smallest slowdown, as a ratio, that would have been detected with this noise. None if no slowdown would.
     pub limit: Option<f64>,
     /// True if a slowdown by more than the threshold may have been overlooked.
     pub is_unseen: bool,
-    /// True if a slowdown may be overlooked, because the pass takes little time.
+    /// True if a slowdown may be overlooked because the pass takes little time (`CompareOptions::minor`).
     pub is_minor: bool,
 }
 
-/// Comparison of two profiles.
+/// The comparison of two profiles.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Comparison {
     pub format: &'static str,
-    /// Description of the compared times.
+    /// Which times are compared, for the reader.
     pub time: &'static str,
-    /// Description of the statistical test.
+    /// The statistical test that was used, for the reader.
     pub test: String,
     pub threshold: f64,
     pub notes: Vec<String>,
@@ -149,8 +149,8 @@ impl Comparison {
         self.lines.iter().filter(|l| l.is_regression)
     }
 
-    /// The reason why a slowdown by more than the threshold cannot be excluded, in one line: the smallest slowdown that would have been
-    /// detected, and the lines in which even a larger one would not have been. None if all would.
+    /// Why a slowdown by more than the threshold cannot be excluded, in one line: the smallest slowdown that would have been detected, and the lines
+    /// in which even a larger one would not. None if every such slowdown would have been detected.
     pub fn cannot_tell(&self) -> Option<String> {
         let (worst, named) = hidden(self.lines.iter().filter(|line| line.is_unseen && !line.is_minor))?;
         Some(format!("cannot tell {worst}: {named}"))
@@ -199,18 +199,18 @@ pub fn compare(old: &Profile, new: &Profile, options: &CompareOptions) -> Result
     compare_repeats(old, new, options, Repeats::Apart)
 }
 
-/// Compares two runs that were measured alternately, with the n-th repeats of the n-th blocks of both next to each other in time.
+/// Compares two profiles that were measured alternately in blocks: the n-th repeats of the n-th blocks of both were next to each other in time.
 ///
 /// # Errors
-/// As of [`compare`], or blocks of one run are of different work.
+/// As of [`compare`], or blocks of one profile are of different work.
 pub fn in_turn(old: &[Profile], new: &[Profile], options: &CompareOptions) -> Result<Comparison, CompareError> {
     let [old, new] = [("old", old), ("new", new)]
         .map(|(which, blocks)| blocks_as_repeats(blocks, old).map_err(|fault| CompareError::Profile { which, fault }));
     compare_repeats(&old?, &new?, options, Repeats::InTurn)
 }
 
-/// The number of blocks of each run that [`in_turn`] needs to detect differences of so many passes, plus two that may disagree. It is even,
-/// so that each run is first equally often.
+/// The number of blocks of each profile that [`in_turn`] needs to detect differences of `passes` passes, plus two that may disagree. It is even, so
+/// that each profile goes first equally often.
 pub fn blocks_in_turn(passes: usize, alpha: f64) -> usize {
     let lines = passes as f64 + 1.0;
     (10..100).step_by(2).find(|n| min_signed_p(n - 2) * lines <= alpha).unwrap_or(100)
@@ -318,7 +318,7 @@ fn counts_cpu(profile: &Profile) -> bool {
     profile.device.is_software && !profile.cpu_ns.is_empty() && profile.passes.iter().all(has)
 }
 
-/// Times of one line in one run.
+/// The times of one line in one profile, one for each repeat.
 #[derive(Clone, Copy)]
 pub struct Series<'a> {
     pub stage: &'a str,
@@ -326,7 +326,7 @@ pub struct Series<'a> {
     pub times: &'a [f64],
 }
 
-/// Times of one line in both runs; None where a run lacks it.
+/// The times of one line in both profiles; None where a profile lacks it.
 pub struct Pair<'a> {
     pub kind: Kind,
     pub name: &'a str,
@@ -428,17 +428,17 @@ const MIN_BLOCKS: usize = 6;
 /// Minimum number of passes in which a common shift is looked for.
 const MIN_COMMON: usize = 3;
 
-/// The minimum number of blocks per run with which the test can report any difference among `lines` lines.
+/// The smallest number of blocks per profile with which the test can report any difference among `lines` lines.
 pub fn blocks_needed(lines: usize, alpha: f64) -> usize {
     (MIN_BLOCKS..100).find(|b| min_p(*b) * lines as f64 <= alpha).unwrap_or(100)
 }
 
-/// The method by which two series are compared.
+/// By which method two series of times are compared.
 #[derive(Clone, Copy)]
 pub enum Method {
-    /// By the medians of `blocks` blocks of each series.
+    /// By the medians of `blocks` consecutive blocks of each series.
     Apart { blocks: usize },
-    /// Time by time, for runs that were measured alternately.
+    /// Pair by pair, for series that were measured alternately.
     InTurn,
 }
 
@@ -520,7 +520,10 @@ fn typical_range(passes: &[&BlockTest]) -> f64 {
     middle.map_or(0.0, |(range, _)| *range)
 }
 
-/// Compares all pairs. `tick`: resolution of the device's clock, ns.
+/// Compares all pairs, and returns a line for each. `tick`: resolution of the device's clock, ns.
+///
+/// # Errors
+/// Times that are no sample.
 pub fn judge(pairs: Vec<Pair>, method: Method, tick: f64, options: &CompareOptions) -> Result<Vec<Line>, SampleError> {
     let both = pairs.iter().filter(|pair| pair.old.is_some() && pair.new.is_some()).count();
     let alpha = options.alpha / both.max(1) as f64;
@@ -609,7 +612,7 @@ fn line(pair: Pair, ratio: Option<(Ratio, f64)>, fault: Option<String>, options:
     }
 }
 
-/// A note if all passes changed by a similar factor, which suggests a change of the clock rather than of a pass.
+/// A note if all passes changed by a similar factor, which suggests that the device's clock rate changed and not a pass. None otherwise.
 pub fn common_shift(lines: &[Line]) -> Option<String> {
     let passes: Vec<Ratio> = lines.iter().filter(|l| l.kind == Kind::Pass).filter_map(|l| l.ratio).collect();
     let logs: Vec<f64> = passes.iter().map(|r| r.estimate.ln()).collect();

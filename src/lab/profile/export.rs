@@ -9,8 +9,8 @@ use crate::text::csv_field;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 
-/// A profile as CSV: one line for each pass, then the host spans, `device` (first begin to last end), `wall` and `cpu` (of the process, if
-/// the system reports it). Without time stamps the time columns of passes are empty.
+/// A profile as CSV: a line for each pass, then the host spans, `device` (from the begin of the first pass to the end of the last), `wall`, and `cpu`
+/// (of the process, if the system reports it). Without time stamps the time columns of passes are empty.
 pub fn csv(profile: &Profile) -> String {
     let mut text = String::from(
         "kind,stage,name,runs_per_picture,repeats,min_ns,p5_ns,median_ns,p95_ns,max_ns,mad_ns,ci_low_ns,ci_high_ns,\
@@ -45,7 +45,7 @@ pub fn csv(profile: &Profile) -> String {
     text
 }
 
-/// All samples as CSV: one line per repeat of every pass and span.
+/// All times of a profile as CSV: a line for each repeat of every pass and span.
 pub fn csv_samples(profile: &Profile) -> String {
     let mut text = String::from("kind,stage,name,repeat,ns\n");
     let lists = [("pass", &profile.passes), ("host", &profile.host)];
@@ -88,7 +88,7 @@ fn optional(value: Option<f64>) -> String {
 /// Ratio of the medians of the halves of a run above which a pass is reported as not steady.
 const MAX_DRIFT: f64 = 1.05;
 
-/// Rows as text, columns as wide as their widest cell: the first `left` columns left-aligned, the others right-aligned.
+/// A table as text, each column as wide as its widest cell: the first `left` columns are left-aligned, the others right-aligned.
 pub(super) fn aligned(rows: &[Vec<String>], left: usize) -> String {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let width = |c: usize| rows.iter().filter_map(|r| r.get(c)).map(|cell| cell.chars().count()).max().unwrap_or(0);
@@ -352,14 +352,14 @@ fn comparison_row(line: &Line) -> Vec<String> {
     row
 }
 
-/// The processor on which a span ran, and whose clock timed it.
+/// On which processor a span ran; its clock timed the span.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Track {
     Device,
     Host,
 }
 
-/// A timed span, in ns since the run began.
+/// A timed span; `begin` and `end` in ns since the run began.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Span {
     pub name: String,
@@ -370,7 +370,7 @@ pub struct Span {
     pub end_ns: f64,
 }
 
-/// The reason why a trace cannot be written.
+/// Why a trace cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub enum TraceError {
     #[error("span {name:?} of repeat {repeat}: from {begin_ns} to {end_ns} ns is not an interval of time")]
@@ -382,11 +382,11 @@ pub enum TraceError {
 /// Maximum time that the numbers of the format resolve to the nanosecond: 2^53 ns, 104 days.
 const MAX_NS: f64 = 9_007_199_254_740_992.0;
 
-/// Writes spans as a Chrome trace, both tracks on one time axis. Host spans may nest; other overlapping spans get threads of their own, so
-/// that no viewer drops them. Without calibration the device's spans are consistent only among themselves, and the trace states that.
+/// Spans as a Chrome trace, those of host and device on one time axis. Host spans may nest; other overlapping spans get threads of their own, so that
+/// no viewer drops them. Without calibration the device's spans are consistent only among themselves, and the trace states that.
 ///
 /// # Errors
-/// A span that ends before it begins, or is not finite.
+/// A span ends before it begins, or is not finite.
 pub fn chrome_trace(profile: &Profile, spans: &[Span]) -> Result<String, TraceError> {
     for span in spans {
         let fits = |ns: f64| ns.is_finite() && ns.abs() < MAX_NS;

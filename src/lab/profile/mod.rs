@@ -12,50 +12,50 @@ use crate::machine::Device;
 use serde::{Deserialize, Serialize};
 use statistics::Sample;
 
-/// Target coverage of confidence intervals.
+/// Requested coverage of confidence intervals.
 pub const LEVEL: f64 = 0.95;
 
-/// One run of `echolume profile`. Lists of times have one entry per repeat, in the order measured, in ns.
+/// The result of one run of `echolume profile`. Lists of times are in ns, with one entry per repeat in the order in which they were measured.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Profile {
-    /// [`Stored::FORMAT`].
+    /// The name of the file format: [`Stored::FORMAT`].
     pub format: String,
     /// Name, version and build of the program.
     pub program: String,
-    /// Time of the run, RFC 3339.
+    /// When it was measured, RFC 3339.
     pub date: String,
     pub device: Device,
-    /// All settings, resolved, as TOML.
+    /// All settings as TOML, with defaults filled in.
     pub scene: String,
-    /// [`settings_hash`] of `scene`.
+    /// Fingerprint of `scene`: [`settings_hash`].
     pub settings_hash: String,
     /// Description of the input.
     pub input: String,
     pub sizes: Sizes,
-    /// Time to acquire the volume. None for volumes that no probe swept.
+    /// The least time to acquire the volume. None if no probe swept it.
     pub acquisition: Option<Acquisition>,
-    /// Number of measured pictures.
+    /// Number of measured repeats, each of which renders one picture.
     pub repeats: usize,
-    /// Number of pictures that are rendered first and not measured.
+    /// Number of repeats that are run first and not measured.
     pub warm_up: usize,
     /// Rotation of the view from each repeat to the next, deg.
     #[serde(default)]
     pub turn: f64,
-    /// The passes in running order.
+    /// The times of the passes, in running order.
     pub passes: Vec<PassProfile>,
-    /// Spans of the host: submit, upload, wait, total. They may nest, so they do not add up.
+    /// The times of host spans: submit, upload, wait, total. They may nest, so they do not add up.
     pub host: Vec<PassProfile>,
-    /// Time from submission until the device is idle again, by the host's clock.
+    /// Wall time from submission until the device is idle again, by the host's clock.
     pub wall_ns: Vec<f64>,
-    /// CPU time of the process over the same interval, all threads, user and system. On a software device this is the cost of the work,
-    /// independent of other load. Empty if the system does not report it.
+    /// CPU time of the process over the same intervals, all threads, user and system. On a software device it is the cost of the work, independent of
+    /// other load. Empty if the system does not report it.
     #[serde(default)]
     pub cpu_ns: Vec<f64>,
-    /// Time from the begin of the first pass to the end of the last, by the device's clock. Empty without time stamps.
+    /// Time from the begin of the first pass to the end of the last one, by the device's clock. Empty without time stamps.
     pub device_ns: Vec<f64>,
     pub ceilings: Option<Ceilings>,
-    /// Description of how the volume is sampled and texels are read.
+    /// How the volume is sampled and how texels are read, for the reader.
     #[serde(default)]
     pub sampling: Option<String>,
     /// Largest error of the position of device spans on the host's clock, ns. None if the device's clock cannot be read.
@@ -63,63 +63,63 @@ pub struct Profile {
     pub clock_deviation_ns: Option<u64>,
 }
 
-/// Sizes of the processed data.
+/// Sizes of the data that is processed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sizes {
-    /// Samples per line, lines.
+    /// Samples per line, and number of lines.
     pub frame: [u32; 2],
     pub slices: u32,
-    /// Texels.
+    /// Columns, rows and slices of the volume, texels.
     pub volume: [u32; 3],
-    /// Pixels.
+    /// Width and height, pixels.
     pub picture: [u32; 2],
 }
 
-/// Lower bound of the time to acquire a volume.
+/// The least time in which sound can acquire a volume.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Acquisition {
     /// Travel time of sound for all lines of all slices, s.
     pub seconds: f64,
-    /// m/s.
+    /// Speed of sound, m/s.
     pub sound_speed: f64,
 }
 
-/// Times of a pass on the device, or of a span on the host.
+/// Times and work of a pass on the device, or times of a span of the host.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PassProfile {
-    /// Name, unique in its list.
+    /// Name, unique among the passes or the host spans.
     pub name: String,
-    /// Stage of the pass; `host` for host spans.
+    /// Stage of the pass; `host` for a host span.
     pub stage: String,
     /// Number of dispatches in one repeat.
     pub runs_per_picture: u32,
-    /// Sum over all runs of a repeat, ns. Empty without time stamps.
+    /// Time of all runs together, ns, for each repeat. Empty without time stamps.
     pub samples_ns: Vec<f64>,
-    /// CPU time of all threads in a repeat, ns, if the device is the CPU; otherwise empty.
+    /// CPU time of all threads in each repeat, ns, if the device is the CPU; otherwise empty.
     #[serde(default)]
     pub cpu_ns: Vec<f64>,
-    /// Minimum bytes read in a repeat: every texel of every bound slot once.
+    /// Least number of bytes that a repeat reads: every texel of every bound slot once.
     pub bytes_read: u64,
-    /// Bytes that a repeat writes.
+    /// Number of bytes that a repeat writes.
     pub bytes_written: u64,
-    /// Unfiltered texel fetches in a repeat, if they can be counted.
+    /// Number of texel fetches without a filter in a repeat. None if they cannot be counted.
     #[serde(default)]
     pub fetches: Option<u64>,
-    /// Filtered texture samples in a repeat, if they can be counted.
+    /// Number of filtered texture samples in a repeat. None if they cannot be counted.
     #[serde(default)]
     pub filtered: Option<u64>,
-    /// Invocations that a repeat needs, without those that fill up workgroups.
+    /// Number of invocations that a repeat needs, without those that fill up workgroups. None if not known.
     #[serde(default)]
     pub dispatched: Option<u64>,
-    /// Compute shader invocations in a repeat, from pipeline statistics if the device has them.
+    /// Number of compute shader invocations in a repeat by pipeline statistics. None if the device has none.
     #[serde(default)]
     pub invocations: Option<u64>,
 }
 
-/// Peak rate per second that the device reached in a micro-benchmark.
+/// The highest rate, per second, that the device reached in a micro-benchmark.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Ceiling {
@@ -129,37 +129,37 @@ pub struct Ceiling {
     pub high: f64,
 }
 
-/// Roofline ceilings of a device.
+/// The roofline ceilings of a device, each a rate per second.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Ceilings {
-    /// Bytes read plus bytes written: copying one byte counts as two.
+    /// Copying: bytes read plus bytes written, so that a copied byte counts as two.
     pub copy: Ceiling,
-    /// Filtered texture samples.
+    /// Texture samples through the device's filter.
     pub sampling: Ceiling,
     /// Samples that the shader interpolates from eight texels.
     #[serde(default)]
     pub exact: Option<Ceiling>,
-    /// Texel fetches, or storage loads if the device uses those.
+    /// Texel fetches, or loads from storage images if the device uses those.
     pub fetch: Ceiling,
 }
 
-/// The ceiling that a pass is closest to.
+/// The ceiling that a pass comes closest to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Roof {
-    /// Ratio of the achieved rate to the ceiling. Above 1 if caches serve what the micro-benchmark fetched from memory.
+    /// The rate that the pass achieves, divided by the ceiling. Above 1 if caches serve what the micro-benchmark fetched from memory.
     pub share: f64,
-    /// "copy", "sampling" or "fetch".
+    /// Which ceiling: "copy", "sampling" or "fetch".
     pub bound: &'static str,
 }
 
 impl PassProfile {
-    /// The times as a sample; None without times.
+    /// The times as a sample. None without times.
     pub fn sample(&self) -> Option<Sample> {
         Sample::new(&self.samples_ns).ok()
     }
 
-    /// Minimum bytes read and written in a repeat.
+    /// Least number of bytes that a repeat reads and writes.
     pub fn bytes(&self) -> u64 {
         self.bytes_read + self.bytes_written
     }
@@ -170,12 +170,13 @@ impl PassProfile {
         (median > 0.0 && count > 0).then(|| count as f64 / median * 1e9)
     }
 
-    /// Minimum memory traffic per second, by the median time.
+    /// Least memory traffic, bytes per second, by the median time. None without times.
     pub fn bytes_per_second(&self) -> Option<f64> {
         self.rate(self.bytes())
     }
 
-    /// The closest ceiling (S. Williams, A. Waterman and D. Patterson, Roofline, 2009, with measured ceilings).
+    /// The ceiling that the pass comes closest to (S. Williams, A. Waterman and D. Patterson, Roofline, 2009, with measured ceilings). None without
+    /// times.
     pub fn roof(&self, ceilings: &Ceilings) -> Option<Roof> {
         let rates = [
             ("copy", self.bytes(), ceilings.copy),
@@ -204,7 +205,7 @@ impl Profile {
         (0..self.repeats).map(|i| self.passes.iter().filter_map(|p| p.samples_ns.get(i)).sum()).collect()
     }
 
-    /// Idle time between passes, ns, one entry per repeat: the span of the device minus the passes. Negative if passes overlap.
+    /// Idle time between passes, ns, for each repeat: the time of the device minus that of the passes. Negative if passes overlap.
     pub fn idle_ns(&self) -> Vec<f64> {
         self.device_ns.iter().zip(self.pass_sums()).map(|(span, passes)| span - passes).collect()
     }
@@ -272,7 +273,7 @@ impl Stored for Profile {
     }
 }
 
-/// Fingerprint of settings: 64-bit FNV-1a of their TOML, in hexadecimal. Not cryptographic.
+/// Fingerprint of settings: the 64-bit FNV-1a hash of their TOML, in hexadecimal. Not cryptographic.
 pub fn settings_hash(scene: &str) -> String {
     let hash =
         scene.bytes().fold(0xcbf2_9ce4_8422_2325, |h: u64, b| (h ^ u64::from(b)).wrapping_mul(0x0000_0100_0000_01b3));

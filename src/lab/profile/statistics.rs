@@ -3,7 +3,7 @@
 
 use crate::statistics;
 
-/// The reason why values are not a sample: there are none, or one is not finite.
+/// Why a list of numbers is no sample.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SampleError {
     #[error("there are no samples")]
@@ -16,24 +16,26 @@ pub enum SampleError {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sample(Vec<f64>);
 
-/// Confidence interval of a median (or a shift), and its coverage.
+/// Confidence interval of a median (or of a shift), and its coverage.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
     pub low: f64,
     pub high: f64,
-    /// Probability, 0..1, that the interval covers the true value. Exact for independent draws from one continuous distribution;
-    /// too high if neighbours are correlated.
+    /// Probability, 0..1, that the interval contains the true value. Exact for independent draws from one continuous distribution; too high if
+    /// neighbours are correlated.
     pub coverage: f64,
 }
 
 impl Interval {
-    /// False if there are too few samples for the requested coverage.
+    /// True if the coverage is at least `level` (0..1). False if there are too few samples for that.
     pub fn reaches(&self, level: f64) -> bool {
         self.coverage >= level
     }
 }
 
 impl Sample {
+    /// Sorts the values.
+    ///
     /// # Errors
     /// There is no value, or one is not finite.
     pub fn new(values: &[f64]) -> Result<Sample, SampleError> {
@@ -64,7 +66,7 @@ impl Sample {
         self.0[self.0.len() - 1]
     }
 
-    /// As [`statistics::quantile`], but never None, because a sample has values.
+    /// The quantile at `share` (0..1), as [`statistics::quantile`], but never None, because a sample has values.
     pub fn quantile(&self, share: f64) -> f64 {
         statistics::quantile(&self.0, share).unwrap_or(f64::NAN)
     }
@@ -103,8 +105,8 @@ impl Sample {
     }
 }
 
-/// Ratio of the median of the second half of a series to that of the first; 1 is steady. None if a half is empty or its median is
-/// not positive. The middle sample of an odd number belongs to neither half.
+/// Drift of a series: the median of its second half divided by that of the first; 1 is steady. None if a half is empty or its median is not positive.
+/// The middle value of an odd number belongs to neither half.
 ///
 /// # Errors
 /// The series is no sample.
@@ -118,8 +120,8 @@ pub fn drift(series: &[f64]) -> Result<Option<f64>, SampleError> {
     Ok((first.median() > 0.0 && ratio > 0.0).then_some(ratio))
 }
 
-/// Medians of `count` consecutive blocks of a series, of nearly equal length. Neighbouring times are correlated; block medians
-/// are far less so, and robust against outliers. None if there are fewer samples than blocks.
+/// Medians of `count` consecutive blocks of a series, of nearly equal lengths. Neighbouring times are correlated; block medians are far less so, and
+/// robust against outliers. None if there are fewer values than blocks.
 ///
 /// # Errors
 /// A value is not finite.
@@ -136,18 +138,18 @@ pub fn block_medians(series: &[f64], count: usize) -> Result<Option<Vec<f64>>, S
 /// approximation is accurate enough.
 const MAX_EXACT: usize = 60;
 
-/// The Mann-Whitney test, two-sided.
+/// The result of a two-sided Mann-Whitney test.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MannWhitney {
-    /// Number of pairs in which the value of the first sample is larger. Ties count half.
+    /// U: the number of pairs of a value of each sample in which that of the first sample is larger. Ties count half.
     pub u: f64,
-    /// Probability of a U at least as extreme if both samples are from one distribution.
+    /// p value: the probability of a U at least as extreme if both samples are from one distribution.
     pub p: f64,
-    /// True if p is from the exact distribution, not from the normal approximation.
+    /// True if `p` is from the exact distribution, false if from the normal approximation.
     pub is_exact: bool,
 }
 
-/// Shift of the second sample relative to the first.
+/// An estimate of the shift of the second sample relative to the first, with a confidence interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shift {
     pub estimate: f64,
@@ -211,14 +213,14 @@ fn rank_sums(ranks: &[usize], chosen: usize) -> Vec<f64> {
     counts.swap_remove(chosen)
 }
 
-/// Minimum p value of two samples of `n` each: 2 / C(2n, n).
+/// Smallest p value that the Mann-Whitney test can have for two samples of `n` values each: 2 / C(2n, n).
 pub fn min_p(n: usize) -> f64 {
     2.0 / (1..=n).map(|i| (n + i) as f64 / i as f64).product::<f64>()
 }
 
-/// The shift between two samples: the median of all differences b - a (J. L. Hodges and E. L. Lehmann, Estimates of location based on rank
-/// tests, 1963). The interval holds every shift that the Mann-Whitney test would not reject; `coverage` is below `level` if there are too
-/// few samples. Memory: n * m values.
+/// Estimates the shift between two samples: the median of all differences b - a (J. L. Hodges and E. L. Lehmann, Estimates of location based on rank
+/// tests, 1963). The interval holds every shift that the Mann-Whitney test would not reject; `coverage` is below `level` if there are too few
+/// samples. Memory: n * m values.
 ///
 /// # Errors
 /// `a` or `b` is no sample.
@@ -273,9 +275,8 @@ fn all_rank_sums(ranks: &[usize]) -> Vec<f64> {
     counts
 }
 
-/// The two-sided signed-rank test (F. Wilcoxon, Individual comparisons by ranking methods, 1945): the probability of rank sums at least as
-/// extreme if differences of pairs lie symmetrically about 0. It uses the exact distribution of the midranks. Differences of 0 are left
-/// out.
+/// p value of the two-sided signed-rank test (F. Wilcoxon, Individual comparisons by ranking methods, 1945): the probability of rank sums at least as
+/// extreme if the differences of pairs lie symmetrically about 0. It uses the exact distribution of the midranks. Differences of 0 are left out.
 ///
 /// # Errors
 /// `differences` is no sample.
@@ -293,13 +294,14 @@ pub fn signed_rank(differences: &[f64]) -> Result<f64, SampleError> {
     Ok((2.0 * tail / counts.iter().sum::<f64>()).min(1.0))
 }
 
-/// Minimum p value of [`signed_rank`] of `n` pairs.
+/// Smallest p value that [`signed_rank`] can return for `n` pairs.
 pub fn min_signed_p(n: usize) -> f64 {
     2.0 * 0.5f64.powi(n as i32)
 }
 
-/// The shift of paired samples: the median of the means of all two differences, each also with itself (Hodges and Lehmann, 1963). The
-/// interval holds every shift that [`signed_rank`] would not reject; `coverage` is below `level` if there are too few pairs.
+/// Estimates the shift of paired samples from the differences of the pairs: the median of the means of every two differences, each also with itself
+/// (Hodges and Lehmann, 1963). The interval holds every shift that [`signed_rank`] would not reject; `coverage` is below `level` if there are too few
+/// pairs.
 ///
 /// # Errors
 /// `differences` is no sample.
@@ -323,8 +325,8 @@ pub fn paired_shift(differences: &[f64], level: f64) -> Result<Shift, SampleErro
     Ok(Shift { estimate: means.median(), low, high, coverage: (1.0 - 2.0 * tail).max(0.0) })
 }
 
-/// Holm's correction (S. Holm, A simple sequentially rejective multiple test procedure, 1979): adjusted p values, in the given order.
-/// Rejecting those up to alpha gives a family-wise error rate of at most alpha, whatever their dependence.
+/// Adjusted p values by Holm's correction (S. Holm, A simple sequentially rejective multiple test procedure, 1979), in the given order. Rejecting
+/// those up to alpha gives a family-wise error rate of at most alpha, whatever the dependence of the tests.
 pub fn holm(p: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..p.len()).collect();
     order.sort_by(|i, j| p[*i].total_cmp(&p[*j]));

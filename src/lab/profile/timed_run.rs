@@ -17,21 +17,21 @@ use std::time::Instant;
 
 #[derive(Clone, Debug)]
 pub struct ProfileOptions {
-    /// Number of measured pictures.
+    /// Number of measured repeats, each of which renders one picture.
     pub repeats: usize,
-    /// Number of pictures that are rendered first and not measured.
+    /// Number of repeats that are run first and not measured.
     pub warm_up: usize,
-    /// Runs the frames through stage 1 once, so that only the later stages are measured.
+    /// True: the frames go through stage 1 only once, so that only the later stages are measured.
     pub still: bool,
-    /// Rotation of the view before each repeat, warm-up included, deg.
+    /// Rotation of the view before each repeat, also those of the warm-up, deg.
     pub angle_step: f64,
-    /// Description of the input.
+    /// Description of the input, for the profile.
     pub input: String,
-    /// Also measure the roofline ceilings of the device.
+    /// True: the roofline ceilings of the device are measured as well.
     pub ceilings: bool,
 }
 
-/// A profile in progress: each call of [`ProfileRun::repeat`] renders the scene once. Two runs can be interleaved, so that other load on
+/// A profile that is being measured: each call of [`ProfileRun::repeat`] runs the scene once. Calls of two runs can alternate, so that other load on
 /// the machine affects both alike.
 pub struct ProfileRun {
     context: Arc<Context>,
@@ -45,7 +45,7 @@ pub struct ProfileRun {
     ceilings: Option<Ceilings>,
 }
 
-/// Profiles a scene. Returns the profile, and the spans of all repeats on one clock.
+/// Profiles a scene. Returns the profile, and the spans of host and device of all repeats, in ns since the run began.
 ///
 /// # Errors
 /// The device cannot hold the scene, or fails.
@@ -63,6 +63,8 @@ pub fn run(
 }
 
 impl ProfileRun {
+    /// Makes the renderer; no repeat has run yet.
+    ///
     /// # Errors
     /// The device cannot hold the scene, or fails.
     pub fn new(context: &Arc<Context>, scene: &Scene, options: &ProfileOptions) -> Result<ProfileRun, GpuError> {
@@ -99,12 +101,12 @@ impl ProfileRun {
         })
     }
 
-    /// True until all warm-up and measured repeats have run.
+    /// True until all repeats, warm-up included, have run.
     pub fn needs_more(&self) -> bool {
         self.done < self.options.warm_up + self.options.repeats
     }
 
-    /// Renders the volume once more and records its times, unless it is a warm-up.
+    /// Runs the scene once, and records its times unless it is part of the warm-up.
     ///
     /// # Errors
     /// The device fails.
@@ -369,7 +371,7 @@ fn fetches(pass: &Pass, scene: &Scene, step: &Step) -> Option<u64> {
 /// Repeats of each ceiling loop; the median is reported.
 const CEILING_REPEATS: u32 = 15;
 
-/// Measures the device's roofline ceilings with the loops of [`crate::passes::device_limits`]; None if it has no time stamps.
+/// Measures the device's roofline ceilings with the passes of [`crate::passes::device_limits`]. None if it has no time stamps.
 ///
 /// # Errors
 /// The device cannot hold a volume of 128^3 and pictures of 2048^2, or fails.

@@ -45,7 +45,7 @@ fn csv_row(report: &Report, table: &Table, row: &Row, usual: bool) -> String {
     fields.join(",") + "\n"
 }
 
-/// Tables 7-9 as CSV, one line for each picture, sigma, starting window and step of growth. Shares are in 0..1.
+/// Tables 7-9 as CSV, one line for each picture, sigma, starting window and number of pixels that the window's edge grew. Shares are 0..1.
 pub fn growth_csv(grown: &[Grown]) -> String {
     let mut text = String::from("picture,centre,sigma,window,largest,grew,share\n");
     for picture in grown {

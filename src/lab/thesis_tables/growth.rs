@@ -10,24 +10,24 @@ use crate::source::StoredType;
 use std::fmt::Write as _;
 use std::sync::Arc;
 
-/// Starting and largest windows of Tables 7-9, pixels, up to the last columns of the tables: 7x7 reaches 19 in Tables 7 and 9, and 21 in
-/// Table 8.
+/// Starting and largest windows of Tables 7-9, pixels, up to the last columns of the tables: a window of 7x7 grows to 19 in Tables 7 and 9, and to 21
+/// in Table 8.
 pub const WINDOWS: [[u32; 2]; 7] = [[3, 17], [5, 19], [7, 19], [7, 21], [9, 21], [11, 21], [13, 23]];
-/// Estimators of the centre: the thesis ties Fig. 48, and so Table 7, to the median (5.7), and planes to Perona-Malik (5.7). Tables 8 and 9
-/// do not say.
+/// Estimators of the centre for which growth is measured: the thesis ties Fig. 48, and so Table 7, to the median (5.7), and planes to Perona-Malik
+/// (5.7). Tables 8 and 9 do not say.
 pub const CENTRES: [Estimator; 2] = [Estimator::Median, Estimator::PeronaMalik];
 
-/// Shares of the thesis, percent: table, starting window, and the pixels whose window grew by +0, +2 and +4.
+/// Values of the thesis: name of the table, starting window in pixels, and per cent of the pixels whose window's edge grew by 0, 2 and 4 pixels.
 pub(crate) const THESIS: [(&str, u32, [f64; 3]); 4] = [
     ("Table 7 (Fig. 48)", 3, [79.30, 20.51, 0.04]),
     ("Table 7 (Fig. 48)", 7, [37.02, 57.88, 2.20]),
     ("Table 9 (liver, Fig. 50)", 3, [77.95, 21.83, 0.20]),
     ("Table 9 (liver, Fig. 50)", 7, [41.51, 50.11, 4.91]),
 ];
-/// Standard deviations of the noise for which the thesis measures, 0..1.
+/// Standard deviations of the noise for which the thesis measures growth, 0..1.
 pub const SIGMAS: [f64; 3] = [0.03, 0.1, 0.17];
 
-/// Growth of the windows on one picture.
+/// How far the windows of the enhanced sigma filter grew on one picture, with one setting.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Growth {
     pub centre: Estimator,
@@ -39,7 +39,7 @@ pub struct Growth {
 }
 
 impl Growth {
-    /// `rings`: for each pixel the number of rings by which its window grew.
+    /// Counts the pixels. `rings`: for each pixel the number of rings by which its window grew.
     pub fn new(centre: Estimator, sigma: f64, windows: [u32; 2], rings: &[f64]) -> Growth {
         let max_rings = (windows[1] - windows[0]) / 2;
         let mut counts = vec![0; max_rings as usize + 1];
@@ -49,7 +49,7 @@ impl Growth {
         Growth { centre, sigma, windows, counts }
     }
 
-    /// Share of the pixels, 0..1, whose window grew by exactly so many rings of pixels; None if it cannot grow that far.
+    /// Share (0..1) of the pixels whose window grew by exactly `rings` rings. None if windows cannot grow that far.
     pub fn share(&self, rings: usize) -> Option<f64> {
         let all: u64 = self.counts.iter().sum();
         self.counts.get(rings).map(|n| *n as f64 / all.max(1) as f64)
@@ -60,7 +60,7 @@ fn columns(rows: &[Growth]) -> usize {
     rows.iter().map(|r| r.counts.len()).max().unwrap_or(0)
 }
 
-/// A table for a terminal, one line per starting window, in percent.
+/// A table of text, one line per starting window, in per cent.
 pub fn table(rows: &[Growth]) -> String {
     let mut text = format!("{:<11} {:>6} {:>7} {:>7}", "centre", "sigma", "window", "largest");
     for n in 0..columns(rows) {
@@ -95,7 +95,7 @@ pub fn csv(rows: &[Growth]) -> String {
     text
 }
 
-/// The growth of the windows of the enhanced sigma filter on one picture (Tables 7-9).
+/// How far the windows of the enhanced sigma filter grew on one picture, with all settings of Tables 7-9.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grown {
     /// Name of the picture.
@@ -103,10 +103,10 @@ pub struct Grown {
     pub rows: Vec<Growth>,
 }
 
-/// One row to measure: centre, sigma, starting and largest window, and its settings.
+/// What one row is measured with: estimator of the centre, sigma, starting and largest window in pixels, and all settings.
 pub type GrowthSettings = (Estimator, f64, [u32; 2], Settings);
 
-/// The reason why growth cannot be measured.
+/// Why growth cannot be measured.
 #[derive(Debug, thiserror::Error)]
 pub enum GrowthError {
     #[error("{0}")]
@@ -115,7 +115,7 @@ pub enum GrowthError {
     Gpu(#[from] GpuError),
 }
 
-/// A picture as a Cartesian volume of one slice.
+/// The scene of a grey picture, as a Cartesian volume of one slice.
 ///
 /// # Errors
 /// The settings are invalid.
@@ -125,7 +125,7 @@ pub fn scene_of(grey: &Grey, settings: Settings) -> Result<Scene, SceneError> {
     Scene::new(Geometry::Cartesian(grid), Input { stored, range: [0.0, grey.white()] }, settings)
 }
 
-/// Filters one picture for every row and returns the growth of its windows.
+/// Filters one picture with the settings of every row, and returns how far its windows grew in each.
 ///
 /// # Errors
 /// A window is out of range, or the device cannot hold the picture.
@@ -148,7 +148,7 @@ pub fn measure(context: &Arc<Context>, grey: &Grey, rows: Vec<GrowthSettings>) -
     Ok(grown)
 }
 
-/// Measures Tables 7-9 on a picture, as `echolume filter --growth-table` does, with both centres.
+/// Measures Tables 7-9 on a picture, with both estimators, as `echolume filter --growth-table` does. `picture`: its name.
 ///
 /// # Errors
 /// A window is out of range, or the device cannot hold the picture.
@@ -160,7 +160,7 @@ pub fn growth(context: &Arc<Context>, picture: &str, grey: &Grey) -> Result<Grow
     Ok(Grown { picture: picture.into(), rows: measure(context, grey, rows)? })
 }
 
-/// The settings of a row of Tables 7-9.
+/// The settings of a row of Tables 7-9, with a starting and a largest window in pixels.
 pub fn growth_settings(centre: Estimator, sigma: f64, [window, largest]: [u32; 2]) -> Settings {
     let mut settings = Settings { mode: Mode::Plane, ..Settings::default() };
     settings.picture.size = [1, 1];

@@ -11,13 +11,14 @@ use crate::profile::Ceiling;
 use crate::profile::statistics::Sample;
 use growth::Grown;
 
-/// Conditions of the thesis (4.5) unless varied. Angle over the scan lines of a frame, deg.
+/// Angle over the scan lines of a frame, deg. This and the following constants are the conditions of the thesis (4.5) where a table does not vary
+/// them.
 pub(crate) const SECTOR_ANGLE: f64 = 77.0;
 /// Angle over the frames of a volume, deg.
 pub(crate) const FAN_ANGLE: f64 = 61.0;
-/// Depth, mm.
+/// Depth of a scan line, mm.
 pub const DEPTH: f64 = 160.0;
-/// Samples per scan line.
+/// Samples of a scan line.
 pub const SAMPLES: usize = 512;
 /// Speed of sound, m/s.
 pub const SOUND_SPEED: f64 = 1540.0;
@@ -26,7 +27,7 @@ const USUAL_MS: f64 = 54.6;
 /// Memory bandwidth of the thesis' GTX 650, GB/s (128 bits at 5 GHz).
 pub(crate) const THESIS_BANDWIDTH: f64 = 80.0;
 
-/// The 3D filter on the samples of the volume, and where it runs.
+/// Where the 3D filter of the thesis runs, and its size.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Filter3d {
     None,
@@ -37,7 +38,7 @@ pub enum Filter3d {
 }
 
 impl Filter3d {
-    /// Name in the tables.
+    /// Name of the filter in the tables.
     pub fn name(self) -> String {
         match self {
             Filter3d::None => "none".into(),
@@ -47,16 +48,16 @@ impl Filter3d {
     }
 }
 
-/// Conditions of one row.
+/// The conditions under which one row of a table is measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Conditions {
-    /// Frames per volume.
+    /// Frames of a volume.
     pub frames: usize,
-    /// Scan lines per frame, of [`SAMPLES`] samples.
+    /// Scan lines of a frame, each of [`SAMPLES`] samples.
     pub lines: usize,
-    /// n of a volume of n^3: slices of n x n pixels, and n samples per ray from the face to the end of the volume.
+    /// n of a volume of n^3: slices of n x n pixels, and n samples of a ray from the face to the end of the volume.
     pub volume: u32,
-    /// Edge of the picture, pixels. It equals that of the volume, unless the picture is held fixed.
+    /// Edge of the square picture, pixels. It equals that of the volume, unless the table keeps the picture's size.
     pub picture: u32,
     pub filter_3d: Filter3d,
     /// Edge of the sigma filter's window, pixels. The filter runs on the distance map, or, if rays are composited, it is the starting
@@ -77,7 +78,7 @@ impl Conditions {
     }
 }
 
-/// Times on the device, ns, one entry per repeat.
+/// GPU times, ns, one entry per repeat.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Times {
     /// Stages 2-4, which the thesis timed.
@@ -86,7 +87,7 @@ pub struct Times {
     pub preprocess: Vec<f64>,
 }
 
-/// Median, minimum and maximum of repeats, ms.
+/// Median, minimum and maximum of a time over the repeats, ms.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spread {
     pub median: f64,
@@ -95,7 +96,7 @@ pub struct Spread {
 }
 
 impl Spread {
-    /// Statistics of times in ns. None without times.
+    /// Statistics of times that are given in ns. None without times.
     pub fn new(ns: &[f64]) -> Option<Spread> {
         let sample = Sample::new(ns).ok()?;
         let [median, min, max] = [sample.median(), sample.min(), sample.max()].map(|ns| ns * 1e-6);
@@ -103,35 +104,35 @@ impl Spread {
     }
 }
 
-/// The value of the thesis for a row.
+/// The time that the thesis states for a row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Thesis {
-    /// Time per rendered volume, ms.
+    /// Time of one rendered volume, ms.
     pub ms: f64,
-    /// True if its table has no such row: the figure is of another one, under the same conditions in Table 6, of the filter along the ray
-    /// in Table 5.
+    /// True if the thesis has no such row in this table, and the time is that of another row: under the same conditions in another table, or, in
+    /// Table 5, of the filter along the ray.
     pub(crate) from_others: bool,
 }
 
-/// A row of a table.
+/// A row of a table: what is measured, and the results.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
-    /// Value of the varied condition.
+    /// Value of the condition that the table varies.
     pub label: String,
     pub conditions: Conditions,
     pub thesis: Thesis,
-    /// Empty until measured, and on a device without time stamps.
+    /// The measured times. Empty before the measurement, and on a device without time stamps.
     pub times: Times,
-    /// None until measured.
+    /// Where rays hit a surface. None before the measurement.
     pub reached: Option<Reached>,
 }
 
-/// One of Tables 3-6, or the usual row by another pipeline.
+/// One of Tables 3-6, or a comparison of two pipelines under the usual conditions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
-    /// Number in the thesis. None for a table that the thesis does not have.
+    /// Number of the table in the thesis. None for the comparison of pipelines, which the thesis does not have.
     pub number: Option<u32>,
-    /// Name of the varied condition.
+    /// Name of the condition that the table varies.
     pub varied: &'static str,
     pub rows: Vec<Row>,
     /// Index of the row with the usual conditions, to which ratios refer.
@@ -139,20 +140,20 @@ pub struct Table {
 }
 
 impl Table {
-    /// Ratio of the median of stages 2-4 to that of the usual row. None if not measured.
+    /// Ratio of the row's median time of stages 2-4 to that of the usual row. None if either was not measured.
     pub fn ratio(&self, row: &Row) -> Option<f64> {
         let usual = Spread::new(&self.rows.get(self.usual)?.times.picture)?;
         let own = Spread::new(&row.times.picture)?;
         (usual.median > 0.0).then(|| own.median / usual.median)
     }
 
-    /// The same ratio of the figures of the thesis.
+    /// Ratio of the row's time to that of the usual row, by the times of the thesis.
     pub(crate) fn thesis_ratio(&self, row: &Row) -> Option<f64> {
         self.rows.get(self.usual).map(|usual| row.thesis.ms / usual.thesis.ms)
     }
 }
 
-/// Tables 3-6, and the usual row by both pipelines, without times. `quick`: see [`Conditions::usual`].
+/// Tables 3-6 and the comparison of pipelines, with rows that are not measured yet. `quick`: see [`Conditions::usual`].
 pub fn tables(quick: bool) -> Vec<Table> {
     let usual = Conditions::usual(quick);
     let table = |number, varied, rows: Vec<(String, Conditions, f64)>| {
@@ -208,12 +209,12 @@ pub fn tables(quick: bool) -> Vec<Table> {
     ]
 }
 
-/// Where the rays of a row hit a surface. It shows whether rows did the same work.
+/// Where the rays of a row hit a surface, which shows whether rows did the same work.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reached {
-    /// Share of the rays that hit a surface, 0..1.
+    /// Share (0..1) of the rays that hit a surface.
     pub share: f64,
-    /// Mean depth of those surfaces below the face, mm; 0 without hits.
+    /// Mean depth of these hits below the probe's face, mm; 0 without hits.
     pub depth: f64,
 }
 
@@ -223,13 +224,13 @@ pub struct Report {
     pub device: Device,
     /// Name, version and build of the program.
     pub program: String,
-    /// Time of the measurement, RFC 3339.
+    /// When it was measured, RFC 3339.
     pub date: String,
     pub quick: bool,
     pub repeats: usize,
     /// Number of volumes that are rendered first and not measured.
     pub warm_up: usize,
-    /// Rate that copying reaches on this device, bytes/s. None without time stamps.
+    /// The rate of copying on this device, bytes/s. None without time stamps.
     pub copy: Option<Ceiling>,
     pub tables: Vec<Table>,
     pub grown: Vec<Grown>,
@@ -246,7 +247,7 @@ impl Report {
 pub mod tests {
     use super::*;
 
-    /// A report without times.
+    /// Test helper: a report whose rows have no times.
     pub fn report() -> Report {
         Report {
             device: Device {
@@ -270,7 +271,7 @@ pub mod tests {
         }
     }
 
-    /// Row n takes 2 (n + 1) ms and in stage 1 ten times as long.
+    /// Test helper: a report whose row n takes 2 (n + 1) ms in stages 2-4, and ten times as long in stage 1.
     pub fn measured() -> Report {
         let mut report = report();
         report.copy = Some(Ceiling { median: 8e9, low: 7e9, high: 9e9 });

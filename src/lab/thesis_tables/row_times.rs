@@ -31,25 +31,25 @@ const PICTURE_SIGMA: f64 = 0.03;
 /// Largest window of a growing one that starts at 9x9 (Tables 7-9), pixels.
 const GROWING_TO: u32 = 21;
 
-/// Options of the measurement of the tables.
+/// How the tables are measured.
 #[derive(Clone, Copy, Debug)]
 pub struct TableOptions {
-    /// Uses smaller volumes: see [`Conditions::usual`].
+    /// True: volumes and pictures are smaller, see [`Conditions::usual`].
     pub quick: bool,
-    /// Number of volumes measured in each row.
+    /// Number of measured volumes for each row.
     pub repeats: usize,
-    /// Number of volumes that are rendered first and not measured.
+    /// Number of volumes for each row that are rendered first and not measured.
     pub warm_up: usize,
 }
 
 impl TableOptions {
-    /// Total number of volumes rendered.
+    /// Number of volumes that are rendered for all rows, those of the warm-up included.
     pub fn volumes(&self) -> usize {
         tables(self.quick).iter().map(|t| t.rows.len()).sum::<usize>() * (self.repeats + self.warm_up)
     }
 }
 
-/// Measures every row; `after_each` is called after every volume.
+/// Measures every row of all tables. `after_each` is called after every rendered volume.
 ///
 /// # Errors
 /// The device cannot hold a scene, or fails.
@@ -190,7 +190,7 @@ const ARRAY_RADIUS: f64 = 40.0;
 /// Radius of the wobble, mm.
 const WOBBLE_RADIUS: f64 = 25.0;
 
-/// Radius of the ball, mm. Its diameter is about that of a fetal head.
+/// Radius of the ball of the test object, mm. Its diameter is about that of a fetal head.
 pub const BALL_RADIUS: f64 = 45.0;
 /// Depth of its centre below the face, mm.
 const BALL_DEPTH: f64 = 100.0;
@@ -222,7 +222,7 @@ fn sweep_probe(frames: usize, lines: usize) -> Probe {
     }
 }
 
-/// Depth below the face of the first surface on a line parallel to the depth axis at (lateral, elevation), mm.
+/// Depth, mm below the probe's face, of the first surface of the test object on a line parallel to the depth axis at (lateral, elevation), mm.
 pub fn surface_depth(lateral: f64, elevation: f64) -> f64 {
     let half_chord_squared = BALL_RADIUS.powi(2) - lateral.powi(2) - elevation.powi(2);
     if half_chord_squared > 0.0 { WALL_DEPTH.min(BALL_DEPTH - half_chord_squared.sqrt()) } else { WALL_DEPTH }
@@ -247,8 +247,8 @@ fn grain(number: u64) -> f64 {
     sum * 3f64.sqrt()
 }
 
-/// The frames of one volume of the tables' test object: a ball in fluid in front of a wall, with a fine grain. Each has `lines` scan lines of
-/// [`SAMPLES`] samples, the samples of a line in a row, as u8 for 0..1. `frames` and `lines` must be at least 2.
+/// The frames of one volume of the tables' test object: a ball in fluid in front of a wall, with a fine grain. Each frame has `lines` scan lines of
+/// [`SAMPLES`] samples, line by line, as u8 for 0..1. `frames` and `lines` must be at least 2.
 pub fn sweep_frames(frames: usize, lines: usize) -> Vec<Frame> {
     let probe = sweep_probe(frames, lines);
     let sample = |slice: usize, line: usize, sample: usize| {

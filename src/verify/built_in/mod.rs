@@ -9,7 +9,7 @@ use crate::scene::{Input, Scene, Settings, VolumeFormat};
 use crate::source::StoredType;
 use glam::DVec3;
 
-/// Specification of a scene.
+/// A scene to build: its name, geometry, input, and settings as TOML.
 #[derive(Clone)]
 pub struct SceneSpec {
     pub name: String,
@@ -187,7 +187,7 @@ fn wide_scenes() -> Vec<SceneSpec> {
     scenes
 }
 
-/// Shared memory with which every pass has the shader that it has on a GPU, bytes.
+/// Shared memory of a workgroup, bytes, with which every pass has the shader that it has on a GPU.
 pub const SHARED_MEMORY: u32 = 32 << 10;
 
 /// Edge of a brick where a scene states none, texels.
@@ -227,7 +227,7 @@ impl Noise {
     }
 }
 
-/// A small abdominal wobbler: 24 lines over 66 deg, 9 frames over 27 deg, 64 samples.
+/// A small abdominal wobbler probe: 24 lines over 66 deg, 9 frames over 27 deg, 64 samples a line.
 pub fn wobbler() -> Probe {
     Probe {
         array: Array::Curved { radius: 20.0 },
@@ -249,7 +249,7 @@ pub fn uneven(mut probe: Probe) -> Probe {
     probe
 }
 
-/// A linear array moved sideways.
+/// A linear array that is moved sideways.
 pub fn linear() -> Probe {
     Probe {
         array: Array::Linear,
@@ -285,14 +285,14 @@ pub fn cartesian(size: [usize; 3]) -> Geometry {
 pub const BYTES: Input = Input { stored: StoredType::U8, range: [0.0, 255.0] };
 pub const FLOATS: Input = Input { stored: StoredType::F32, range: [0.0, 1.0] };
 
-/// Frames of a volume from a function of texel and slice, with the values that their textures return.
+/// The frames of a volume by a function of (column, row, slice) that gives the value, 0..1, that a shader reads there.
 pub fn frames(scene: &Scene, f: impl Fn([usize; 3]) -> f64) -> Vec<Texels> {
     let [width, height] = scene.frame_size().map(|n| n as usize);
     let one = |k| Texels::from_fn([width, height, 1], 1, |[x, y, _], _| f([x, y, k]));
     (0..scene.slices() as usize).map(one).collect()
 }
 
-/// Frames of a volume that shows a body, which is given as a function of position in space, mm.
+/// The frames of a volume that shows a body. `body` gives the value, 0..1, at a position in space, mm.
 pub fn body_frames(scene: &Scene, body: impl Fn(DVec3) -> f64) -> Vec<Texels> {
     let place = |[i, j, k]: [usize; 3]| match &scene.geometry {
         Geometry::Sweep(probe) => probe.to_space(Indices { sample: i as f64, line: j as f64, slice: k as f64 }),
@@ -325,14 +325,14 @@ const MODES: [(&str, &str); 17] = [
     ("pair", "mode = 'sr'\nlayout = 'pair'"),
 ];
 
-/// Every mode once, each with filters of every stage, in one small sweep.
+/// Scenes of a small sweep: every mode once, each with filters of every stage.
 pub fn modes() -> Vec<SceneSpec> {
     let sweep = Geometry::Sweep(wobbler());
     MODES.iter().map(|(name, toml)| SceneSpec::new(name, &sweep, BYTES, format!("{toml}\n{ALL_FILTERS}"))).collect()
 }
 
-/// Frames of a wavy wall between two slightly uneven tissues, which give every mode structure to render and filter. The depth of the wall
-/// depends on the volume `number`.
+/// The frames of a wavy wall between two slightly uneven tissues, which gives every mode structure to render and filter. Volumes of another `number`
+/// have the wall at another depth.
 pub fn wall(scene: &Scene, number: u32) -> Vec<Texels> {
     let shift = 4.0 * f64::from(number);
     body_frames(scene, |p| {

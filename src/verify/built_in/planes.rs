@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// A prism and a cone, and a brush.
+/// Settings with three cuts for tests: a prism, a cone, and a brush.
 pub(super) const TWO_CUTS: &str = "mode = 'vr'
     cuts = [
         { contour = [[-8, -6], [9, -5], [3, 2], [2, 9]], view = { at = [0, 20, 0], direction = [0.2, 1, 0], up = [0, 0, 1] } },

@@ -13,7 +13,7 @@ fn moved(mut probe: Probe, share: f64) -> Probe {
     probe
 }
 
-/// Scenes of rays: every mode that casts them in every geometry, and every filter, light and setting of rays in one.
+/// Scenes that cast rays: every such mode in every geometry, and every filter, light and setting of rays in one geometry.
 pub(super) fn ray_scenes() -> Vec<SceneSpec> {
     let mut scenes = Vec::new();
     let mut add = |name: &str, geometry: &Geometry, input: Input, toml: &str| {

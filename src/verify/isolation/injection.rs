@@ -25,8 +25,8 @@ enum Kind {
     Unsynchronized,
 }
 
-/// A check that must crash: `segv:GROUP / NAME`, or `abort`, `hang`, `exit`, `flake` or `unsynchronized` instead of `segv`. With `start`
-/// instead of a check the process crashes before it opens the device.
+/// A crash to inject into a worker process, as text: `segv:GROUP / NAME` for the check that crashes, or `abort`, `hang`, `exit`, `flake` or
+/// `unsynchronized` instead of `segv`. With `start` instead of a check the process crashes before it opens the device.
 #[derive(Clone, Debug)]
 pub struct InjectedCrash {
     kind: Kind,
@@ -54,12 +54,12 @@ impl FromStr for InjectedCrash {
 }
 
 impl InjectedCrash {
-    /// The text that it was parsed from.
+    /// The text that this was parsed from.
     pub fn text(&self) -> &str {
         &self.text
     }
 
-    /// Crashes, if the crash is requested before the device is opened.
+    /// Crashes the process if the crash is to come before the device is opened.
     pub fn at_start(&self) {
         if self.check == START {
             crash(self.kind);
@@ -67,7 +67,7 @@ impl InjectedCrash {
     }
 
     /// Replaces the work of the named check with the crash, or with the failure that `flake` and `unsynchronized` stand for. Returns false if no
-    /// check has that name. With `start`, which [`InjectedCrash::at_start`] serves, all checks stay and it returns true.
+    /// check has that name. A crash at `start` changes no check, and true is returned ([`InjectedCrash::at_start`]).
     pub fn inject(&self, checks: &mut [Check]) -> bool {
         if self.check == START {
             return true;

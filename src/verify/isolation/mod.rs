@@ -36,12 +36,12 @@ const LINES: usize = 4;
 /// How many workers in a row may fail to start before no more are started.
 const MAX_STARTS: u32 = 3;
 
-/// Returns the first signal that asks this process to end, if any.
+/// A function that returns the name of the first signal that asked this process to end; None so far.
 pub type Signal<'a> = &'a dyn Fn() -> Option<&'static str>;
-/// Prints a line that a worker wrote outside the protocol.
+/// A function that prints a line that a worker wrote outside the protocol.
 pub type Echo = Arc<dyn Fn(&str) + Send + Sync>;
 
-/// Starts workers and assigns checks to them.
+/// Runs checks in worker processes, one at a time; a worker that crashes is replaced.
 pub struct Workers<'a> {
     /// The command of a worker.
     command: &'a dyn Fn() -> Command,
@@ -54,13 +54,13 @@ pub struct Workers<'a> {
 }
 
 impl<'a> Workers<'a> {
-    /// Starts the first worker with `command`, and waits until it has opened the device. `limit` is the time limit of a check; that of this start
-    /// is the same, but at least one minute and at most ten. `signal` is asked during waits and ends them. `echo` gets what a worker prints
-    /// outside the protocol.
+    /// Starts the first worker with `command`, and waits until it has opened the device. `limit` is the time limit of a check, and of this start, for
+    /// which it is at least one minute and at most ten. `signal` is asked during every wait, and ends it. `echo` gets what a worker prints outside
+    /// the protocol.
     ///
     /// # Errors
-    /// The program cannot be started, refuses its arguments, finds no device or does not open it in time, the driver crashes when it is opened, or
-    /// a signal came.
+    /// The program cannot be started, refuses its arguments, finds no device or does not open it in time, the driver crashes when it is opened, or a
+    /// signal came.
     pub fn start(
         command: &'a dyn Fn() -> Command,
         limit: Duration,
@@ -97,7 +97,7 @@ impl<'a> Workers<'a> {
         }
     }
 
-    /// Runs the check at this index of [`Ready::checks`].
+    /// Runs the check with index `place` in [`Ready::checks`] in a worker. `name`: its name, for an outcome if the worker fails.
     pub fn run(&mut self, place: usize, name: &CheckName) -> Outcome {
         let (first, has_crashed) = self.attempt(Request { place, waits: false }, name);
         // What failed without a crash the worker has run again itself.

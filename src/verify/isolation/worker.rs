@@ -23,31 +23,31 @@ const MARK: &str = "echolume-verify-worker: ";
 /// Time for an idle worker to end by itself once nobody asks any more.
 const GRACE: Duration = Duration::from_secs(2);
 
-/// What a worker says.
+/// A message from a worker to the process that started it, on a line of standard output.
 #[derive(Serialize, Deserialize)]
 pub(super) enum Message {
-    /// It begins a Vulkan call, of a shader or a device.
+    /// A Vulkan call begins: name of the call, and of the shader or device that it is for.
     Calls(String, String),
-    /// First: it has a device.
+    /// First message of a worker that has opened its device.
     Ready(Box<Ready>),
-    /// First: it has none. The exit code says why; see [`Failure::exit_code`].
+    /// First message of a worker without a device. `code`: the exit code that says why ([`Failure::exit_code`]).
     Refused { code: u8, message: String },
-    /// A check was run.
+    /// The outcome of a check that was run.
     Done(Box<Done>),
 }
 
-/// The device of a worker, and the checks that it can run.
+/// What a worker says of itself: its device, and the checks that it can run.
 #[derive(Serialize, Deserialize)]
 pub struct Ready {
     pub device: Device,
-    /// The validation layer is active and detects a missing barrier.
+    /// True if the validation layer is active and detects a missing barrier.
     pub validation: bool,
     /// Lines to print before the first check.
     pub lines: Vec<String>,
     pub checks: Vec<CheckName>,
 }
 
-/// An outcome with its pictures, which JSON reports leave out.
+/// An outcome together with its pictures, which the JSON of an outcome leaves out.
 #[derive(Serialize, Deserialize)]
 pub(super) struct Done {
     outcome: Outcome,
@@ -97,7 +97,7 @@ impl Done {
         Done { outcome, pictures }
     }
 
-    /// The outcome as the worker had it.
+    /// The outcome with its pictures.
     pub(super) fn received(self) -> Outcome {
         let received = |sent: SentComparison| {
             let [actual, expected, difference] = sent.pictures.map(SentPicture::received);
@@ -115,7 +115,7 @@ impl Done {
 }
 
 impl Message {
-    /// The call that it names, as a report quotes it.
+    /// The Vulkan call of a message [`Message::Calls`], as reports quote it; None for other messages.
     pub(super) fn call(&self) -> Option<String> {
         match self {
             Message::Calls(call, of) if of.is_empty() => Some(call.clone()),
@@ -124,7 +124,7 @@ impl Message {
         }
     }
 
-    /// The message in a line, if it has the mark.
+    /// Parses the message in a line. None if the line has no message's mark, or is damaged.
     pub(super) fn parse(line: &str) -> Option<Message> {
         let (_, json) = line.split_once(MARK)?;
         serde_json::from_str(json).inspect_err(|fault| tracing::warn!("a message of a worker: {fault}")).ok()
@@ -139,22 +139,25 @@ impl Message {
     }
 }
 
-/// From now on reports each Vulkan call in which this process may crash to the other process.
+/// From now on sends a message before each Vulkan call in which this process may crash.
 pub fn tell_calls() {
     // Nobody listens any more if this fails, and the next answer says so.
     calls::tell(|call, of| drop(Message::Calls(call.into(), of.into()).send()));
 }
 
-/// Reports that there is no device to run checks on.
+/// Sends the message that there is no device to run checks on.
+///
+/// # Errors
+/// One line: standard output is closed.
 pub fn refuse(failure: Failure) -> Result<(), String> {
     let code = failure.exit_code();
     Message::Refused { code, message: failure.message() }.send()
 }
 
-/// Runs the checks that standard input requests until it ends.
+/// Runs the checks that the lines of standard input request, until standard input ends.
 ///
 /// # Errors
-/// One line: standard output is closed.
+/// One line: standard output is closed, or there is no such check.
 pub fn serve(dut: &mut DeviceUnderTest, checks: &[Check], ready: Ready) -> Result<(), String> {
     Message::Ready(Box::new(ready)).send()?;
     let mut group = None;
@@ -166,7 +169,8 @@ pub fn serve(dut: &mut DeviceUnderTest, checks: &[Check], ready: Ready) -> Resul
     Ok(())
 }
 
-/// A line of standard input: the place of a check, and whether the host waits for each of its submissions.
+/// A request to a worker, a line of standard input: the index of a check (`place`), and whether the host waits for each submission before it makes
+/// the next (`waits`).
 pub(super) struct Request {
     pub place: usize,
     pub waits: bool,

@@ -9,12 +9,12 @@ use crate::text::escaped;
 use std::collections::{BTreeMap, HashSet};
 use std::fmt::{Display, Formatter};
 
-/// Severity of a change.
+/// How bad a change is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Class {
-    /// Fails the run: a check that did not fail before, an error that now exceeds its tolerance, or a time beyond the threshold.
+    /// It fails the run: a check fails that did not before, an error now exceeds its tolerance, or a time has grown beyond the threshold.
     Worse,
-    /// Reported, without failing the run.
+    /// It is reported, and does not fail the run.
     Changed,
     Better,
 }
@@ -31,13 +31,13 @@ impl Class {
     }
 }
 
-/// A difference between the runs.
+/// A difference between an outcome and that of the earlier run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Change {
     pub class: Class,
     pub group: String,
     pub name: String,
-    /// One line, the old value before the new one.
+    /// What changed, in one line: the old value before the new one.
     pub what: String,
 }
 
@@ -53,18 +53,18 @@ impl Display for Change {
     }
 }
 
-/// Comparison of a run with an earlier one.
+/// The comparison of a run with an earlier one, the baseline.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BaselineComparison {
     /// Description of the earlier run.
     pub baseline: String,
-    /// Differences of the conditions, one line each, the old value before the new one.
+    /// Differences of the conditions of both runs (device, driver, program and the like), one line each, the old value before the new one.
     pub differences: Vec<String>,
-    /// Items that could not be compared, with the reasons, and other remarks.
+    /// What could not be compared, with the reasons, and other remarks.
     pub notes: Vec<String>,
     /// The changes, the worst first, otherwise in the order of the new run.
     pub changes: Vec<Change>,
-    /// Number of checks without changes.
+    /// Number of checks that did not change.
     pub same: usize,
     /// Number of checks that fail in both runs.
     pub(crate) still_failing: usize,
@@ -82,12 +82,12 @@ impl BaselineComparison {
         worse.map(|c| (&c.group, &c.name)).collect::<HashSet<_>>().len()
     }
 
-    /// Differences of the conditions, then all changes with their checks, the worst first. Empty if nothing changed.
+    /// Lines to print: differences of the conditions, then all changes with their checks, the worst first. Empty if nothing changed.
     pub fn lines(&self) -> Vec<String> {
         self.differences.iter().cloned().chain(self.changes.iter().map(Change::to_string)).collect()
     }
 
-    /// The last line: how many checks are unchanged.
+    /// The last line to print: how many checks are unchanged.
     pub fn conclusion(&self) -> String {
         let first = if self.changes.is_empty() { "nothing changed" } else { "nothing else changed" };
         let failing = match self.still_failing {
@@ -105,8 +105,8 @@ struct Pair<'a> {
     new: &'a Figure,
 }
 
-/// Compares the checks and figures of `new` with those of the same name in `old`. `threshold`: ratio of times above which a slower check
-/// fails the run.
+/// Compares the checks and figures of `new` with those of the same name in `old`. `threshold`: ratio of times from which on a slower check fails the
+/// run.
 pub fn compare(old: &Run, new: &Run, threshold: Threshold) -> BaselineComparison {
     let (mut changes, mut notes, mut pairs) = (Vec::new(), Vec::new(), Vec::new());
     let (mut still_failing, mut only_new, mut gone, mut both) = (0, 0, 0, Vec::new());

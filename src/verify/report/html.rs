@@ -17,8 +17,8 @@ use maud::{Markup, html};
 /// Maximum number of checks of a group that is expanded by default.
 const MAX_OPEN: usize = 40;
 
-/// Writes the complete page. Pictures are embedded up to the limits `MAX_SETS` and [`MAX_BYTES`], those of failures first. The page
-/// states how many are omitted.
+/// The report as a complete HTML page. Pictures are embedded up to the limits `MAX_SETS` and [`MAX_BYTES`], those of failures first. The page states
+/// how many are omitted. `compared`: the comparison with a baseline, if there is one.
 ///
 /// # Errors
 /// One line: [`Run::check`] refuses the run.
@@ -327,7 +327,7 @@ pub(crate) struct EmbeddedPictures {
 }
 
 impl EmbeddedPictures {
-    /// Actual, expected and difference side by side, or a line with the reason if there is no space.
+    /// The actual picture, the expected one and their difference side by side, or a line with the reason if the page has no room for them.
     pub fn set(&mut self, shown: &PictureComparison) -> Markup {
         let pictures = [
             ("actual".to_string(), &shown.actual),
@@ -369,7 +369,7 @@ impl EmbeddedPictures {
         html! { p class="dim" { (what) ": pictures left out, the page is full" } }
     }
 
-    /// A sentence if pictures were omitted.
+    /// A sentence that says how many pictures were omitted. None if none were.
     pub fn note(&self) -> Option<String> {
         (self.left_out > 0).then(|| {
             format!(

@@ -6,7 +6,7 @@ use crate::text::escaped;
 use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestRerun, TestSuite};
 use std::time::Duration;
 
-/// Writes the XML file. A comparison adds a suite, whose only case fails if anything is worse.
+/// The report as JUnit XML. `compared`, the comparison with a baseline, adds a suite whose only case fails if anything is worse.
 ///
 /// # Errors
 /// One line: the XML could not be written.

@@ -20,7 +20,7 @@ use std::collections::{HashMap, HashSet};
 use std::fmt::Write as _;
 use std::time::Duration;
 
-/// The extent of the checks.
+/// How thoroughly a device is checked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Level {
@@ -34,29 +34,29 @@ pub enum Level {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Run {
-    /// [`Stored::FORMAT`].
+    /// The name of the file format: [`Stored::FORMAT`].
     pub format: String,
     /// Name, version and build of the program.
     pub program: String,
-    /// Time of the run, RFC 3339.
+    /// When the run was made, RFC 3339.
     pub date: String,
     pub device: Device,
     pub level: Level,
     /// True if the validation layer with synchronization validation was active.
     pub validation: bool,
-    /// Duration of all checks, s.
+    /// Duration of the run, s.
     pub seconds: f64,
     /// The outcomes in running order.
     pub outcomes: Vec<Outcome>,
 }
 
 impl Run {
-    /// Outcomes of the failed checks.
+    /// The outcomes of the checks that failed.
     pub fn failures(&self) -> impl Iterator<Item = &Outcome> {
         self.outcomes.iter().filter(|o| o.verdict == Verdict::Failed)
     }
 
-    /// Outcomes of the checks that passed only when they were run again.
+    /// The outcomes of the checks that failed at first and passed when they were run again.
     pub(crate) fn flaky(&self) -> impl Iterator<Item = &Outcome> {
         self.outcomes.iter().filter(|o| o.failed_before > 0)
     }
@@ -66,12 +66,12 @@ impl Run {
         self.outcomes.iter().any(|o| o.group == START)
     }
 
-    /// Number of checks with this verdict.
+    /// Number of outcomes with this verdict.
     pub fn count(&self, verdict: Verdict) -> usize {
         self.outcomes.iter().filter(|o| o.verdict == verdict).count()
     }
 
-    /// Outcomes by group, groups in the order in which they first ran.
+    /// The outcomes by group; groups are in the order in which they first ran.
     pub fn groups(&self) -> Vec<(&str, Vec<&Outcome>)> {
         let mut places = HashMap::new();
         let mut groups: Vec<(&str, Vec<&Outcome>)> = Vec::new();
@@ -86,7 +86,7 @@ impl Run {
     }
 }
 
-/// The result of one check.
+/// The result of running one check.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Outcome {
@@ -95,34 +95,34 @@ pub struct Outcome {
     /// Name of the check, unique in its group and the same in every run of this version.
     pub name: String,
     pub verdict: Verdict,
-    /// Duration by the clock of the host, reference included, s.
+    /// Duration by the clock of the host, s; it includes the reference.
     pub seconds: f64,
     /// Measured errors and times.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub figures: Vec<Figure>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub faults: Vec<Fault>,
-    /// Remarks, such as the reason why it was skipped, and fallbacks that were used.
+    /// Remarks, such as the reason why the check was skipped, and fallbacks that were used.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,
-    /// Number of runs that failed before the one of this outcome passed. If it is not 0, the check is a flake.
+    /// How often the check failed before it passed. If it is not 0, the check is flaky.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub failed_before: u32,
-    /// Comparison pictures, of passed checks too.
+    /// Comparison pictures, also those of passed checks.
     #[serde(skip)]
     pub pictures: Vec<PictureComparison>,
 }
 
-/// Group and name of a check.
+/// Names a check by its group and its name.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CheckName {
     pub group: String,
-    /// Name, unique in its group.
+    /// Name of the check, unique in its group.
     pub name: String,
 }
 
-/// Verdict of a check.
+/// How a check ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
@@ -138,19 +138,19 @@ pub enum Verdict {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Figure {
-    /// Name, unique in its check.
+    /// Name of the number, unique in its check.
     pub what: String,
-    /// The largest error, or the median of times. NaN if the output was NaN.
+    /// The measured number: the largest error, or the median of `samples`. NaN if the output was NaN.
     #[serde(with = "any_number")]
     pub value: f64,
     /// The largest value that passes. None if every value passes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub allowed: Option<f64>,
     pub unit: Unit,
-    /// Single times, in the order of measurement.
+    /// The single times of which `value` is the median, in the order of measurement. Empty for errors.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub samples: Vec<f64>,
-    /// True if the figure depends on circumstances of the run, not on the device. It is reported, but never compared.
+    /// True if the figure depends on circumstances of the run and not on the device. It is reported, but not compared with a baseline.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub fleeting: bool,
 }
@@ -161,7 +161,7 @@ pub struct Figure {
 pub enum Unit {
     /// The unit of the compared output: mm for distances, 1 for values from 0 to 1.
     Value,
-    /// Levels of an 8-bit picture.
+    /// Levels of a picture of 8 bits.
     Levels,
     Millimetres,
     /// Nanoseconds.
@@ -171,21 +171,21 @@ pub enum Unit {
     Count,
 }
 
-/// A detected fault.
+/// A fault that a check found in the device.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Fault {
     /// One line that describes the fault.
     pub what: String,
-    /// The faulty pass, if known.
+    /// The pass that computes wrongly, if known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pass: Option<String>,
-    /// Description of the input.
+    /// Description of the input with which it occurred.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub input: String,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub worst: Option<Worst>,
-    /// Files of the pictures once they are written: actual, expected, difference.
+    /// Names of the picture files once they are written: actual, expected, difference.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub files: Vec<String>,
 }
@@ -194,49 +194,49 @@ pub struct Fault {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Worst {
-    /// Name of the output in the shader.
+    /// Name of the output, as in the shader.
     pub output: String,
-    /// Position: column, row, slice.
+    /// Position of the texel: column, row, slice.
     pub at: [usize; 3],
     pub channel: usize,
     #[serde(with = "any_number")]
     pub expected: f64,
     #[serde(with = "any_number")]
     pub got: f64,
-    /// Number of texels beyond tolerance.
+    /// Number of texels of the output that are beyond tolerance.
     pub beyond: usize,
-    /// Number of texels.
+    /// Number of texels of the output.
     pub texels: usize,
 }
 
-/// A picture with the expected one and their difference.
+/// An actual picture, the expected one, and their difference.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PictureComparison {
-    /// Short description.
+    /// Short description of what is compared.
     pub what: String,
     pub actual: Picture,
     pub expected: Picture,
-    /// Differences on black, multiplied by the gain.
+    /// The absolute difference of each channel, multiplied by `gain`.
     pub difference: Picture,
     pub gain: u32,
-    /// Index of the fault, in the outcome, that they belong to.
+    /// Index in [`Outcome::faults`] of the fault that the pictures show; None if they show none.
     pub fault: Option<usize>,
 }
 
 impl Fault {
-    /// A fault with only a description.
+    /// A fault of which only a description is known.
     pub fn new(what: impl Into<String>) -> Fault {
         Fault { what: what.into(), pass: None, input: String::new(), worst: None, files: Vec::new() }
     }
 }
 
 impl Figure {
-    /// An error with its limit.
+    /// The figure of an error, with the largest value that passes.
     pub fn error(what: impl Into<String>, value: f64, allowed: f64, unit: Unit) -> Figure {
         Figure { what: what.into(), value, allowed: Some(allowed), unit, samples: Vec::new(), fleeting: false }
     }
 
-    /// Times of the same work in the order of measurement, ns.
+    /// The figure of times, ns, of the same work in the order of measurement.
     ///
     /// # Errors
     /// There is no time, or one is not finite.
@@ -245,18 +245,18 @@ impl Figure {
         Ok(Figure { what: what.into(), value, allowed: None, unit: Unit::Ns, samples, fleeting: false })
     }
 
-    /// A time that was measured once. It is compared with an earlier one by a generous ratio.
+    /// The figure of a time that was measured once. It is compared with that of a baseline by a generous ratio.
     pub fn single_time(what: impl Into<String>, time: Duration) -> Figure {
         let value = time.as_nanos() as f64;
         Figure { what: what.into(), value, allowed: None, unit: Unit::Ns, samples: Vec::new(), fleeting: false }
     }
 
-    /// True for a time without samples.
+    /// True for the figure of a time that was measured once.
     pub(crate) fn is_single_time(&self) -> bool {
         self.unit == Unit::Ns && self.samples.is_empty()
     }
 
-    /// The value over its limit: above 1 fails, and NaN gives infinity. None without a limit.
+    /// The value divided by its limit: a check with more than 1 fails, and NaN gives infinity. None without a limit.
     pub fn used(&self) -> Option<f64> {
         let allowed = self.allowed?;
         Some(match self.value {
@@ -268,7 +268,7 @@ impl Figure {
 }
 
 impl Outcome {
-    /// The outcome of a check that measured nothing. `why`: the fault of a failed check, otherwise a note.
+    /// The outcome of a check that was not run. `why`: the fault if the verdict is failed, otherwise a note.
     pub(crate) fn unrun(check: &CheckName, verdict: Verdict, why: String) -> Outcome {
         let (faults, notes) = match verdict {
             Verdict::Failed => (vec![Fault::new(why)], Vec::new()),
@@ -287,9 +287,8 @@ impl Outcome {
         }
     }
 
-    /// Finds the cause of a failure by repetition. `again` runs the check once more, and `waiting` runs it while the host waits for each
-    /// submission before the next. A check that passes when it is run again is a flake. A check that passes only while the host waits lacks
-    /// synchronization.
+    /// Runs a check that failed again, to find the cause. `again` runs it once more; `waiting` runs it while the host waits for each submission
+    /// before it makes the next. A check that passes in `again` is flaky. One that passes only in `waiting` lacks synchronization.
     pub(crate) fn explained(self, mut again: impl FnMut() -> Outcome, waiting: impl FnOnce() -> Outcome) -> Outcome {
         let first = self.faults.first().map_or_else(String::new, |fault| format!(": {}", fault.what));
         for failed in 1..=RERUNS {
@@ -313,18 +312,18 @@ impl Outcome {
         outcome
     }
 
-    /// The figure that is closest to its limit, or exceeds it most.
+    /// The figure that is closest to its limit, or exceeds it most. None if no figure has a limit.
     pub fn tightest(&self) -> Option<&Figure> {
         let used = self.figures.iter().filter_map(|f| Some((f, f.used()?)));
         used.reduce(|a, b| if b.1 > a.1 { b } else { a }).map(|(figure, _)| figure)
     }
 
-    /// The name of the check with this outcome.
+    /// The name of the check that this is the outcome of.
     pub fn check(&self) -> CheckName {
         CheckName { group: self.group.clone(), name: self.name.clone() }
     }
 
-    /// Group and name.
+    /// Group and name of the check, as text.
     pub fn title(&self) -> String {
         format!("{} / {}", escaped(&self.group), escaped(&self.name))
     }
@@ -478,7 +477,7 @@ mod any_number {
     }
 }
 
-/// Group of the outcome of a device that could not be started.
+/// The name of the group of the outcome that tells that a device could not be started.
 pub(crate) const START: &str = "start";
 
 /// How often a check that failed is run once more.
@@ -491,7 +490,7 @@ fn is_zero(count: &u32) -> bool {
 /// Maximum number of changes of a class that are listed, except those that fail the run.
 const MAX_CHANGES: usize = 40;
 
-/// One line on a group, without line break: verdicts, duration, and the check that is closest to its tolerance.
+/// A line on a group, without line break: verdicts, duration, and the check that is closest to its tolerance.
 pub fn group_line(group: &str, outcomes: &[&Outcome]) -> String {
     let count = |verdict| outcomes.iter().filter(|o| o.verdict == verdict).count();
     let mut line = format!("{:<18} {}", escaped(group), counts(Verdict::ALL.map(count)));
@@ -515,7 +514,7 @@ fn counts(of: [usize; 4]) -> String {
     if texts.is_empty() { "no checks".into() } else { texts.join(", ") }
 }
 
-/// A failed check in full, one line per item, each with line break.
+/// The report of a failed check, one line per item, each with line break.
 pub fn failure(outcome: &Outcome) -> String {
     let mut text = format!("{}: {}\n", outcome.title(), outcome.verdict.word());
     for fault in &outcome.faults {
@@ -589,8 +588,8 @@ pub fn summary(run: &Run) -> String {
     )
 }
 
-/// Changes since an earlier run, the worst first, in lines. All changes that fail the run are listed; of the others only some, with the
-/// number of the rest.
+/// Lines on the changes since the baseline, the worst first. All changes that fail the run are listed; of the others only some, with the number of
+/// the rest.
 pub fn comparison(compared: &BaselineComparison) -> String {
     let mut text = format!("compared with {}\n", compared.baseline);
     for line in compared.differences.iter().chain(&compared.notes) {
@@ -618,7 +617,7 @@ const DIGITS: usize = 3;
 /// Significant digits that distinguish all f64.
 const MAX_DIGITS: usize = 17;
 
-/// Three significant digits; scientific notation for very large and very small numbers.
+/// A number with three significant digits, in scientific notation if it is very large or very small.
 pub fn number(value: f64) -> String {
     to_digits(value, DIGITS)
 }
@@ -671,7 +670,7 @@ fn shown(value: f64, unit: Unit, factor: f64, digits: usize) -> String {
     }
 }
 
-/// A value with its unit.
+/// A value with its unit, as text.
 pub fn amount(value: f64, unit: Unit) -> String {
     let (factor, word) = scale(unit, value);
     match shown(value, unit, factor, DIGITS) {
@@ -688,18 +687,18 @@ fn distinguishable(values: [f64; 2], unit: Unit) -> ([String; 2], &'static str) 
     (texts.unwrap_or_else(|| with(DIGITS)), word)
 }
 
-/// Expected and actual value with enough digits to distinguish them.
+/// The expected and the actual value as text, with enough digits to tell them apart.
 pub fn expected_and_got(expected: f64, got: f64) -> [String; 2] {
     distinguishable([expected, got], Unit::Value).0
 }
 
-/// Two values and their unit: `0.8 -> 1.9 levels`.
+/// Two values with their unit, as text: `0.8 -> 1.9 levels`.
 pub fn change(old: f64, new: f64, unit: Unit) -> String {
     let ([old, new], word) = distinguishable([old, new], unit);
     format!("{old} -> {new}{word}")
 }
 
-/// The value of a figure and its limit: `0.8 of 2 levels`.
+/// The value of a figure with its limit, as text: `0.8 of 2 levels`.
 pub fn value_of_limit(figure: &Figure) -> String {
     let Some(allowed) = figure.allowed else { return amount(figure.value, figure.unit) };
     let ([value, allowed], word) = distinguishable([figure.value, allowed], figure.unit);
@@ -707,7 +706,7 @@ pub fn value_of_limit(figure: &Figure) -> String {
     format!("{value} of {allowed}{word}")
 }
 
-/// A share in integer percent. It is 100 only if the share is exactly 1.
+/// A share (0..1) as text in whole per cent. It is 100 only if the share is exactly 1.
 pub fn percent(share: f64) -> String {
     match share {
         s if !s.is_finite() || s >= 100.0 => "over 9999 %".into(),
@@ -718,7 +717,7 @@ pub fn percent(share: f64) -> String {
     }
 }
 
-/// A duration, given in s.
+/// A duration in s, as text.
 pub fn seconds(s: f64) -> String {
     match s {
         s if s >= 3600.0 => format!("{} h {} min", (s / 3600.0) as u64, ((s % 3600.0) / 60.0) as u64),

@@ -6,7 +6,7 @@ use crate::metrics::table;
 use crate::metrics::text_format::Exposition;
 use std::time::UNIX_EPOCH;
 
-/// Writes the file. `compared`: the run's comparison with its baseline, if it has one.
+/// The report as metrics for a textfile collector of Prometheus. `compared`: the comparison with a baseline, if there is one.
 pub fn prometheus(run: &Run, compared: Option<&BaselineComparison>) -> String {
     let device = &run.device;
     let conditions = [

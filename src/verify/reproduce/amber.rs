@@ -18,21 +18,21 @@ const MAX_PLACE: usize = 1 << 24;
 /// Halves that are smaller Amber takes as 0 when it reads what a shader has written.
 const MIN_HALF: f64 = 1.0 / 16384.0;
 
-/// A script, and the dispatch that it has.
+/// A script for Amber, and the dispatch that it makes.
 pub(super) struct Script<'a> {
     pub name: String,
     pub text: String,
     pub case: &'a Case,
-    /// The dispatch is one layer of another.
+    /// True if the dispatch is a single layer of the reproduced one.
     pub is_of_layer: bool,
-    /// Name of the file of the uniform block.
+    /// Name of the file that holds the uniform block.
     pub params: String,
 }
 
-/// The script, or one a layer.
+/// The scripts of a dispatch: one, or one for each layer that it writes.
 ///
 /// # Errors
-/// One line: why the dispatch cannot be expressed.
+/// One line: why Amber cannot express the dispatch.
 pub(super) fn scripts(case: &Case) -> Result<Vec<Script<'_>>, String> {
     let script = |name: String, case, shader, params: String, is_of_layer| {
         Ok(Script { name, text: script(case, shader, &params)?, case, is_of_layer, params })
@@ -47,7 +47,7 @@ pub(super) fn scripts(case: &Case) -> Result<Vec<Script<'_>>, String> {
     layers.iter().enumerate().map(of).collect()
 }
 
-/// What a reader of the scripts must know.
+/// Text that tells a reader of the scripts how to run them, and their limits.
 pub(super) fn about(case: &Case, scripts: &[Script]) -> String {
     let names: Vec<_> = scripts.iter().map(|script| script.name.as_str()).collect();
     let mut text = format!(

@@ -95,18 +95,18 @@ impl Array {
     }
 }
 
-/// The written files.
+/// What [`reproduce`] has written.
 pub struct Reproduction {
     pub title: String,
-    /// True if the dispatch differs from its reference on this device.
+    /// True if the dispatch that was written differs from its reference on this device.
     pub fails: bool,
-    /// The reason why there is no script for Amber. None if there is one.
+    /// Why there is no script for Amber. None if there is one.
     pub without_script: Option<String>,
     pub files: Vec<String>,
 }
 
-/// Writes a dispatch of a pass into a folder, which is created if needed: the smallest that fails, otherwise the smallest with at least
-/// `MIN_TEXELS` texels.
+/// Writes a dispatch of a pass with its data into a folder, which is made if needed: the smallest dispatch that fails, otherwise the smallest with at
+/// least `MIN_TEXELS` texels. `check`: name of the pass's check.
 ///
 /// # Errors
 /// No pass has this name, the device fails, or a file cannot be written.
@@ -119,7 +119,7 @@ pub fn reproduce(dut: &mut DeviceUnderTest, check: &str, folder: &Path) -> Resul
     Ok(Reproduction { title: case.title, fails, without_script, files: written })
 }
 
-/// The reason why nothing was reproduced.
+/// Why nothing was reproduced.
 #[derive(Debug, thiserror::Error)]
 pub enum ReproduceError {
     #[error("'{0}' compares no pass with its reference; those of the group 'passes' do (--list)")]

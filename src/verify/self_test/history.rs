@@ -1,13 +1,13 @@
 //! Public bugs of drivers that occurred in practice, and the injected fault that recreates each. They show that the checks detect real
 //! bugs, not only invented ones.
 
-/// A public bug and its recreation.
+/// A publicly reported bug of a driver, and the injected fault that recreates it.
 pub struct KnownBug {
     /// Name of the injected fault.
     pub fault: &'static str,
-    /// The driver, or the layer above it.
+    /// The driver that had the bug, or the layer above it.
     pub driver: &'static str,
-    /// Description of the wrong behaviour.
+    /// What the driver did wrong.
     pub what: &'static str,
     /// Where it was reported: an address or a file.
     pub source: &'static str,

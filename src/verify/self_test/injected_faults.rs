@@ -374,7 +374,7 @@ const fn of_command(name: &'static str, what: &'static str, command: Command) ->
     InjectedFault { name, what, change: Change::Command(command) }
 }
 
-/// One fault for each class of instructions.
+/// Faults of the compiler: one for each class of instructions.
 pub(super) fn of_instructions() -> impl Iterator<Item = InjectedFault> {
     MUTATIONS.iter().map(|mutation| InjectedFault {
         name: mutation.class,

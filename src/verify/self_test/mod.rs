@@ -25,29 +25,29 @@ use std::time::Instant;
 /// Maximum number of scenes in which each pass is checked, and of further ones, each with another pipeline.
 const SCENES: usize = 6;
 
-/// An injected fault, and the check that detected it.
+/// Whether an injected fault was detected, and by which check.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Detection {
     pub fault: String,
-    /// The kind of defect that it represents.
+    /// The kind of defect that the fault stands for.
     pub what: String,
-    /// Group and name of the check. None if the fault was not detected.
+    /// Group and name of the check that detected the fault. None if none did.
     pub by: Option<String>,
     /// Message of the check, or the reason why nothing detected the fault.
     pub message: String,
-    /// True if it was not tested.
+    /// True if the fault was not tested on this device.
     pub left_out: bool,
-    /// Duration by the clock of the host, s.
+    /// Duration of the test by the clock of the host, s.
     pub seconds: f64,
 }
 
 impl Detection {
-    /// The public bugs that the fault recreates, one line each.
+    /// The publicly reported bugs that the fault recreates, one line each.
     pub fn history(&self) -> impl Iterator<Item = String> {
         history::of(&self.fault).map(|bug| format!("as in {}: {} ({})", bug.driver, bug.what, bug.source))
     }
 
-    /// The detection as the outcome of a check: an undetected fault is a failure.
+    /// The detection as the outcome of a check, which fails if the fault was not detected.
     pub fn outcome(&self) -> Outcome {
         let (verdict, faults, note) = match &self.by {
             _ if self.left_out => (Verdict::LeftOut, Vec::new(), Some(self.message.clone())),
@@ -68,12 +68,12 @@ impl Detection {
     }
 }
 
-/// Public bugs, each with the name of the fault that recreates it.
+/// Publicly reported bugs, each with the name of the fault that recreates it.
 pub fn known_bugs() -> &'static [KnownBug] {
     history::KNOWN_BUGS
 }
 
-/// The detection of a deliberate crash from the outcome of the check whose process crashed.
+/// Whether a deliberate crash was detected, from the outcome of the check whose process crashed.
 pub fn crash(outcome: &Outcome) -> Detection {
     let said = outcome.faults.first().map(|fault| fault.what.clone());
     let is_named = outcome.verdict == Verdict::Failed && said.as_ref().is_some_and(|said| said.contains("signal"));
@@ -87,14 +87,14 @@ pub fn crash(outcome: &Outcome) -> Detection {
     }
 }
 
-/// All faults to inject, in running order: those of single passes and commands, then one for each class of instructions. Dropped barriers
-/// are tested in addition.
+/// All faults that the self-test injects, in running order: those of single passes and Vulkan commands, then one for each class of instructions.
+/// Dropped barriers are tested in addition.
 pub fn faults() -> impl Iterator<Item = InjectedFault> {
     injected_faults::FAULTS.iter().copied().chain(injected_faults::of_instructions())
 }
 
-/// Injects every fault and drops every barrier, and calls `tell` after each. The last detection states whether the checks that detected
-/// faults pass without an injected fault.
+/// Injects every fault, and drops every barrier, one at a time; calls `tell` with the detection of each. The last detection tells whether the checks
+/// that detected faults pass without one.
 ///
 /// # Errors
 /// The device fails without a fault.

@@ -52,11 +52,11 @@ pub const PICTURE: Pass = Pass {
 /// How the rows and columns of an image are solved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Solver {
-    /// Each is eliminated forwards and substituted backwards, an invocation a row or a column: a dispatch each. That is the least work, and
-    /// what a CPU does fastest.
+    /// One invocation solves a row or a column: one dispatch eliminates forwards, another substitutes back. That is the least work, and fastest on a
+    /// CPU.
     Thomas,
-    /// In one dispatch, a workgroup a row or a column: by parallel cyclic reduction to as many systems as the workgroup has invocations. A GPU has
-    /// work for all its processors only so.
+    /// One workgroup solves a row or a column in a single dispatch: parallel cyclic reduction splits it into as many systems as the workgroup has
+    /// invocations. Only so does a GPU have work for all its processors.
     Hybrid,
 }
 
@@ -67,13 +67,13 @@ const THREADS: u32 = 128;
 const MAX_CHUNK: u32 = 16;
 
 impl Solver {
-    /// Dispatches of one step, half of them for each axis.
+    /// Number of dispatches of one time step; half of them work on rows, half on columns.
     pub(super) fn dispatches(self) -> u32 {
         if self == Solver::Thomas { 4 } else { 2 }
     }
 }
 
-/// The images of one kind under AOS: the slots between the dispatches of a step, the size, and the number of channels.
+/// What differs between AOS on slices, distance maps and pictures: shaders, the slots for intermediate results, size and number of channels.
 pub(super) struct Images {
     /// The shaders that eliminate, substitute back, and do both.
     shaders: [&'static str; 3],
@@ -113,7 +113,7 @@ enum Sweep {
 }
 
 impl Images {
-    /// The hybrid solver wherever a workgroup's memory holds the longest row or column.
+    /// Chooses the hybrid solver wherever a workgroup's shared memory holds the longest row or column.
     pub(super) fn solver(&self, scene: &Scene) -> Solver {
         let chunk = (0..2).map(|axis| self.chunk(scene, axis)).max().unwrap_or(0);
         // An equation has three coefficients and a right side.
@@ -175,7 +175,8 @@ impl Images {
         }
     }
 
-    /// `extrapolates`: the dispatch ends both half steps of Richardson's extrapolation.
+    /// Specialization constants. `extrapolates`: true for the dispatch that ends the two half steps of Richardson's extrapolation, and combines them
+    /// with the full step.
     pub(super) fn constants(
         &self,
         scene: &Scene,

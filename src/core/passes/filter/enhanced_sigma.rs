@@ -56,8 +56,8 @@ pub const PICTURE: Pass = Pass {
     ..Pass::OF_PICTURES
 };
 
-/// How far the window grew at each pixel of a slice, which Tables 7-9 of the thesis count. It reads the same slice as the filter, which
-/// runs next.
+/// Records how many rings the filter's window grew at each pixel of a slice, which Tables 7-9 of the thesis count. It reads the same slice as the
+/// filter, which runs next.
 pub const GROWTH: Pass = Pass {
     name: "growth_slice",
     link: Link::Observer(Chain::Slices),
@@ -201,8 +201,8 @@ impl Enhanced {
     }
 }
 
-/// Shares of the pixels, within the sector, whose window's edge grew by +0, +2, +4 ... up to the largest (thesis Tables 7-9),
-/// from the map that [`GROWTH`] writes. They sum to 1.
+/// Shares (0..1, summing to 1) of the pixels within the sector whose window's edge grew by +0, +2, +4 ... pixels up to the largest growth (thesis
+/// Tables 7-9), from the map that [`GROWTH`] writes.
 pub fn growth_shares(scene: &Scene, growth: &Texels) -> Vec<f64> {
     let enhanced = scene.slice_filters.enhanced_sigma.unwrap_or_default();
     let rings = (enhanced.largest / 2).saturating_sub(enhanced.window / 2) as usize;

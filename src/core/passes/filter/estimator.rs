@@ -33,9 +33,9 @@ pub const SLICE: Pass = Pass {
     ..Pass::OF_SLICES
 };
 
-/// Smallest difference that counts as a gradient: half a level of 255, as Wang, Vagnucci and Li do on integer levels.
+/// Smallest difference of sample values (0..1) that counts as a gradient: half a level of 255, as Wang, Vagnucci and Li do on integer levels.
 pub(super) const LEAST: f64 = 0.5 / 255.0;
-/// Smallest difference of distances that counts as a gradient, mm: a 32nd of the detector's step, below its resolution.
+/// Smallest difference of distances that counts as a gradient, mm: 1/32 of the detector's step, which is below its resolution.
 pub(super) fn least_distance(scene: &Scene) -> f64 {
     scene.ring.step / 32.0
 }
@@ -50,7 +50,7 @@ pub(super) fn constant(estimator: Estimator) -> i32 {
     }
 }
 
-/// How far it looks, texels.
+/// How many pixels away from the centre the estimator reads.
 pub(super) fn reach(estimator: Estimator) -> u32 {
     if estimator == Estimator::NagaoMatsuyama { 2 } else { 1 }
 }
@@ -59,12 +59,13 @@ pub(super) fn params(params: Params, edge: f64, least: f64) -> Params {
     params.f32("edge", storable_edge(edge)).f32("least", least)
 }
 
-/// An edge constant that f32 divides by: 1e-30 is 0 and 1e30 is infinite to every difference there is.
+/// Clamps an edge constant so that f32 can divide by it: 1e-30 acts as 0 and 1e30 as infinity on every difference that occurs.
 pub(super) fn storable_edge(edge: f64) -> f64 {
     edge.clamp(1e-30, 1e30)
 }
 
-/// The estimate at the pixel whose surroundings `around` gives by offset; that pixel itself must be `valid`.
+/// Estimates the noise-free value of a pixel. `around` gives the value at an offset (columns, rows) from it; neighbours that are not `valid` are left
+/// out, and the pixel itself must be valid. `edge`: edge constant of Perona-Malik; `least`: smallest difference that counts as a gradient.
 pub(super) fn estimate(
     estimator: Estimator,
     around: &dyn Fn(i64, i64) -> f64,
@@ -113,7 +114,7 @@ pub(super) fn estimate(
     }
 }
 
-/// 1 / (1 + (g/k)^2); nothing flows where k is 0.
+/// The conductance 1 / (1 + (g/k)^2) for a difference g and the edge constant k; 0 where k is 0.
 pub(super) fn quotient(difference: f64, edge: f64) -> f64 {
     if edge > 0.0 { 1.0 / (1.0 + (difference / edge).powi(2)) } else { 0.0 }
 }

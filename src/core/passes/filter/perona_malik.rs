@@ -47,7 +47,7 @@ pub const PICTURE: Pass = Pass {
     ..Pass::OF_PICTURES
 };
 
-/// An edge of 0 keeps every pixel: no pass.
+/// Whether the filter of this scheme is needed. An edge constant of 0 changes no pixel, so that no pass is needed.
 pub(super) fn need(settings: Option<PeronaMalik>, scheme: Scheme) -> Need {
     match settings {
         Some(p) if p.edge == 0.0 => Err("an edge of 0 changes nothing"),
@@ -70,7 +70,7 @@ fn params(settings: Option<PeronaMalik>, args: &DispatchArgs) -> Params {
     Params::default().f32("edge", storable_edge(p.edge)).f32("lambda", p.step).i32("slice", args.slice)
 }
 
-/// How well two texels conduct. Colours go by the root mean square of their differences (Gerig et al. 1992).
+/// Conductance between two texels, 0..1. For colours the difference is the root mean square over the channels (Gerig et al. 1992).
 pub(super) fn conductance(p: &PeronaMalik, a: &[f64], b: &[f64]) -> f64 {
     let colours = a.len().min(3);
     let squares: f64 = (0..colours).map(|c| (a[c] - b[c]).powi(2)).sum();

@@ -8,8 +8,8 @@ use crate::scene;
 const WHY: &str = "a sum of at most 63^2 differences in f32; a pixel within rounding of the range's end may fall on either side; the \
                    slice's R16F stores 1 to 4.9e-4";
 
-/// Widens the range of values, of full scale: 5-3 counts what lies at its very end, as 51 of 255 levels do at a sigma of 0.1. It is ten times
-/// what f32 rounds there, and a fifteenth of a level of 16 bits. Distances have no levels and no scale.
+/// Margin, in values of 0..1, by which the range of similar values is widened: equation 5-3 of the thesis includes a value at the very end, as 51 of
+/// 255 levels are at a sigma of 0.1. It is ten times the rounding error of f32, and a fifteenth of a 16-bit level. Distances have no such margin.
 pub(super) const TIE: f64 = 1e-6;
 
 pub const SLICE: Pass = Pass {
@@ -68,12 +68,14 @@ fn need(sigma: Option<scene::Sigma>) -> Need {
     }
 }
 
-/// K: fewer than 4 at 7x7, fewer than 3 at 5x5 (thesis 5.3), and in proportion elsewhere.
+/// K of thesis 5.3 for a window of `window` pixels along each edge: where no more than K of its pixels are similar to the centre, the four immediate
+/// neighbours are averaged instead. It is 3 at 7x7, 2 at 5x5, and in proportion elsewhere.
 pub(super) fn few(window: u32) -> u32 {
     window.saturating_sub(1) / 2
 }
 
-/// D, or D over the centre: 2 sigma, as the shader gets it. 1e30 is infinite to every value there is, and stays finite when multiplied by one.
+/// The half width of the range of similar values, 2 sigma, as the shader gets it; for multiplicative noise as a factor of the centre. It is at most
+/// 1e30, which includes every value and stays finite when multiplied by a sample.
 pub(super) fn range(sigma: f64) -> f64 {
     f64::from((2.0 * sigma).min(1e30) as f32)
 }

@@ -22,7 +22,7 @@ pub(super) fn need_back(scene: &Scene) -> Need {
     }
 }
 
-/// Smallest edge of a cell, mm, that the kernel of the key light can be stretched to.
+/// Smallest edge of a cell, mm, at which the widest kernel still spreads the key light as far as requested.
 pub(super) fn least_cell(scene: &Scene) -> f64 {
     let most = VARIANCES[1] * f64::from(MAX_STRIDE.pow(2));
     light_of(scene).widening.powi(2) * KEY.propagation(scene).path / most
@@ -220,7 +220,7 @@ impl Beam {
     }
 }
 
-/// The light that `light.direction` names, layer by layer, or several layers at once.
+/// Propagates the light from `light.direction` through the lattice: one layer, or several, a dispatch.
 pub(crate) const PROPAGATE: Pass = Pass {
     name: "light_propagate",
     shader: |s, _| KEY.shader(s),
@@ -240,7 +240,7 @@ pub(crate) const PROPAGATE: Pass = Pass {
     ..MATTER
 };
 
-/// The back light, in larger cells.
+/// Propagates the back light, in cells of twice the edge.
 pub(crate) const PROPAGATE_BACK: Pass = Pass {
     name: "light_propagate_back",
     needed: need_back,

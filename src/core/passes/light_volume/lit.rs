@@ -5,12 +5,12 @@ use crate::passes::pass::*;
 use crate::scene::{Ground, LightLattice, Mode, Scene};
 use glam::DVec3;
 
-/// Reciprocal of the length over which matter fades towards the faces of the region; 0 if it does not.
+/// Reciprocal, 1/mm, of the length over which matter fades towards the faces of the region; 0 without a fade.
 pub(in crate::passes) fn fade_density(scene: &Scene) -> f64 {
     scene.region_fade().map_or(0.0, |fade| 1.0 / fade)
 }
 
-/// What a pass that composites reads of the light volume.
+/// The slots of the light volume that a pass that composites reads. Empty if the scene has no light volume.
 pub(in crate::passes) fn reads(scene: &Scene) -> Vec<Bind> {
     let filtered = scene.filters_in_hardware();
     match scene.lit_by_volume() {
@@ -21,7 +21,7 @@ pub(in crate::passes) fn reads(scene: &Scene) -> Vec<Bind> {
     }
 }
 
-/// Adds the numbers of the light volume to those of a pass that composites.
+/// Adds the parameters of the light volume to those of a pass that composites.
 pub(in crate::passes) fn params(scene: &Scene, params: Params) -> Params {
     let light = &scene.settings.light;
     let volume = light_of(scene);
@@ -43,7 +43,7 @@ pub(in crate::passes) fn params(scene: &Scene, params: Params) -> Params {
         .vec3("ground_edge", ground.edge)
 }
 
-/// Constants of a pass that composites; `is_alone`: what it makes fills the picture.
+/// Specialization constants for a pass that composites. `is_alone`: its output is the whole picture, so that the ground (the backdrop) is drawn.
 pub(in crate::passes) fn constants(scene: &Scene, is_alone: bool) -> [(&'static str, i32); 4] {
     [
         ("FADE", scene.region_fade().is_some() as i32),
@@ -57,7 +57,8 @@ fn ground_of(scene: &Scene, is_alone: bool) -> Option<Ground> {
     scene.lit_by_volume().filter(|_| is_alone)?.ground
 }
 
-/// The light of a ray through a place of the picture, rays from its corner, as it is shown: through the response curve, premultiplied.
+/// Applies the response curve (`light.volume.exposure`) to the composited light of a ray, premultiplied. `at`: position in the picture, in rays from
+/// its upper left corner. Without a light volume the light is unchanged.
 pub(in crate::passes) fn developed(scene: &Scene, is_alone: bool, rgba: [f64; 4], at: [f64; 2]) -> [f64; 4] {
     match scene.lit_by_volume() {
         Some(volume) => on_film(scene, volume.exposure, ground_of(scene, is_alone), rgba, at),
@@ -65,7 +66,8 @@ pub(in crate::passes) fn developed(scene: &Scene, is_alone: bool, rgba: [f64; 4]
     }
 }
 
-/// Colour of a ray that meets no matter, through a position of the picture in rays from its corner. None without a ground.
+/// Colour of the backdrop (`light.volume.ground`) where a ray meets no matter. `at`: position in the picture, in rays from its upper left corner.
+/// None if the scene draws no backdrop.
 pub fn bare_ground(scene: &Scene, at: [f64; 2]) -> Option<[f64; 3]> {
     let is_alone = scene.settings.mode == Mode::Volume && !scene.lights_volume() && scene.still().is_none();
     ground_of(scene, is_alone)?;
@@ -73,7 +75,8 @@ pub fn bare_ground(scene: &Scene, at: [f64; 2]) -> Option<[f64; 3]> {
     Some([r, g, b])
 }
 
-/// Linear light of a ray through a place of the picture, rays from its corner, premultiplied: through the response curve and over the ground.
+/// Applies the response curve to linear premultiplied light, and composites it over the backdrop if there is one. `at`: position in the picture, in
+/// rays from its upper left corner.
 pub(in crate::passes) fn on_film(
     scene: &Scene,
     exposure: f64,
@@ -99,7 +102,7 @@ pub(in crate::passes) fn on_film(
     [shown(0), shown(1), shown(2), 1.0]
 }
 
-/// The light volume as the reference of a pass that composites sees it.
+/// The light volume, sampled by the references of passes that composite.
 pub(in crate::passes) struct Lit<'a> {
     shade: &'a Texels,
     normals: &'a Texels,
@@ -121,7 +124,7 @@ impl<'a> Lit<'a> {
         })
     }
 
-    /// Light that white matter at a position scatters along a unit direction, without a highlight.
+    /// Light (red, green, blue) that white matter at a place scatters towards the viewer, without a highlight. `along`: unit direction of the ray.
     pub fn scattered(&self, place: DVec3, along: DVec3) -> [f64; 3] {
         let cells = (place - self.lattice.low) / self.lattice.cell - 0.5;
         let at = clamped(cells.to_array(), self.shade);
@@ -134,7 +137,8 @@ impl<'a> Lit<'a> {
         std::array::from_fn(|c| shade[c] + shade[3] * SHEEN * grazing.powi(3))
     }
 
-    /// Light of matter of this colour at a position in space, seen along a unit direction.
+    /// Light that matter of the colour `albedo` at a place, mm in space, sends towards the viewer, with its highlight. `along`: unit direction of the
+    /// ray.
     pub fn light(&self, scene: &Scene, albedo: [f64; 3], place: DVec3, along: DVec3) -> [f64; 3] {
         let cells = (place - self.lattice.low) / self.lattice.cell - 0.5;
         let at = clamped(cells.to_array(), self.shade);

@@ -46,7 +46,8 @@ fn cells(scene: &Scene) -> [u32; 3] {
     scene.light_lattice().count
 }
 
-/// The density and the echo of each cell; beyond the box, those at its faces. Matter does not fade towards the faces of the region here: what it cuts lies in the shade of what is beyond.
+/// Samples the density and the echo of each cell. Cells outside the rendered box take the values at its faces. `region.fade` is not applied here, so
+/// that what the region cuts off still lies in the shade of the matter beyond.
 pub(crate) const MATTER: Pass = Pass {
     name: "light_matter",
     shader: |_, _| "light_volume/matter",
@@ -107,7 +108,7 @@ pub(crate) const MATTER: Pass = Pass {
     ..Pass::OF_RAYS
 };
 
-/// The levels of the pyramid, one after the other.
+/// Computes the levels of the Gaussian pyramid of the density, one after the other.
 pub(crate) const REDUCE: Pass = Pass {
     name: "light_reduce",
     shader: |_, _| "light_volume/reduce",
@@ -157,15 +158,14 @@ fn level(n: u32) -> Slot {
     }
 }
 
-/// Smallest edge of a cell, mm, at which the light is the requested one. In smaller cells kernels and cones would have to be wider than
-/// they can be.
+/// Smallest edge of a cell, mm, at which the light is as requested. With smaller cells, kernels and cones would have to be wider than they can be.
 pub fn least_cell(scene: &Scene) -> f64 {
     let light = light_of(scene);
     let scattered = light.scatter_deviations().into_iter().fold(0.0, f64::max) / MAX_SCATTER;
     beam::least_cell(scene).max(scattered).max(scene.least_cell_of_cones())
 }
 
-/// Light that tissue scatters, along one axis a dispatch.
+/// Computes the light that tissue scatters: a Gaussian along one axis in each dispatch.
 pub(crate) const DIFFUSE: Pass = Pass {
     name: "light_diffuse",
     shader: |_, _| "light_volume/diffuse",
@@ -238,7 +238,7 @@ fn scatter(scene: &Scene) -> [f64; 3] {
         .map(|deviation| (deviation / scene.light_lattice().cell).clamp(0.05, MAX_SCATTER))
 }
 
-/// Light from everywhere above, and from behind.
+/// Computes the ambient light from above and from behind in each cell.
 pub(crate) const AMBIENT: Pass = Pass {
     name: "light_ambient",
     shader: |_, _| "light_volume/ambient",

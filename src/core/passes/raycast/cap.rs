@@ -54,23 +54,23 @@ pub(crate) const PASS: Pass = Pass {
     ..Pass::OF_RAYS
 };
 
-/// What passes that end rays at cut faces read.
+/// The slot of cut faces, for passes that end rays there. None if the scene has no cut faces.
 pub(in crate::passes) fn reads(scene: &Scene) -> Option<Bind> {
     scene.has_caps().then_some(whole("cap", Slot::Cap))
 }
 
-/// The constant of these passes.
+/// The specialization constant that tells a pass whether rays end at cut faces.
 pub(in crate::passes) fn constant(scene: &Scene) -> (&'static str, i32) {
     ("CAPPED", scene.has_caps() as i32)
 }
 
-/// The cut face of the ray of a pixel, if it has one.
+/// The cut face that the ray of pixel (x, y) shows. None if it shows none.
 pub(crate) fn cut_at(scene: &Scene, reads: &Arrays, x: usize, y: usize) -> Option<Cut> {
     let cut = scene.has_caps().then(|| reads.get("cap").get([x, y, 0]))?;
     (cut[1] > 0.0).then_some(Cut { echo: cut[0], opacity: cut[1] })
 }
 
-/// The part of a cut face that a ray shows.
+/// What a ray shows of a cut face: an echo as a grey value, and the opacity of the face.
 #[derive(Clone, Copy)]
 pub struct Cut {
     echo: f64,
@@ -78,12 +78,12 @@ pub struct Cut {
 }
 
 impl Cut {
-    /// True if the ray ends here: nothing shines through.
+    /// True if the face is opaque, so that the ray ends here.
     pub(crate) fn ends_ray(self) -> bool {
         self.opacity >= 1.0
     }
 
-    /// The colour over what is behind. Both are premultiplied.
+    /// Composites the cut face over the colour `behind` it. Both are premultiplied.
     pub fn over(self, behind: [f64; 4]) -> [f64; 4] {
         let front = [self.echo, self.echo, self.echo, 1.0];
         std::array::from_fn(|c| self.opacity * front[c] + (1.0 - self.opacity) * behind[c])

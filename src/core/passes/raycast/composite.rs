@@ -3,22 +3,22 @@
 
 use crate::scene::{Compositing, transfer};
 
-/// How a step of length h becomes opacity a and light; y = kappa h / h0 with the absorption kappa for a length of h0.
+/// How a step of length h becomes opacity a and light, with y = kappa h / h0, where kappa is the absorption over the reference length h0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rule {
     /// a = y, at most 1, kappa from the step's middle.
     Riemann,
     /// a = 1 - exp(-y), kappa from the step's middle.
     Corrected,
-    /// a = 1 - exp(-y), kappa from the beginning of the step. No setting offers it. It shows what the middle of the step gains.
+    /// a = 1 - exp(-y), kappa from the beginning of the step. No setting offers it; tests compare it with `Corrected`.
     CorrectedLeft,
-    /// a = 1 - exp(-y), with the mean kappa, and the mean colour weighted by it, between the values at the step's two ends.
+    /// a = 1 - exp(-y), with the mean kappa between the sample values at the step's two ends, and the mean colour weighted by kappa.
     PreIntegrated,
-    /// The light and the opacity of the step's own integral between the values at its two ends: every place is dimmed by what lies in
-    /// front of it in the same step.
+    /// The exact integral over the step of a transfer function between the sample values at its two ends: light and opacity, each place dimmed by the
+    /// matter in front of it in the same step.
     Exponential,
-    /// The opacity of `PreIntegrated`, but the step's light is y times its colour, as if no part of a step lay in the shade of another (Engel,
-    /// Kraus, Ertl 2001 name this shortcut). Not offered: it costs an order.
+    /// The opacity of `PreIntegrated`, but the step's light is y times its colour, as if no part of a step lay in the shade of another (a shortcut of
+    /// Engel, Kraus, Ertl 2001). No setting offers it: its error is one order larger.
     PreIntegratedUnshaded,
 }
 
@@ -33,45 +33,45 @@ impl From<Compositing> for Rule {
     }
 }
 
-/// A place of a ray: mm behind its entry, and the number of steps to there.
+/// A position on a ray: `offset` mm behind the ray's entry, after `n` steps.
 #[derive(Clone, Copy, Debug)]
 pub struct Place {
     pub offset: f64,
     pub n: f64,
 }
 
-/// The medium of a ray: red, green, blue, and the absorption over one reference length. None outside of everything.
+/// The matter on a ray. A colour is red, green and blue with the absorption over one reference length; None where the ray is outside the medium.
 pub trait Medium {
-    /// The part of a step, from offset to offset, that is inside the medium; none if neither end is. A part that begins or ends within the
-    /// step has one value, that of the step's end inside.
+    /// The part of a step, given by two offsets in mm, that is inside the medium. None if neither end is inside. A step that begins or ends outside
+    /// takes the value of its end inside.
     fn part_inside(&self, step: [f64; 2]) -> Option<[f64; 2]> {
         Some(step)
     }
     fn at(&self, place: Place) -> Option<[f64; 4]>;
-    /// Mean absorption, and mean colour weighted by it, over a step along which the value goes evenly from one end to the other.
+    /// Mean colour weighted by absorption, and mean absorption, over a step along which the sample value changes linearly from `from` to `to`.
     fn between(&self, from: Place, to: Place) -> Option<[f64; 4]>;
-    /// Premultiplied red, green, blue, and the opacity, of the same step, which is `length` reference lengths long: the integral of the
-    /// light, each place dimmed by the step's own matter in front of it.
+    /// Premultiplied red, green, blue, and opacity, of the same step of `length` reference lengths: the integral of its light, each place dimmed by
+    /// the step's own matter in front of it.
     fn self_attenuated(&self, from: Place, to: Place, length: f64) -> Option<[f64; 4]>;
 }
 
-/// The emission-absorption sum of one ray.
+/// Numerical integration of emission and absorption along one ray, front to back.
 #[derive(Clone, Copy, Debug)]
 pub struct March {
     pub rule: Rule,
-    /// Length of the ray behind its entry, mm. The last step is as long as the remainder.
+    /// Length of the ray behind its entry, mm. The last step is shortened to end there.
     pub path: f64,
-    /// The length for which absorption is given, mm.
+    /// The length that absorption refers to, mm.
     pub reference_length: f64,
-    /// The ray ends when less than this share of light is left. With 0 it never ends early.
+    /// The ray ends when its transmittance (0..1) falls below this. With 0 it never ends early.
     pub early_end: f64,
-    /// Opacity from which on the ray has hit something.
+    /// Opacity (0..1) from which on the ray counts as having hit something.
     pub hit: f64,
 }
 
 impl March {
-    /// Red, green, blue and opacity, and the offset at which the ray has become as opaque as a hit is. `offset` is how many mm
-    /// behind the entry a number of steps leads, and rises with it.
+    /// Returns red, green, blue and opacity of the ray, and the offset, mm, at which its opacity reaches `hit`; None if it does not. `offset` maps a
+    /// number of steps to mm behind the entry, and rises with it.
     pub fn through(&self, medium: &impl Medium, offset: impl Fn(f64) -> f64) -> ([f64; 4], Option<f64>) {
         let mut light = [0.0; 3];
         let mut opacity = 0.0;

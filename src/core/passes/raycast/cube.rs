@@ -65,7 +65,8 @@ fn stride(scene: &Scene) -> f64 {
     0.5 * scene.grid.pitch[0].min(scene.grid.pitch[1])
 }
 
-/// Where a ray is within all half-spaces, and which of them it enters last.
+/// Where a ray enters and leaves the intersection of half-spaces, mm along it, and the index of the one that it enters last; None if it begins
+/// inside. Returns None if the ray misses the intersection.
 pub(super) fn entry(block: &[HalfSpace], origin: DVec3, direction: DVec3) -> Option<(f64, f64, Option<usize>)> {
     let (mut enter, mut leave, mut face) = (0.0f64, f64::MAX, None);
     for (i, half) in block.iter().enumerate() {

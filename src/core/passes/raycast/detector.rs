@@ -17,10 +17,10 @@
 use crate::probe::Geometry;
 use crate::scene::{Detector, Place, Ring, Scene, Sign, Surface};
 
-/// An edge has been followed when the difference falls below this share of its maximum.
+/// After the crossing of the threshold the detector follows the difference until it falls below this share of its maximum.
 pub(super) const FOLLOW_LEVEL: f64 = 0.7;
 
-/// The factor of the difference; 0 if its size counts.
+/// Factor of the detector's difference by `surface.sign`: 1 for bright, -1 for dark, 0 if its absolute value counts.
 pub(super) fn polarity(scene: &Scene) -> f64 {
     match scene.settings.surface.sign {
         Sign::Bright => 1.0,
@@ -29,13 +29,14 @@ pub(super) fn polarity(scene: &Scene) -> f64 {
     }
 }
 
-/// A difference as the detector judges it.
+/// The difference that is compared with the threshold: times `polarity`, or its absolute value if `polarity` is 0.
 pub(super) fn judged(polarity: f64, difference: f64) -> f64 {
     if polarity == 0.0 { difference.abs() } else { polarity * difference }
 }
 
-/// Place of the surface in samples, and the echo behind it. Sample n is the ray's sample `first + n`; the region begins at its
-/// sample 0, and half a ring later an edge in its middle may be a surface.
+/// Finds the surface in the samples of a ray. Returns its fractional index in `samples` and the echo behind it; None if there is no surface.
+/// `samples[n]` is the ray's sample `first + n`, None outside the insonified region. The region begins at sample 0 of the ray; a surface may lie
+/// there at the earliest, and the samples before it fill the detector's ring.
 pub(super) fn detect(scene: &Scene, samples: &[Option<f64>], first: i64) -> Option<(f64, f64)> {
     // A Cartesian volume repeats its border: that it is even says nothing of the noise.
     let bordered = matches!(scene.geometry, Geometry::Cartesian(_));
@@ -394,7 +395,7 @@ struct Peak {
 /// Halves of the ring in the noise estimate: two rings. More would include samples too far in front of the edge, above all a slope of the gain.
 const MEMORY: f64 = 4.0;
 
-/// Mean and variance of the `learnt` samples that have left the ring's newer half.
+/// Running mean and variance of the samples in front of the detector's newer half ring.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Noise {
     learnt: f64,
@@ -403,7 +404,7 @@ pub(super) struct Noise {
 }
 
 impl Noise {
-    /// Takes the ring's older half, newest first: the first time all of it, then only its newest sample.
+    /// Takes the older half of the ring, newest sample first: all of it the first time, afterwards only its newest sample.
     pub(super) fn learn(&mut self, older: &[f64]) {
         let count = older.len() as f64;
         if self.learnt == 0.0 {

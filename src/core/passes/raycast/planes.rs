@@ -43,7 +43,7 @@ pub(crate) const PASS: Pass = Pass {
     ..Pass::OF_RAYS
 };
 
-/// The pass [`PASS`] that also tones and stores 8 bits.
+/// Does the same as [`PASS`], and also tones the picture and stores it in 8 bits.
 pub(crate) const TONED: Pass = Pass {
     name: "raycast_planes_toned",
     shader: |_, _| "raycast/planes.toned",

@@ -34,7 +34,7 @@ pub(in crate::passes) fn reads(scene: &Scene) -> Vec<Bind> {
     reads
 }
 
-/// What passes that take samples along rays read: with the slots for empty-space skipping.
+/// The slots that passes with samples along rays read, including those for empty-space skipping.
 pub(super) fn marching_reads(scene: &Scene, skipping: Skipping) -> Vec<Bind> {
     let mut reads = reads(scene);
     reads.extend(scene.packs().then_some(whole("packed_neighbours", Slot::PackedNeighbours)));
@@ -73,7 +73,7 @@ pub(in crate::passes) fn constants(scene: &Scene) -> Vec<(&'static str, i32)> {
     ]
 }
 
-/// Constants of the passes that take samples along rays.
+/// Specialization constants of passes that take samples along rays.
 pub(super) fn marching_constants(scene: &Scene, skipping: Skipping) -> Vec<(&'static str, i32)> {
     let mut constants = constants(scene);
     if scene.packs() {
@@ -85,12 +85,12 @@ pub(super) fn marching_constants(scene: &Scene, skipping: Skipping) -> Vec<(&'st
     constants
 }
 
-/// Parameters of a pass that casts no ray: they do not depend on the camera.
+/// Ray parameters for a pass that casts no ray: they do not depend on the camera.
 pub(in crate::passes) fn unmoved_params(scene: &Scene, view: View) -> Params {
     params(&unmoved(scene, [DVec3::ZERO, DVec3::ZERO, DVec3::ZERO, DVec3::Y]), view, 1.0)
 }
 
-/// The scene with rays of one direction from an origin and its steps of a pixel right and down, and without its rays' step.
+/// The scene with another set of parallel rays (`origin`, its change per pixel to the right and down, and `direction`), and without the rays' step.
 pub(super) fn unmoved(scene: &Scene, [origin, origin_dx, origin_dy, direction]: [DVec3; 4]) -> Scene {
     let zero = DVec3::ZERO;
     let rays = crate::scene::Rays {
@@ -220,12 +220,12 @@ fn sector(params: Params, [range_low, range_high, line_low, line_high]: [f64; 4]
         .f32("line_high", line_high)
 }
 
-/// Where the ray of a pixel goes through the picture, rays from its corner.
+/// The position in the picture, in rays from its upper left corner, that the ray (x, y) goes through: the middle of its cell.
 pub(super) fn middle_of(x: usize, y: usize) -> [f64; 2] {
     [x as f64 + 0.5, y as f64 + 0.5]
 }
 
-/// A pixel's ray in f64, and the volume that it goes through.
+/// A ray in f64, and the volume that it goes through.
 pub(super) struct Ray<'a> {
     scene: &'a Scene,
     volume: &'a Texels,
@@ -236,7 +236,8 @@ pub(super) struct Ray<'a> {
     direction: DVec3,
     /// Across the ray, unit length.
     across: [DVec3; 2],
-    /// Interval inside the box and on the near side of every clip plane, mm; leave < enter is a miss.
+    /// Distances along the ray, mm, at which it enters and (`leave`) leaves the box and the near side of all clip planes. The ray misses if leave <
+    /// enter.
     pub enter: f64,
     pub leave: f64,
     /// Ratio of the step at the entry to the scene's step, and the increase of this ratio per mm.
@@ -249,7 +250,7 @@ impl<'a> Ray<'a> {
         Ray::through(scene, volume, view, step, middle_of(x, y))
     }
 
-    /// The ray through a place of the picture, rays from its corner.
+    /// The ray through a position (x, y) of the picture, in rays from its upper left corner.
     pub fn through(scene: &'a Scene, volume: &'a Texels, view: View, step: f64, [x, y]: [f64; 2]) -> Ray<'a> {
         let (origin, direction) = scene.rays.at(x, y);
         let (enter, leave) = span(scene, view, origin, direction);
@@ -270,12 +271,12 @@ impl<'a> Ray<'a> {
         self.leave - self.enter
     }
 
-    /// Where it enters the region; a miss if it does not.
+    /// Distance along the ray at which it enters the region, mm; [`MISS`] if it does not.
     pub(crate) fn enter_or_miss(&self) -> f64 {
         if self.path() > 0.0 { self.enter } else { MISS }
     }
 
-    /// Distance behind the entry after n steps, mm: dt/dn = step (wider + widening t).
+    /// Distance t behind the entry after n steps, mm: the solution of dt/dn = step (wider + widening t).
     pub fn offset(&self, n: f64) -> f64 {
         let rate = self.step * self.widening;
         match rate == 0.0 {
@@ -284,12 +285,12 @@ impl<'a> Ray<'a> {
         }
     }
 
-    /// Length of the step that begins after n steps, mm.
+    /// Length of the step that follows n steps, mm.
     pub fn length(&self, n: f64) -> f64 {
         self.offset(n + 1.0) - self.offset(n)
     }
 
-    /// Steps to an offset.
+    /// Number of steps, which may be fractional, to an offset in mm behind the entry.
     pub(crate) fn steps_to(&self, offset: f64) -> f64 {
         match self.widening == 0.0 {
             true => offset / (self.step * self.wider),
@@ -297,7 +298,7 @@ impl<'a> Ray<'a> {
         }
     }
 
-    /// A place that many mm behind the entry.
+    /// The place in space, mm, at an offset in mm behind the entry.
     pub fn place(&self, offset: f64) -> DVec3 {
         self.origin + self.direction * (self.enter + offset)
     }
@@ -307,13 +308,13 @@ impl<'a> Ray<'a> {
         self.direction
     }
 
-    /// True if the position at this distance behind the entry, mm, is in the insonified region.
+    /// True if the place at an offset in mm behind the entry is in the insonified region.
     pub fn is_inside(&self, offset: f64) -> bool {
         texel(self.scene, self.place(offset)).is_some()
     }
 
-    /// The windowed sample at an offset, which is that of step `n`; none outside the insonified region. With the sliding
-    /// filter it is the weighted mean of the samples of a cube around it that are inside.
+    /// The sample after the grey window, 0..1, at an offset in mm behind the entry, which is that after `n` steps. None outside the insonified
+    /// region. With `ray.sliding` it is the weighted mean of the samples inside the region of a cube around it.
     pub fn sample(&self, offset: f64, n: f64) -> Option<f64> {
         let at = texel(self.scene, self.place(offset))?;
         let edge = i64::from(self.scene.settings.ray.sliding);
@@ -344,7 +345,7 @@ impl<'a> Ray<'a> {
         if weights > 0.0 { sum / weights } else { 0.0 }
     }
 
-    /// The unfiltered sample at a distance along the ray.
+    /// The sample after the grey window, 0..1, at a distance in mm along the ray, without `ray.sliding`. None outside the insonified region.
     pub fn echo(&self, distance: f64) -> Option<f64> {
         let [low, high] = self.window;
         let at = texel(self.scene, self.origin + self.direction * distance)?;
@@ -352,7 +353,7 @@ impl<'a> Ray<'a> {
     }
 }
 
-/// The volume at texture indices, as the scene interpolates it.
+/// The value of the volume at fractional texel indices, interpolated as the scene says.
 pub(in crate::passes) fn interpolated(scene: &Scene, volume: &Texels, at: [f64; 3]) -> f64 {
     if scene.takes_bspline() { volume.bspline_across_slices(at) } else { volume.trilinear(at) }
 }
@@ -369,7 +370,7 @@ fn spread_range(probe: &Probe) -> f64 {
     probe.first_range().max(probe.last_range() / 8.0)
 }
 
-/// Where a ray enters and leaves the rendered region, mm; leave < enter is a miss.
+/// Distances along a ray, mm, at which it enters and leaves the region of `view` and the clip planes. The ray misses if leave < enter.
 pub fn span(scene: &Scene, view: View, origin: DVec3, direction: DVec3) -> (f64, f64) {
     let (mut enter, mut leave) = (0.0f64, f64::MAX);
     for axis in 0..3 {
@@ -396,7 +397,7 @@ pub fn span(scene: &Scene, view: View, origin: DVec3, direction: DVec3) -> (f64,
     (enter, leave)
 }
 
-/// Texture indices of a place in space, beyond the sweep those of its nearest end; none outside the scan lines.
+/// Fractional texel indices of a place in space, mm. Beyond the first and last slice it takes the nearest of them. None outside the scan lines.
 pub(in crate::passes) fn texel_beyond_sweep(scene: &Scene, place: DVec3) -> Option<[f64; 3]> {
     let Geometry::Sweep(probe) = &scene.geometry else { return texel(scene, place) };
     let (x, y, position) = probe.inverse_sweep_map(place);
@@ -414,7 +415,7 @@ pub(in crate::passes) fn texel_beyond_sweep(scene: &Scene, place: DVec3) -> Opti
     inside(probe, in_plane).then_some([pixel[0], pixel[1], slice])
 }
 
-/// Texture indices of a place in space; none outside the insonified region. By the exact inverse of the probe's maps, not by the
+/// Fractional texel indices of a place in space, mm; None outside the insonified region. It uses the exact inverse of the probe's maps, not the
 /// tables that the shader reads.
 pub fn texel(scene: &Scene, place: DVec3) -> Option<[f64; 3]> {
     let grid = &scene.grid;

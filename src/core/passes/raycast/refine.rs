@@ -10,7 +10,7 @@ use crate::passes::postprocess::{tone_constants, tone_params, toned};
 /// Second difference of a pixel's colour on the screen beyond which it has all rays: two levels of the screen.
 const THRESHOLD: f64 = 2.0 / 255.0;
 
-/// Which pixels have all rays.
+/// Marks the pixels at edges, which get all rays of adaptive supersampling.
 pub(crate) const MARK_EDGES: Pass = Pass {
     name: "mark_edges",
     shader: |_, _| "raycast/mark_edges",

@@ -40,14 +40,14 @@ pub(crate) const PASS: Pass = Pass {
     ..Pass::OF_RAYS
 };
 
-/// What the detector writes.
+/// The slots that the surface detector writes: the distance map, and the echo at the surface where light depends on it.
 pub(super) fn writes(scene: &Scene) -> Vec<Bind> {
     let mut writes = vec![whole("distance_map", Slot::Distance)];
     writes.extend(scene.lights_by_echo().then_some(whole("surface", Slot::Surface)));
     writes
 }
 
-/// Parameters of the detector and its rays.
+/// Parameters of the surface detector and its rays.
 pub(super) fn params(scene: &Scene) -> Params {
     let surface = &scene.settings.surface;
     ray::params(scene, scene.surface_view(), scene.ring.step)
@@ -59,7 +59,7 @@ pub(super) fn params(scene: &Scene) -> Params {
         .f32("behind_step", scene.step_behind())
 }
 
-/// Constants of the detector and its rays.
+/// Specialization constants of the surface detector and its rays.
 pub(super) fn constants(scene: &Scene) -> Vec<(&'static str, i32)> {
     let surface = &scene.settings.surface;
     let mut constants = ray::marching_constants(scene, empty_space::surface_skipping(scene));
@@ -87,8 +87,8 @@ pub(super) fn constants(scene: &Scene) -> Vec<(&'static str, i32)> {
     constants
 }
 
-/// Finds the surface on a pixel's ray, and writes its distance, and its echo where the scene stores it. A ray that ends at a cut face has its
-/// surface there.
+/// Finds the surface on a pixel's ray and writes its distance, and its echo where the scene stores it. On a ray that ends at a cut face, the face is
+/// the surface.
 pub(super) fn reference_ray(scene: &Scene, reads: &Arrays, writes: &mut Arrays, x: usize, y: usize) {
     let ray = ray::Ray::cast(scene, reads.get("volume"), scene.surface_view(), scene.ring.step, x, y);
     let count = ray.steps_to(ray.path().max(0.0)).floor() as i64;
@@ -116,7 +116,8 @@ pub(super) fn reference_ray(scene: &Scene, reads: &Arrays, writes: &mut Arrays, 
     }
 }
 
-/// Mean echo over the depth behind the surface that skin shading needs.
+/// Mean sample over the depth that skin shading looks behind the surface, which is at `distance` mm along the ray. Samples outside the insonified
+/// region count as 0.
 pub(super) fn behind(scene: &Scene, ray: &ray::Ray, distance: f64) -> f64 {
     let count = scene.samples_behind();
     let sum: f64 = (1..=count).filter_map(|i| ray.echo(distance + f64::from(i) * scene.step_behind())).sum();

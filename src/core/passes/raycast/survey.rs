@@ -9,21 +9,21 @@ use crate::scene::{Mode, Scene, View};
 const RAYS: usize = 4096;
 const SAMPLES: f64 = 1024.0;
 
-/// What the rays, or the points of planes, meet.
+/// Statistics of what the rays, or the points of planes, meet in the volume.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Survey {
-    /// Number of rays that pass through the rendered box within all clip planes. For planes, number of points there.
+    /// Number of rays that pass through the rendered box on the near side of all clip planes. For planes, number of points there.
     pub met: usize,
-    /// Number of samples in the insonified region, of at most 4096 of those rays.
+    /// Number of samples in the insonified region that were taken on at most 4096 of those rays.
     pub insonified: usize,
-    /// Smallest and largest of these samples, 0..1 before the grey window. None without any.
+    /// Smallest and largest of these samples, 0..1 before the grey window. None if there are none.
     pub values: Option<[f64; 2]>,
-    /// Mode surface and mixed: the largest difference of two neighbouring means of the length of an edge, after the grey window, by the
-    /// sign of `surface.sign`. 0 in other modes.
+    /// Modes surface and mixed: the largest difference of the means of two neighbouring stretches of a ray, each as long as `surface.edge`, after the
+    /// grey window and with the sign of `surface.sign`. 0 in other modes.
     pub edge: f64,
 }
 
-/// The view of the mode: its grey window, and its part of the region.
+/// The region and grey window that the scene's mode renders with.
 pub fn view(scene: &Scene) -> View {
     match scene.settings.mode {
         Mode::Volume => scene.volume_view(),
@@ -34,7 +34,8 @@ pub fn view(scene: &Scene) -> View {
     }
 }
 
-/// Surveys a scene. `volume`: the texels of its volume, 0..1, of which those within the visible bounds are read.
+/// Samples the volume along the scene's rays, or on its planes. `volume`: the texels of its volume, 0..1, of which those within the visible bounds
+/// are read.
 pub fn survey(scene: &Scene, volume: &Texels) -> Survey {
     let mut survey = Survey::default();
     if scene.is_flat() {

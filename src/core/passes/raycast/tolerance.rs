@@ -21,7 +21,7 @@ use crate::passes::postprocess::{tone_constants, tone_params, toned};
 use crate::scene::{Scene, transfer};
 use glam::DVec3;
 
-/// Levels of the screen in the range 0..1.
+/// Levels of a picture of 8 bits that make the range 0..1.
 pub const LEVELS: f64 = 255.0;
 
 /// How often a step is halved, at most.
@@ -58,12 +58,12 @@ fn early_end(scene: &Scene) -> f64 {
     scene.settings.ray.early_end.min(allowed(scene) / LEVELS)
 }
 
-/// Rays of the lattice: one through every other pixel of every other row.
+/// Size of the lattice of first rays: one through every other pixel of every other row.
 pub(crate) fn lattice_size(scene: &Scene) -> [u32; 2] {
     scene.ray_size().map(|n| n.div_ceil(2))
 }
 
-/// Tiles of a picture.
+/// Number of tiles of 8 x 8 pixels of a picture, along both axes.
 pub fn tiles(scene: &Scene) -> [u32; 2] {
     scene.ray_size().map(|n| n.div_ceil(TILE))
 }
@@ -82,7 +82,7 @@ fn brightest(scene: &Scene) -> f64 {
     }
 }
 
-/// The rays of the lattice. They begin with the scene's step.
+/// Casts the rays of the lattice, with the scene's step at first and with shorter ones where the error is too large.
 pub const FIRST: Pass = Pass {
     name: "tolerance_first",
     shader: |_, _| "tolerance/cast.first",
@@ -137,7 +137,7 @@ pub const FIRST: Pass = Pass {
     ..volume::PASS
 };
 
-/// All pixels from the rays of the lattice, and which of them have too large an error.
+/// Computes all pixels and their errors from the rays of the lattice, and marks the pixels whose error is too large.
 pub const ENLARGE: Pass = Pass {
     name: "tolerance_enlarge",
     shader: |_, _| "tolerance/enlarge",
@@ -204,7 +204,7 @@ fn marked(marks: &Texels, tile: usize) -> u32 {
     marks.values[2 * tile..2 * tile + 2].iter().map(|word| (*word as u32).count_ones()).sum()
 }
 
-/// The marked pixels in order of tiles: one workgroup counts them.
+/// Lists the marked pixels in the order of their tiles; a single workgroup counts them.
 pub const LIST: Pass = Pass {
     name: "tolerance_list",
     shader: |_, _| "tolerance/list",
@@ -231,7 +231,7 @@ pub const LIST: Pass = Pass {
     ..ENLARGE
 };
 
-/// The rays of the listed pixels.
+/// Casts a ray for each listed pixel.
 pub(crate) const REFINE: Pass = Pass {
     name: "tolerance_refine",
     shader: |_, _| "tolerance/cast.refine",

@@ -77,7 +77,7 @@ pub(crate) const PASS: Pass = Pass {
     ..Pass::OF_RAYS
 };
 
-/// With adaptive supersampling, the rays of the pixels that are marked.
+/// Casts all rays of the pixels that adaptive supersampling has marked.
 pub(crate) const REFINED: Pass = Pass {
     name: "raycast_refined",
     needed: |s| match s.adapts_rays() {
@@ -145,7 +145,7 @@ fn reference_rays(
     }
 }
 
-/// Adds the numbers of compositing with this step, mm, to those of a pass.
+/// Adds the parameters of compositing with a step of `step` mm to those of a pass.
 pub(super) fn compositing_params(scene: &Scene, params: Params, step: f64) -> Params {
     let volume = &scene.settings.volume;
     let (axis, near) = depth_axis(scene);
@@ -159,7 +159,7 @@ pub(super) fn compositing_params(scene: &Scene, params: Params, step: f64) -> Pa
     light_volume::params(scene, params)
 }
 
-/// Constants of compositing; `is_alone`: what is composited fills the picture.
+/// Specialization constants of compositing. `is_alone`: the composited volume is the whole picture.
 pub(super) fn compositing_constants(scene: &Scene, is_alone: bool) -> Vec<(&'static str, i32)> {
     let compositing = match scene.settings.volume.compositing {
         Compositing::Riemann => 0,
@@ -177,7 +177,7 @@ pub(super) fn compositing_constants(scene: &Scene, is_alone: bool) -> Vec<(&'sta
     constants
 }
 
-/// Red, green, blue and opacity of a whole ray with this step, mm, through the table of the transfer function over the value.
+/// Red, green, blue and opacity of the whole ray of pixel (x, y) with a step of `step` mm, through the transfer function.
 pub(super) fn composited(scene: &Scene, reads: &Arrays, step: f64, [x, y]: [usize; 2]) -> [f64; 4] {
     let ray = ray::Ray::cast(scene, reads.get("volume"), scene.volume_view(), step, x, y);
     let tables = Tables { of_steps: reads.get("transfer"), curve: Vec::new(), lit: Lit::new(scene, reads) };
@@ -208,7 +208,7 @@ fn kind(scene: &Scene) -> Kind {
     }
 }
 
-/// The length for which the transfer function's opacities are given: one slice pixel, mm.
+/// The length that the transfer function's opacities refer to: one slice pixel, mm.
 pub fn reference_length(scene: &Scene) -> f64 {
     scene.reference_length()
 }
@@ -217,11 +217,12 @@ fn is_exponential(scene: &Scene) -> bool {
     scene.settings.volume.compositing == Compositing::Exponential
 }
 
-/// The tables of the transfer function that the pass reads.
+/// What compositing looks up: the transfer function and the light volume.
 pub(super) struct Tables<'a> {
-    /// Over the value, or between the values at both ends of a step.
+    /// The transfer function over the sample value or, with pre-integration, over the sample values at both ends of a step.
     pub of_steps: &'a Texels,
-    /// Over the value: what a step of another length is integrated from. Empty unless the rule is exponential.
+    /// The transfer function over the sample value, from which a step of another length is integrated. Empty unless `volume.compositing` is
+    /// exponential.
     pub curve: Vec<[f64; 4]>,
     pub lit: Option<Lit<'a>>,
 }
@@ -237,7 +238,7 @@ fn curve(scene: &Scene, table: &Texels) -> Vec<[f64; 4]> {
     }
 }
 
-/// Depth of a place along the view: its dot product with the first, less the second, is 0 at the box's nearest corner and 1 at
+/// A vector and a number: the vector's dot product with a place, less the number, is the depth along the view, 0 at the box's nearest corner and 1 at
 /// its farthest.
 pub fn depth_axis(scene: &Scene) -> (DVec3, f64) {
     let forward = scene.rays.forward;
@@ -247,7 +248,7 @@ pub fn depth_axis(scene: &Scene) -> (DVec3, f64) {
     (forward / (2.0 * half), (forward.dot(middle) - half) / (2.0 * half))
 }
 
-/// The volume along a ray, through the transfer function and the tints by depth.
+/// The volume along a ray as a [`Medium`]: through the transfer function and the tints by depth.
 pub(super) struct RayMedium<'a> {
     scene: &'a Scene,
     ray: &'a ray::Ray<'a>,
@@ -273,7 +274,7 @@ impl<'a> RayMedium<'a> {
         [r, g, b, kappa * self.scene.faded(place)]
     }
 
-    /// A colour of a place under the light of another, and the tint by depth.
+    /// The colour `rgb` at `place` after the light of the light volume at `lit_at` and the tint by depth.
     pub(crate) fn tinted_at(&self, rgb: [f64; 3], place: DVec3, lit_at: DVec3) -> [f64; 3] {
         let settings = &self.scene.settings.volume;
         let rgb = match &self.tables.lit {
@@ -352,7 +353,7 @@ fn between(low: [f64; 4], high: [f64; 4], share: f64) -> [f64; 4] {
     std::array::from_fn(|c| low[c] + (high[c] - low[c]) * share)
 }
 
-/// Index of the entry before a value in 0..1, and the fraction to the next entry.
+/// For a table of `entries` equidistant entries: index of the entry before a value in 0..1, and the fraction of the way to the next entry.
 pub(super) fn placed(value: f64, entries: usize) -> (usize, f64) {
     let at = value * (entries - 1) as f64;
     let n = (at.floor() as usize).min(entries - 2);

@@ -10,17 +10,17 @@ use glam::DVec3;
 /// Cells along each edge of a tile between whose corners a line is straight: surface and curve are smooth.
 const CELLS: usize = 72;
 
-/// The line of the render start on a tile, in straight pieces.
+/// The line on one tile along which its plane cuts the start surface or start curve, in straight pieces.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StartLine {
-    /// Corner and size of the tile, pixels of the picture.
+    /// Upper left corner and size of the tile, pixels of the picture.
     pub tile: [[f64; 2]; 2],
     /// The ends of each piece, pixels of the picture.
     pub pieces: Vec<[[f64; 2]; 2]>,
 }
 
-/// The lines at which the planes beside a rendering cut the render start, by tile. Empty if nothing is removed, or if planes have no lines.
-/// `unveiled`: the result of the search in the volume that is drawn.
+/// The lines at which the planes beside a rendering cut the start surface or start curve, one entry a tile. Empty if nothing is removed in front of
+/// the render start, or if no lines are drawn over planes. `unveiled`: the result of the search in the volume that is drawn.
 pub fn lines(scene: &Scene, unveiled: Option<&Unveiled>) -> Vec<StartLine> {
     let removes = |unveiled: &&Unveiled| unveiled.outcome.is_found() && unveiled.rows.iter().any(|row| *row > 0.0);
     let start = Start {

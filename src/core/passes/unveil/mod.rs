@@ -40,39 +40,39 @@ const LEAST_CONTRAST: u32 = LEVELS / 8;
 /// Least share of the columns in view that have a near face, per cent.
 const LEAST_SHARE: u32 = 40;
 
-/// The result of the search in a volume.
+/// The start surface that the search for the pocket of fluid found in a volume.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Unveiled {
     pub outcome: Outcome,
-    /// Row at which rendering starts, by column and slice of the volume, the column fastest. All 0 if the pocket was not recognised.
+    /// Row at which rendering starts, for each column and slice of the volume, the column fastest. All 0 if the pocket was not recognised.
     pub rows: Vec<f32>,
 }
 
-/// Whether the pocket of fluid was recognised.
+/// Whether the search recognised the pocket of fluid in front of a face.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// The pocket was recognised.
+    /// It was recognised: rendering starts at its near face.
     Found(Evidence),
     /// No fluid lies in front of tissue.
     NoPocket,
-    /// The pocket is hardly darker than the tissue around it.
+    /// The pocket is hardly darker than the tissue around it, so that it is not used.
     NoContrast(Evidence),
-    /// Too few columns in view meet the pocket.
+    /// Too few of the columns in view meet the pocket, so that it is not used.
     TooSmall(Evidence),
 }
 
-/// The evidence for a pocket.
+/// What was measured on the pocket. Grey levels are 0..=1024, for sample values of 0..1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Evidence {
-    /// Grey level of the tissue in front of the pocket or behind it, whichever is darker. `pocket` is that of the pocket.
+    /// Grey level of the tissue in front of the pocket or behind it, whichever is darker.
     pub tissue: u32,
     pub pocket: u32,
-    /// Measured share of the volume's columns in view, per cent, in which the pocket's near face was found or that begin in the pocket.
+    /// Per cent of the columns in view in which the pocket's near face was found, or that begin inside the pocket.
     pub share: u32,
 }
 
 impl Outcome {
-    /// True if rendering starts at the fluid.
+    /// True if the pocket was recognised, so that rendering starts at its near face.
     pub fn is_found(&self) -> bool {
         matches!(self, Outcome::Found(_))
     }
@@ -116,8 +116,7 @@ pub(super) const SEARCH: Search = Search {
     reference: |scene, volume| reference(scene, volume).0,
 };
 
-/// Finds where rendering starts in each column of a volume. `bytes`: all texels of the volume in the format of [`Slot::Volume`], not only the
-/// visible ones.
+/// Searches a volume for the pocket of fluid. `bytes`: all texels of the volume, not only the visible ones, in the format of [`Slot::Volume`].
 pub fn find(scene: &Scene, bytes: &[u8]) -> Unveiled {
     let lattice = scene.fluid_lattice();
     let cells = smoothed_cells(&lattice, cells(scene, &lattice, bytes));

@@ -79,7 +79,7 @@ impl Body {
         Body::Breast,
     ];
 
-    /// Name of the part for the user.
+    /// Name of the part of the body that the user reads.
     pub fn title(self) -> &'static str {
         match self {
             Body::Abdomen => "Abdomen",

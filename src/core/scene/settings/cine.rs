@@ -25,14 +25,15 @@ impl Default for Cine {
 }
 
 impl Cine {
-    /// The numbers of the volumes that are played, ascending, for a recording of `count` volumes. Empty if the marks are not among them.
+    /// The numbers of the volumes that are played, ascending, for a recording of `count` volumes. Empty if `first` and `last` are not among them.
     pub fn volumes(&self, count: usize) -> Vec<usize> {
         let first = self.first.map_or(0, |first| first as usize);
         let last = self.last.map_or(count.saturating_sub(1), |last| last as usize);
         (first..count.min(last.saturating_add(1))).collect()
     }
 
-    /// The same in the order of a film that is repeated, also backwards if the loop is played back and forth. Each end is there once.
+    /// The numbers of the volumes in the order of a film that is repeated. If the loop is played back and forth, it includes the way back, and each
+    /// end is there once.
     pub fn film(&self, count: usize) -> Vec<usize> {
         let mut order = self.volumes(count);
         if self.back_and_forth {

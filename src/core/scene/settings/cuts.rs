@@ -47,7 +47,7 @@ pub struct Brush {
 }
 
 impl Brush {
-    /// Points of all strokes.
+    /// Number of points of all strokes.
     pub fn points(&self) -> usize {
         self.strokes.iter().map(Vec::len).sum()
     }

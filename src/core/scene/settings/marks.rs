@@ -69,7 +69,8 @@ impl Sides {
         }
     }
 
-    /// The direction from its first end to its last, in axes of the patient to the left, to the back and to the head; 0 if it is not known.
+    /// Unit vector from the axis's first end to its last, in the patient's axes: to the left, to the back, to the head. Zero if the sides are not
+    /// known.
     pub(crate) fn direction(self) -> DVec3 {
         match self {
             Sides::None => DVec3::ZERO,
@@ -80,14 +81,14 @@ impl Sides {
         }
     }
 
-    /// The sides in this direction.
+    /// The sides along an axis that runs in this direction of the patient, as [`Sides::direction`].
     pub(crate) fn along(direction: DVec3) -> Sides {
         let all = [Sides::RightLeft, Sides::FrontBack, Sides::FeetHead];
         let all = all.into_iter().flat_map(|sides| [sides, sides.exchanged()]);
         all.max_by(|a, b| a.direction().dot(direction).total_cmp(&b.direction().dot(direction))).unwrap_or_default()
     }
 
-    /// The letters at the two ends of the axis.
+    /// The letters at the first and the last end of the axis. None if the sides are not known.
     pub fn letters(self) -> Option<[&'static str; 2]> {
         Some(match self {
             Sides::None => return None,

@@ -5,17 +5,17 @@ use crate::scene::number::Allowed::Range;
 use crate::scene::number::{Number, SHARE, number};
 use serde::{Deserialize, Serialize};
 
-/// Most measurements and annotations of a scene.
+/// Largest number of measurements and annotations of a scene.
 pub const MAX_MEASURES: usize = 64;
-/// Most points of a measurement, or of one of its contours.
+/// Largest number of points of a measurement, or of one of its contours.
 pub const MAX_POINTS: usize = 512;
-/// Most points of all measurements of a scene.
+/// Largest number of points of all measurements of a scene.
 pub const MAX_ALL_POINTS: usize = 20_000;
-/// Most contours of a volume.
+/// Largest number of contours of a volume measurement.
 pub const MAX_CONTOURS: usize = 64;
 /// Longest text of a measurement, characters.
 pub const MAX_TEXT: usize = 80;
-/// Longest words on what a measurement was made on, characters.
+/// Longest description of what a measurement was made on, characters.
 pub(crate) const MAX_MADE: usize = 200;
 
 /// A measurement or an annotation. It keeps its place in the volume whatever the view.
@@ -92,22 +92,22 @@ pub enum MeasureKind {
 }
 
 impl Measurement {
-    /// The number of its volume, if it is another one than that which is shown.
+    /// The number of the volume that it was made on, if that is not the volume `shown`; else None.
     pub fn other_volume(&self, shown: Option<u32>) -> Option<u32> {
         self.made.as_ref().map(|made| made.volume).filter(|volume| shown.is_some_and(|shown| shown != *volume))
     }
 
-    /// Number of its points, those of its contours included.
+    /// Number of points, those of contours included.
     pub fn count(&self) -> usize {
         self.points.len() + self.contours.iter().map(Vec::len).sum::<usize>()
     }
 
-    /// Words on the line along which a length is measured.
+    /// What the user reads on the line along which a length is measured.
     pub fn way(&self) -> &'static str {
         if self.on_surface { "along the surface" } else { "along the line" }
     }
 
-    /// Name of the measurement for the user.
+    /// Name of the measurement that the user reads.
     pub fn title(&self) -> &'static str {
         match (self.kind, self.on_surface) {
             (MeasureKind::Surface, false) => "Along a line",
@@ -130,7 +130,7 @@ impl MeasureKind {
         MeasureKind::Arrow,
     ];
 
-    /// Name of the kind for the user.
+    /// Name of the kind that the user reads.
     pub fn title(self) -> &'static str {
         match self {
             MeasureKind::Distance => "Caliper",
@@ -145,7 +145,7 @@ impl MeasureKind {
         }
     }
 
-    /// Number of points that complete the measurement. None for kinds that the user ends.
+    /// Number of points at which a measurement of this kind is complete. None for kinds that the user ends.
     pub fn complete_at(self) -> Option<usize> {
         match self {
             MeasureKind::Text => Some(1),

@@ -31,7 +31,7 @@ use super::number::Allowed::{Any, Range};
 use super::number::{Group, LARGEST, LENGTH_OR_0, Number, PLACE, SHARE, number};
 use serde::{Deserialize, Serialize};
 
-/// Fewest and most points of a curved render start.
+/// Fewest points of a curved render start (`region.start_curve`).
 pub const MIN_START_POINTS: usize = 3;
 pub const MAX_START_POINTS: usize = 5;
 
@@ -117,7 +117,7 @@ impl Settings {
         self.with_drawings_of(&Settings::default())
     }
 
-    /// Changes the mode, and the layout where it does not fit the mode: planes have no layout, and a pair is of mode surface.
+    /// Changes the mode, and the layout if it does not fit: modes of planes have layout single, and layout pair needs mode surface.
     pub fn set_mode(&mut self, mode: Mode) {
         self.mode = mode;
         if mode.is_flat() || (self.layout == Layout::Pair && mode != Mode::Surface) {
@@ -271,7 +271,7 @@ impl Default for Cap {
     }
 }
 
-/// Every number with a row, in the order of their sliders.
+/// All numbers of the settings that have a [`Number`], in the order of their sliders.
 pub fn numbers() -> impl Iterator<Item = &'static Number> {
     NUMBERS.iter().copied().flatten()
 }

@@ -146,17 +146,17 @@ impl Default for Cube {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Inset {
-    /// The face at -lateral.
+    /// How far the face towards -lateral is moved inwards, mm.
     pub left: f64,
-    /// The face at +lateral.
+    /// How far the face towards +lateral is moved inwards, mm.
     pub right: f64,
-    /// The face nearest to the probe.
+    /// How far the face nearest to the probe is moved inwards, mm.
     pub near: f64,
-    /// The face farthest from the probe.
+    /// How far the face farthest from the probe is moved inwards, mm.
     pub far: f64,
-    /// The face at -elevation.
+    /// How far the face towards -elevation is moved inwards, mm.
     pub bottom: f64,
-    /// The face at +elevation.
+    /// How far the face towards +elevation is moved inwards, mm.
     pub top: f64,
 }
 
@@ -165,17 +165,17 @@ pub struct Inset {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Tilt {
-    /// The face at -lateral.
+    /// Tilt of the face towards -lateral, two angles in deg.
     pub left: [f64; 2],
-    /// The face at +lateral.
+    /// Tilt of the face towards +lateral, two angles in deg.
     pub right: [f64; 2],
-    /// The face nearest to the probe.
+    /// Tilt of the face nearest to the probe, two angles in deg.
     pub near: [f64; 2],
-    /// The face farthest from the probe.
+    /// Tilt of the face farthest from the probe, two angles in deg.
     pub far: [f64; 2],
-    /// The face at -elevation.
+    /// Tilt of the face towards -elevation, two angles in deg.
     pub bottom: [f64; 2],
-    /// The face at +elevation.
+    /// Tilt of the face towards +elevation, two angles in deg.
     pub top: [f64; 2],
 }
 
@@ -184,7 +184,7 @@ fn inset_limits(scene: &Scene, axis: usize, across: f64) -> [f64; 2] {
     [0.0, (scene.high - scene.low)[axis] - across - 2.0]
 }
 
-/// The row of a face's inset.
+/// Makes the [`Number`](crate::scene::Number) of the inset of one face.
 macro_rules! inset {
     ($face:ident, $axis:expr, $opposite:ident, $name:expr, $hint:expr) => {
         number!(cube.inset.$face, "mm", LENGTH_OR_0)

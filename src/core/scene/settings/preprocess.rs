@@ -20,7 +20,7 @@ pub struct Conditioning {
     /// Standard deviation of the Gaussian low pass along each line, samples; 0 for none. Absent: half the decimation factor if
     /// lines are decimated, else none.
     pub low_pass: Option<f64>,
-    /// The same in mm along the line, in place of `low_pass`; at most 32 samples.
+    /// Standard deviation of the low pass in mm along the line, in place of `low_pass`; at most 32 samples.
     pub low_pass_mm: Option<f64>,
     /// Most samples per line. Longer lines are low-passed and decimated by the smallest integer factor that meets this.
     pub samples: Option<u32>,
@@ -62,7 +62,7 @@ impl Conditioning {
         }
     }
 
-    /// Decimation factor for lines of `samples` samples.
+    /// Decimation factor for lines of `samples` samples, by the setting `samples`; 1 if it is absent.
     pub fn factor(&self, samples: usize) -> u32 {
         let most = self.samples.map_or(samples, |most| most.max(1) as usize);
         samples.div_ceil(most).max(1) as u32
@@ -85,9 +85,9 @@ pub struct Slices {
     pub pixels: u32,
     /// Median filter of 3x3 pixels.
     pub median: bool,
-    /// A local estimator as a filter.
+    /// A local estimator, applied as a filter. Absent: none.
     pub estimator: Option<Estimator>,
-    /// Edge constant k of the estimator perona-malik: differences above it, in 0..1, are preserved.
+    /// Edge constant k of a Perona-Malik estimator, in sample values of 0..1: differences above it are preserved.
     pub estimator_edge: f64,
     /// Sigma filter.
     pub sigma: Option<Sigma>,
@@ -149,7 +149,7 @@ pub enum VolumeFormat {
 }
 
 impl VolumeFormat {
-    /// The name in settings.
+    /// The format's name in settings.
     pub fn name(self) -> &'static str {
         match self {
             VolumeFormat::Auto => "auto",
@@ -167,8 +167,7 @@ impl VolumeFormat {
 pub struct Sigma {
     /// Window size, pixels.
     pub window: u32,
-    /// The same in mm, in place of `window`: the nearest odd number of pixels, at most 63; less than two are no filter. Not
-    /// in `post`.
+    /// Window size in mm, in place of `window`: the nearest odd number of pixels, at most 63; less than two are no filter. Not in `post`.
     pub window_mm: Option<f64>,
     /// Standard deviation of the noise. A neighbour counts within 2 sigma. In 0..1 on slices and pictures, in mm on distances; relative to
     /// the centre's value if the noise is multiplicative.
@@ -205,9 +204,9 @@ pub struct EnhancedSigma {
     pub window: u32,
     /// Largest window size, pixels. Thesis Tables 7-9: 17, 19, 19 (21 in Table 8), 21, 21, 23 for starts of 3, 5, 7, 9, 11, 13.
     pub largest: u32,
-    /// The starting window in mm, in place of `window`: the nearest odd number of pixels. Not in `post`.
+    /// Starting window size in mm, in place of `window`: the nearest odd number of pixels. Not in `post`.
     pub window_mm: Option<f64>,
-    /// The largest window in mm, in place of `largest`: as large as the first at least; less than two pixels are no filter. Not in `post`.
+    /// Largest window size in mm, in place of `largest`: at least that of the starting window; less than two pixels are no filter. Not in `post`.
     pub largest_mm: Option<f64>,
     /// Standard deviation of the noise. A neighbour counts within 2 sigma of the centre. In 0..1 on slices and on the brightness of
     /// pictures, in mm on distances; relative to the centre if the noise is multiplicative.
@@ -254,7 +253,7 @@ pub enum Estimator {
 }
 
 impl Estimator {
-    /// The name in settings and tables.
+    /// The estimator's name in settings and tables.
     pub fn name(self) -> &'static str {
         match self {
             Estimator::Median => "median",
@@ -300,8 +299,8 @@ impl Default for PeronaMalik {
 }
 
 impl PeronaMalik {
-    /// Reach of the diffusion, pixels: three standard deviations of the heat equation, whose variance is twice the time. The explicit
-    /// scheme reaches at most one pixel per step. At most 64.
+    /// How far the diffusion reaches, pixels: three standard deviations of the heat equation, whose variance is twice the time. The explicit scheme
+    /// reaches at most one pixel per step. At most 64.
     pub fn reach(&self) -> f64 {
         let steps = f64::from(self.repeat);
         let spread = 3.0 * (2.0 * self.step * steps).sqrt();
@@ -309,8 +308,8 @@ impl PeronaMalik {
         carried.min(64.0)
     }
 
-    /// Stages s of a step of RKL1: the smallest odd number, at least 3, for which (s^2 + s)/2 times the explicit scheme's limit of 1/4 is not
-    /// exceeded (Meyer, Balsara and Aslam 2014). Odd numbers damp the highest frequencies.
+    /// Number of stages s of an RKL1 step: the smallest odd number, at least 3, for which the step is at most (s^2 + s)/2 times the explicit scheme's
+    /// limit of 1/4 (Meyer, Balsara and Aslam 2014). Odd numbers damp the highest frequencies.
     pub fn stages(&self) -> u32 {
         (1..).map(|n| 2 * n + 1).find(|s| f64::from(s * s + s) / 8.0 >= self.step.min(200.0)).unwrap_or(3)
     }
@@ -357,7 +356,7 @@ pub struct Smooth {
     pub depth: f64,
     /// Standard deviation along elevation, slices.
     pub elevation: f64,
-    /// The same in mm at the middle of the region, in place of `elevation`: it follows the slice pitch. At most 32 slices.
+    /// Standard deviation along elevation in mm at the middle of the region, in place of `elevation`: it follows the slice pitch. At most 32 slices.
     pub elevation_mm: Option<f64>,
     /// Taps along each axis, in place of the deviations above: a Gaussian in pixels, pixels and slices with the deviation
     /// sqrt(n - 1) / 2 of the binomial of n taps, cut off there.
@@ -374,7 +373,7 @@ fn with_enhanced_sigma(filter: Option<EnhancedSigma>, sigma: f64) -> Option<Enha
 
 const WINDOW: Allowed = Odd(3.0, MAX_WINDOW as f64);
 
-/// The rows of the filters that slices, distances and pictures have, but for those with sliders.
+/// Makes the [`Number`](crate::scene::Number) rows of filters that slices, distance maps and pictures have, except those with sliders.
 macro_rules! filters {
     ($of:ident) => {
         &[
@@ -393,7 +392,7 @@ macro_rules! filters {
     };
 }
 
-/// The rows of a Gaussian.
+/// Makes the rows of the numbers of a Gaussian ([`Smooth`]).
 macro_rules! smooth {
     ($of:ident) => {
         &[
@@ -473,7 +472,7 @@ pub enum Blur {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum BlurName {
-    /// In modes that cast rays.
+    /// In modes that cast rays, and not in modes of planes.
     Rendered,
 }
 
@@ -484,7 +483,7 @@ impl Default for Blur {
 }
 
 impl Blur {
-    /// True if slices are blurred in a mode that shows planes (`is_flat`), or casts rays.
+    /// True if slices are blurred in a mode of planes (`is_flat`) or in one that casts rays (not `is_flat`).
     pub fn is_on(self, is_flat: bool) -> bool {
         match self {
             Blur::Always(on) => on,

@@ -117,7 +117,7 @@ pub enum Sampling {
 }
 
 impl Sampling {
-    /// Description for `--explain` and profiles.
+    /// Description of the sampling for `--explain` and profiles.
     pub fn words(self) -> &'static str {
         match self {
             Sampling::Auto => "the fastest for the device",
@@ -161,7 +161,8 @@ pub enum Elevation {
 pub struct Volume {
     /// Grey window: samples in this interval are stretched to 0..1 first.
     pub window: [f64; 2],
-    /// Start depth: rays ignore everything above it, mm below the probe's face (Cartesian: along the depth axis).
+    /// Start depth, mm below the probe's face (Cartesian: along the depth axis): rays ignore everything nearer to the probe. Absent: the region's
+    /// near face.
     pub start_depth: Option<f64>,
     /// Transfer function.
     pub transfer: Transfer,
@@ -169,11 +170,11 @@ pub struct Volume {
     pub colour: Option<TransferName>,
     /// Opacities of this function in place of those of `transfer`.
     pub opacity: Option<TransferName>,
-    /// Extinction where the transfer function's opacity is 1, in proportion to the opacity. Absent: opacities are those of one voxel
+    /// Extinction where the transfer function's opacity is 1, 1/mm; elsewhere in proportion to the opacity. Absent: opacities are those of one voxel
     /// (one slice pixel).
     pub extinction: Option<f64>,
-    /// Entries of its table, 16..=4096 (1024 with pre-integrated compositing); absorption is linear between two. Absent: 256, or
-    /// as many as it takes to meet points of the transfer function that are closer than an entry.
+    /// Entries of the transfer function's table, 16..=4096 (at most 1024 with pre-integrated compositing); absorption is linear between two. Absent:
+    /// 256, or as many as it takes to meet points of the transfer function that are closer than an entry.
     pub entries: Option<u32>,
     /// Samples below this are transparent, after the window.
     pub threshold: f64,
@@ -289,11 +290,11 @@ pub struct TransferPoint {
 pub struct Surface {
     /// Grey window: samples in this interval are stretched to 0..1 first.
     pub window: [f64; 2],
-    /// Start depth: rays ignore everything above it, mm below the probe's face.
+    /// Start depth, mm below the probe's face: rays ignore everything nearer to the probe. Absent: the region's near face.
     pub start_depth: Option<f64>,
     /// Detection rule.
     pub detector: Detector,
-    /// Detectors `adaptive` and `lasting`: an edge counts at once if it exceeds this many standard deviations of the noise before it.
+    /// Detectors adaptive and lasting: an edge counts at once if its difference exceeds this many standard deviations of the noise in front of it.
     pub noise: f64,
     /// Length of an edge, mm: the difference is the mean echo over this length behind a place minus the mean echo over this length in front
     /// of it, at any step of the rays. The detector takes at least 4 and at most 256 samples of this length. `samples`: 4 steps of the
@@ -314,7 +315,7 @@ pub struct Surface {
     pub number: u32,
     /// What is lit: a constant colour, or the volume through the transfer function.
     pub colour: SurfaceColour,
-    /// Depth of the volume behind the surface that gives it its colour with `colour = "behind"`.
+    /// Depth, mm, of the volume behind the surface that gives the surface its colour with `colour = "behind"`.
     pub colour_depth: f64,
 }
 
@@ -420,7 +421,7 @@ pub enum Place {
 pub struct Projection {
     /// Grey window: samples in this interval are stretched to 0..1 first.
     pub window: [f64; 2],
-    /// Start depth: rays ignore everything above it, mm below the probe's face.
+    /// Start depth, mm below the probe's face: rays ignore everything nearer to the probe. Absent: the region's near face.
     pub start_depth: Option<f64>,
 }
 

@@ -12,9 +12,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Distance {
-    /// Window size of the median filter, pixels of the distance map; 0 for none.
+    /// Window size of the median filter, pixels of the distance map; odd, 0 for none.
     pub median: u32,
-    /// The same in mm at the middle of the region, in place of `median`: the nearest odd number of pixels, at most 63; less
+    /// Window size of the median filter in mm at the middle of the region, in place of `median`: the nearest odd number of pixels, at most 63; less
     /// than two are no filter.
     pub median_mm: Option<f64>,
     /// Bilateral filter.
@@ -28,7 +28,7 @@ pub struct Distance {
 }
 
 impl Distance {
-    /// The filters for half as many rays per axis. They cover the same part of the picture, and diffusion runs for the same time.
+    /// The filters for half as many rays along each axis: windows cover the same part of the picture, and diffusion spreads as far.
     pub fn halved(&self) -> Distance {
         let window = |edge: u32| 2 * (edge / 4).max(1) + 1;
         let half = |mm: Option<f64>| mm.map(|mm| mm / 2.0);
@@ -61,7 +61,7 @@ pub struct Bilateral {
     /// Standard deviation in the picture, pixels.
     #[serde(default)]
     pub pixels: f64,
-    /// The same in mm at the middle of the region, in place of `pixels`: at most 10 pixels; less than a tenth is no filter.
+    /// Standard deviation in the picture in mm at the middle of the region, in place of `pixels`: at most 10 pixels; less than a tenth is no filter.
     #[serde(default)]
     pub mm: Option<f64>,
     /// Standard deviation of the distance, mm.
@@ -72,7 +72,7 @@ pub struct Bilateral {
 }
 
 impl Bilateral {
-    /// Least and largest standard deviation in the picture, pixels.
+    /// Smallest standard deviation in the picture, pixels.
     pub(crate) const MIN_PIXELS: f64 = 0.1;
     pub const MAX_PIXELS: f64 = 10.0;
 }
@@ -175,14 +175,14 @@ pub struct LightVolume {
     pub widening: f64,
     /// Standard deviation over which tissue scatters green light; red further, blue less.
     pub scatter: f64,
-    /// Reach of ambient light: matter farther away than this keeps none of it off.
+    /// Reach of ambient light, mm: matter farther away than this does not occlude it.
     pub reach: f64,
     /// Slope of the echo from which on the orientation of a surface is certain: half that of skin in fluid after a Gaussian of 1.5 mm. Where the
     /// echo is flatter, light depends less on the orientation.
     pub slope: f64,
-    /// How much light depends on the orientation of the tissue's surface.
+    /// How much light depends on the orientation of the tissue's surface: 0 not at all, 1 fully.
     pub relief: f64,
-    /// Wrap-around of the light.
+    /// How far the light wraps around to the side that faces away from it: 0 not at all, 1 fully.
     pub wrap: f64,
     /// Coefficient of the back light.
     pub back: f64,
@@ -192,12 +192,12 @@ pub struct LightVolume {
     pub back_colour: [f64; 3],
     /// Exposure: factor of the light before the response curve.
     pub exposure: f64,
-    /// What is behind a volume that fills the picture. Absent: black.
+    /// The backdrop behind a volume that fills the picture. Absent: black.
     pub ground: Option<Ground>,
 }
 
-/// A ground that is bright in the middle of the picture, a little above it, and falls off to its edges. Colours are linear light, like those of
-/// the transfer function.
+/// A backdrop that is bright in the middle of the picture, a little above it, and falls off to its edges. Colours are linear light, like those of the
+/// transfer function.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Ground {
@@ -291,7 +291,7 @@ impl Default for Occlusion {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Skin {
-    /// Wrap-around of the light.
+    /// How far the light wraps around the terminator: 0 not at all, 1 fully.
     pub wrap: f64,
     /// Translucency: light that passes through thin tissue.
     pub translucency: f64,

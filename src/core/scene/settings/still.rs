@@ -34,17 +34,17 @@ impl Default for Still {
 }
 
 impl Still {
-    /// Most samples of a pixel: their sums are 32-bit floats.
+    /// Largest number of samples (paths) of a pixel: their sums are 32-bit floats.
     pub const MAX_SAMPLES: u32 = 65536;
     /// Most dispatches of a picture: the parameters of so many fit into a command buffer's (64 KiB), where each begins at a multiple of 256 bytes.
     const MAX_DISPATCHES: u32 = 64;
 
-    /// Samples of each dispatch but the last.
+    /// Number of samples (paths) of a pixel in each dispatch but the last.
     pub(crate) fn samples_at_once(&self) -> u32 {
         self.batch.max(self.samples.div_ceil(Still::MAX_DISPATCHES))
     }
 
-    /// Number of dispatches of one picture.
+    /// Number of dispatches that trace the paths of a picture.
     pub fn dispatches(&self) -> u32 {
         self.samples.div_ceil(self.samples_at_once())
     }

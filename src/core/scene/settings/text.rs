@@ -21,7 +21,7 @@ fn subsampling(mut taken: impl FnMut(&str) -> Option<bool>) -> Option<i64> {
 }
 
 impl Settings {
-    /// The settings of a scene file.
+    /// Parses a scene file.
     ///
     /// # Errors
     /// The text is not valid TOML, or a value does not fit its setting. The error has the position.
@@ -29,7 +29,7 @@ impl Settings {
         Settings::from_node(Node::parse(text)?)
     }
 
-    /// The settings of a part of a larger text.
+    /// Reads settings from a node of a larger parsed text.
     ///
     /// # Errors
     /// A value does not fit its setting. The error has the position in the text.
@@ -47,7 +47,7 @@ impl Settings {
         Settings::deserialize(node)
     }
 
-    /// The settings of a table with the keys of a scene file.
+    /// Reads settings from a table with the keys of a scene file.
     ///
     /// # Errors
     /// A value does not fit its setting.
@@ -79,7 +79,7 @@ impl Settings {
         serde_json::to_string(self.erased())
     }
 
-    /// Gives the settings of a table by former names their names of today, so that a later table overrides them.
+    /// Renames keys of former versions in a table of settings to those of today, so that a later table overrides them.
     pub(crate) fn rename(table: &mut Table) {
         if let Some(Value::Table(ray)) = table.get_mut("ray") {
             let pixels = subsampling(|name| {

@@ -33,25 +33,25 @@ const INSTRUCTIONS: &[&str] = &["Instruction count", "Instructions", "Instructio
 /// Shared memory of a workgroup, bytes.
 const SHARED: &[&str] = &["SLM size", "LDS size", "Workgroup Memory Size", "ldsUsageSizeInBytes", "Shared Memory Size"];
 
-/// The statistics of a pipeline that several drivers report. `None` if this driver does not report the value. Of a pipeline that the driver
-/// compiles to several executables, the worst value counts, because the driver decides which one runs.
+/// Those statistics of a pipeline that several drivers report. `None` if this driver does not report a value. If the driver compiles several
+/// executables of a pipeline, the worst value counts, because the driver decides which one runs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Columns {
-    /// Registers of an invocation. Half registers count as registers.
+    /// Number of registers of an invocation; half registers count as registers.
     pub registers: Option<f64>,
-    /// Number of subgroups that a processor can hold at the same time: the occupancy.
+    /// Occupancy: how many subgroups a processor can hold at the same time.
     pub waves: Option<f64>,
     /// Values that did not fit into registers, in the driver's unit.
     pub spills: Option<f64>,
     pub instructions: Option<f64>,
     /// Shared memory of a workgroup, bytes.
     pub shared: Option<f64>,
-    /// Number of invocations in a subgroup. If the driver chooses it by the registers, a smaller number is a loss of occupancy.
+    /// Number of invocations in a subgroup. If the driver chooses it by the number of registers, a smaller number is a loss of occupancy.
     pub subgroup: Option<u32>,
 }
 
 impl Columns {
-    /// `statistics`: the names of the values of every executable.
+    /// `statistics`: the driver's names of the values of each executable ([`PipelineProfile::statistics`](super::PipelineProfile::statistics)).
     pub fn of(statistics: &[String], pipeline: &Pipeline) -> Columns {
         let executables = &pipeline.executables;
         let sum = |executable: &Executable, names: &[&str]| {

@@ -8,40 +8,40 @@ use serde::Serialize;
 /// Ratio above which more registers or instructions are reported as worse.
 const GROWTH: f64 = 1.05;
 
-/// A pipeline with a column that differs.
+/// A pipeline whose value in a column differs between two profiles.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Change {
     pub pipeline: String,
-    /// "waves", "subgroup", "spills", "registers", "instructions".
+    /// Name of the column: "waves", "subgroup", "spills", "registers" or "instructions".
     pub column: &'static str,
     pub old: f64,
     pub new: f64,
-    /// True if the change fails the comparison.
+    /// True if the change makes the comparison fail.
     pub is_worse: bool,
 }
 
-/// A newer set of statistics, compared with an older one.
+/// The comparison of two sets of pipeline statistics.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PipelineComparison {
     pub format: &'static str,
-    /// Number of pipelines that both have.
+    /// Number of pipelines that both sets have.
     pub compared: usize,
-    /// Number of pipelines that only the new one has.
+    /// Number of pipelines that only the new set has.
     pub added: usize,
-    /// Number of pipelines that only the old one has.
+    /// Number of pipelines that only the old set has.
     pub gone: usize,
-    /// The changes, the worse first.
+    /// The changes; those that fail the comparison first.
     pub changes: Vec<Change>,
-    /// Pipelines that only the new one has and that spill.
+    /// Pipelines that only the new set has and whose registers spill.
     pub(crate) new_spills: Vec<String>,
-    /// Time to compile the pipelines that both have, without any cache, ms: old, new. It is reported, but never a failure, because another
+    /// Compile time without any cache of the pipelines that both have, ms: old, new. It is reported and never fails the comparison, because another
     /// machine is faster or slower.
     pub(crate) cold_ms: [f64; 2],
-    /// Differences of device, driver and input, one line each.
+    /// Differences in device, driver and input, one line each.
     pub notes: Vec<String>,
 }
 
-/// The reason why two sets cannot be compared.
+/// Why two sets cannot be compared.
 #[derive(Debug, PartialEq, thiserror::Error)]
 pub enum CompareError {
     #[error("{which} statistics: the device '{device}' reported none; there is nothing to compare")]
@@ -55,7 +55,7 @@ pub enum CompareError {
 }
 
 impl PipelineComparison {
-    /// The pipelines with a column that became worse, each once.
+    /// The pipelines with a change that fails the comparison, each once.
     pub fn worse(&self) -> Vec<&str> {
         let changed = self.changes.iter().filter(|change| change.is_worse).map(|change| &change.pipeline);
         let mut titles: Vec<&str> = changed.chain(&self.new_spills).map(String::as_str).collect();

@@ -18,62 +18,62 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Statistics of pipelines on one device.
+/// The statistics of compiled pipelines on one device.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PipelineProfile {
-    /// [`Stored::FORMAT`].
+    /// The name of the file format: [`Stored::FORMAT`].
     pub format: String,
     /// Name, version and build of the program.
     pub program: String,
-    /// Time of the run, RFC 3339.
+    /// When it was measured, RFC 3339.
     pub date: String,
     pub device: String,
     pub driver: String,
-    /// Description of the compiled pipelines: the input, and `every mode, preset and filter` or the settings' own.
+    /// Which pipelines were compiled: the input, and `every mode, preset and filter` or only those of the settings.
     pub input: String,
-    /// False if the device does not report statistics. Then there are only times.
+    /// False if the device reports no statistics, so that there are only compile times.
     pub has_statistics: bool,
-    /// The driver's names of its statistics, in the order of the values of an executable.
+    /// The driver's names of its statistics, in the order of [`Executable::values`].
     pub statistics: Vec<String>,
     /// The pipelines in the order of their first use.
     pub pipelines: Vec<Pipeline>,
 }
 
-/// A pipeline. Its shader, constants and formats identify it.
+/// A measured pipeline, identified by its shader, constants and formats.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Pipeline {
-    /// The first pass that uses it.
+    /// The first pass that uses it; None if not stored.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pass: Option<String>,
     pub shader: String,
-    /// Specialization constants by name.
+    /// Values of specialization constants by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub constants: BTreeMap<String, i32>,
-    /// Formats of the inputs.
+    /// Formats of the inputs, in the order of the pass.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub formats: Vec<String>,
-    /// Time to compile without any cache, ms.
+    /// Compile time without any cache, ms.
     pub(crate) cold_ms: f64,
-    /// Time to compile from a pipeline cache, ms.
+    /// Compile time with a pipeline cache that holds it, ms.
     pub(crate) warm_ms: f64,
-    /// True if the driver reports that it took the pipeline from the cache. `None` if it does not report it.
+    /// True if the driver took the pipeline from the cache when `warm_ms` was measured. `None` if the driver does not report it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) from_cache: Option<bool>,
-    /// The programs that the driver made of it. The driver chooses one for a dispatch.
+    /// The executables that the driver compiled for it. The driver chooses one for a dispatch.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub executables: Vec<Executable>,
 }
 
-/// A program for the device.
+/// An executable of a pipeline (VK_KHR_pipeline_executable_properties).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Executable {
     pub name: String,
     /// Number of invocations in a subgroup.
     pub subgroup: u32,
-    /// Values in the order of [`PipelineProfile::statistics`]. `None` if this executable lacks one.
+    /// The driver's statistics, in the order of [`PipelineProfile::statistics`]. `None` if this executable lacks one.
     pub values: Vec<Option<f64>>,
 }
 
@@ -86,7 +86,8 @@ impl Pipeline {
     }
 }
 
-/// Compiles every pipeline that these scenes need with these shaders, twice: without any cache, and from a pipeline cache. Submits nothing.
+/// Compiles every pipeline that these scenes need with these shaders, twice: without any cache, and with a pipeline cache that holds it. Submits
+/// nothing to the device.
 ///
 /// # Errors
 /// The device cannot hold a scene, or a shader does not compile.
@@ -143,7 +144,7 @@ fn pipeline(measured: MeasuredPipeline, statistics: &[String]) -> Pipeline {
 }
 
 impl PipelineProfile {
-    /// The columns of a pipeline that the drivers have in common.
+    /// The statistics of a pipeline that several drivers report.
     pub fn columns(&self, pipeline: &Pipeline) -> Columns {
         Columns::of(&self.statistics, pipeline)
     }

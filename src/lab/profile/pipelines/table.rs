@@ -9,7 +9,7 @@ use std::fmt::Write as _;
 /// Pipelines that the table of a long list shows: those with the fewest waves.
 const SHOWN: usize = 40;
 
-/// The pipelines, those with the lowest occupancy first, and sums.
+/// The pipelines as a table of text, those with the lowest occupancy first, and sums.
 pub fn table(profile: &PipelineProfile) -> String {
     let mut order: Vec<&Pipeline> = profile.pipelines.iter().collect();
     // Without statistics the slowest to compile are of interest.
@@ -57,7 +57,7 @@ fn sums(profile: &PipelineProfile) -> String {
     text
 }
 
-/// The differences, the worse first.
+/// The changes as a table of text, those that fail the comparison first.
 pub fn comparison_table(compared: &PipelineComparison) -> String {
     let mut text = String::new();
     for note in &compared.notes {

@@ -35,12 +35,12 @@ fn sums(n: u32) -> [Slot; 2] {
     }
 }
 
-/// Slots of the sums over all paths: of light and collisions, and of the squares of luminance.
+/// The slots that hold the sums over all paths of each pixel: light and number of collisions, and the squares of luminance.
 pub fn final_sums(scene: &Scene) -> [Slot; 2] {
     sums(still(scene).dispatches())
 }
 
-/// The majorant of each brick: the largest extinction of any value that samples in it may have.
+/// Computes the majorant of each brick: the largest extinction of any value that samples in it may have.
 pub(crate) const MAJORANTS: Pass = Pass {
     name: "still_majorants",
     shader: |_, _| "raycast/still_majorants",
@@ -82,7 +82,7 @@ pub(crate) const MAJORANTS: Pass = Pass {
     ..Pass::OF_RAYS
 };
 
-/// Clears the sums before the first path.
+/// Clears the sums of all pixels before the first path.
 pub const BEGIN: Pass = Pass {
     name: "still_begin",
     shader: |_, _| "raycast/still_begin",
@@ -106,7 +106,7 @@ fn written(n: u32) -> Vec<Bind> {
     vec![whole("next_sums", light), whole("next_squares", squares)]
 }
 
-/// Paths of every pixel, some a dispatch, added to the sums of those before.
+/// Traces paths of light for every pixel, some in each dispatch, and adds them to the sums.
 pub(crate) const PATHS: Pass = Pass {
     name: "still_paths",
     shader: |_, _| "raycast/still",
@@ -182,7 +182,7 @@ pub(crate) const PATHS: Pass = Pass {
     ..MAJORANTS
 };
 
-/// Luminance of linear light (ITU-R BT.709).
+/// Luminance of linear light (ITU-R BT.709 weights).
 pub fn luminance([red, green, blue, _]: [f64; 4]) -> f64 {
     0.2126 * red + 0.7152 * green + 0.0722 * blue
 }
@@ -192,7 +192,7 @@ fn largest_extinction(scene: &Scene) -> f64 {
     still_medium(scene).chunks_exact(4).map(|entry| f64::from(entry[3])).fold(0.0, f64::max)
 }
 
-/// The mean of the paths of each pixel, through the response curve and over the ground.
+/// Turns the sums into the picture: the mean of the paths of each pixel, through the response curve and over the backdrop.
 pub(crate) const RESOLVE: Pass = Pass {
     name: "still_resolve",
     shader: |_, _| "raycast/still_resolve",

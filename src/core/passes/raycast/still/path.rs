@@ -12,7 +12,7 @@ const LEAST_TRANSMITTANCE: f64 = 0.1;
 /// Collisions from which on Russian roulette decides whether a path goes on.
 const SURE_EVENTS: u32 = 4;
 
-/// The medium of a path-traced picture (setting `still`): scattering and absorption at each position, and upper bounds of the extinction.
+/// The medium that paths of light go through: albedo and extinction at each position, and the majorants of the extinction by brick.
 pub struct Medium<'a> {
     scene: &'a Scene,
     volume: &'a Texels,
@@ -32,13 +32,14 @@ impl<'a> Medium<'a> {
         Medium::of(scene, reads.get("volume"), reads.get("medium"), bricks)
     }
 
-    /// `table`: albedo of red, green and blue, and extinction over the sample value.
+    /// `table`: albedo of red, green and blue, and extinction (1/mm), at equidistant windowed sample values. `bricks`: the majorant of each brick,
+    /// 1/mm; None if the largest extinction of the table applies everywhere.
     pub fn of(scene: &'a Scene, volume: &'a Texels, table: &'a Texels, bricks: Option<&'a Texels>) -> Medium<'a> {
         let majorant = table.values.iter().skip(3).step_by(4).copied().fold(0.0, f64::max);
         Medium { scene, volume, table, bricks, majorant, lights: scene.still_lights() }
     }
 
-    /// The matter at a place in space.
+    /// Albedo and extinction at a place in space, mm. Both are 0 outside the insonified region.
     pub fn at(&self, place: DVec3) -> Matter {
         let Some(texel) = ray::texel(self.scene, place) else { return ([0.0; 3], 0.0) };
         let [low, high] = self.scene.volume_view().window;
@@ -140,7 +141,7 @@ impl<'a> Medium<'a> {
         if is_ended.is_some() { 0.0 } else { transmitted }
     }
 
-    /// The light of one path of a pixel, and 1 in the last component if the path collided.
+    /// Traces one path of the pixel (x, y). Returns its linear light, and in the last component 1 if the path collided with matter, else 0.
     pub fn path(&self, [x, y]: [usize; 2], mut stream: Stream) -> [f64; 4] {
         let settings = self.scene.still().copied().unwrap_or_default();
         let lights = &self.lights;

@@ -15,7 +15,7 @@ fn pcg4d(mut v: [u32; 4]) -> [u32; 4] {
     v
 }
 
-/// The random numbers of one path.
+/// The random numbers of one path of light.
 #[derive(Clone, Debug)]
 pub struct Stream {
     key: [u32; 4],
@@ -26,7 +26,7 @@ impl Stream {
         Stream { key: [x as u32 | (y as u32) << 16, sample, seed, 0] }
     }
 
-    /// Four uniform numbers of 24 bits in 0..1, without 1.
+    /// Draws four numbers, uniform in 0..1 without 1, of 24 bits each.
     pub fn draw(&mut self) -> [f64; 4] {
         let drawn = pcg4d(self.key).map(|bits| f64::from(bits >> 8) / f64::from(1 << 24));
         self.key[3] = self.key[3].wrapping_add(1);
