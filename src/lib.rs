@@ -185,7 +185,7 @@ pub mod low_level {
     #[cfg(feature = "lab")]
     pub use echolume_lab::{bounds, error_report, filter_report, profile, thesis_tables};
     pub use echolume_segment as segment;
-    pub use echolume_session::{kiosk, live, marked, measure, user_presets, workspace};
+    pub use echolume_session::{compare, kiosk, live, marked, measure, user_presets, workspace};
     #[cfg(feature = "view")]
     pub use echolume_ui as ui;
     #[cfg(feature = "verify")]

@@ -100,6 +100,11 @@ impl InputArgs {
         file.map(|file| Ok((file, Workspace::read(file).map_err(input)?))).transpose()
     }
 
+    /// Opens another recording with the flags that give the geometry of this one.
+    pub fn open_another(&self, file: &Path) -> Result<Box<dyn Source>, Failure> {
+        open_recording(file, self.geometry.options())
+    }
+
     /// The number of the volume to use.
     pub fn volume(&self) -> Result<usize, Failure> {
         match self.volume {

@@ -43,6 +43,7 @@ mod batch;
 mod bounds;
 #[cfg(feature = "lab")]
 mod budget;
+mod compare;
 mod drawing;
 #[cfg(feature = "lab")]
 mod error_report;

@@ -2,7 +2,7 @@
 
 use crate::args::{GeometryArgs, Output, check_outputs, open_recording, recording_help};
 use crate::files::signals::Writing;
-use crate::probe::{Geometry, Grid, World};
+use crate::probe::{Geometry, Grid, Rigid, World};
 use crate::scene::default_look::block_edge;
 use crate::scene::{EchoHistogram, EchoLevels, Input, insonified_box};
 use crate::source::convert::{Target, Volume, lattice, no_echo};
@@ -459,6 +459,10 @@ pub struct MakePhantom {
     /// Body head: level of clutter (reverberations and side lobes) everywhere, dB re full scale, -60 to 0 [default: none]
     #[arg(long, value_name = "DB", allow_negative_numbers = true)]
     clutter: Option<f64>,
+    /// Bodies head and vessels: move the body before the sweep, by a shift in mm along lateral, depth and elevation and a rotation vector in degrees about a point 55 mm
+    /// below the probe's face, such as 3,0,-2,0,5,0 [default: not moved]
+    #[arg(long, value_name = "L,D,E,X,Y,Z", allow_hyphen_values = true)]
+    moved: Option<Rigid>,
     /// Also write what is where in the first volume of bodies head and vessels: labels to this file (.mha, or .seg.nrrd with their names for 3D Slicer), and the signed
     /// distance from the skin (vessels: from the blood), mm, to NAME.distance.mha. 0 fluid, 1 skin, 2 hand, 3 cord, 4 skull, 5 brain, 6 choroid plexus, 7 ventricle, 8 falx,
     /// 9 uterus, 10 blood, 11 vessel wall, 12 liver
@@ -502,6 +506,7 @@ impl MakePhantom {
             heart_swing: self.heart_swing,
             gap: self.gap.unwrap_or(usual.gap),
             clutter_db: self.clutter,
+            moved: self.moved.map_or(usual.moved, |moved| Rigid { about: PhantomOptions::CENTRE, ..moved }),
             ..usual
         };
         let phantom = Phantom::new(options).map_err(input)?;

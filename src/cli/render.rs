@@ -1,6 +1,7 @@
 //! `echolume render`: renders a recording to a picture.
 
 use super::budget;
+use super::compare::{self, CompareArgs};
 use super::drawing::{DrawFault, draw_despite_losses, send_volume};
 use super::mesh_sheet;
 use super::one_colour;
@@ -38,6 +39,7 @@ use std::time::Instant;
                         echolume render bone.mha --preset bone --roi depth=20:50 --explain\n  \
                         echolume render sweep.mha --turntable 120 -o turn/\n  \
                         echolume render loop.mha --volumes all -o loop-%03d.png\n  \
+                        echolume render --compare before.mha after.mha --register find -o compared.png\n  \
                         zcat sweep.mha.gz | echolume render - -o - | display"
 )]
 pub struct Render {
@@ -46,6 +48,8 @@ pub struct Render {
     /// The picture to write: .png, .jpg, .bmp or .ppm by its ending; - for a PNG on standard output
     #[arg(short, long, value_name = "FILE", default_value = "picture.png")]
     output: PathBuf,
+    #[command(flatten)]
+    compare: CompareArgs,
     #[command(flatten)]
     series: SeriesArgs,
     /// Print the plan without rendering: passes, bytes, and the reason for each pass
@@ -96,16 +100,34 @@ impl Render {
     pub fn run(&self) -> Result<(), Failure> {
         let options = self.options()?;
         self.series.check()?;
-        if self.series.is_given() && !self.explain {
-            let alone = [
-                ("--dump", self.dump.is_some()),
-                ("--mesh", self.mesh.is_some()),
-                ("--error-map", self.error_map.is_some()),
-                ("--budget", self.budget.is_some()),
-                ("--still", self.still.is_some()),
-                ("--tolerance", self.tolerance.is_some()),
+        let alone = [
+            ("--dump", self.dump.is_some()),
+            ("--mesh", self.mesh.is_some()),
+            ("--error-map", self.error_map.is_some()),
+            ("--budget", self.budget.is_some()),
+            ("--still", self.still.is_some()),
+            ("--tolerance", self.tolerance.is_some()),
+        ];
+        let alone = alone.iter().find(|(_, is_given)| *is_given);
+        if self.compare.is_given() {
+            let series = [
+                ("--turntable and --volumes", self.series.is_given()),
+                ("--explain", self.explain),
+                ("--timings", self.timings),
             ];
-            if let Some((flag, _)) = alone.iter().find(|(_, is_given)| *is_given) {
+            if let Some((flag, _)) = alone.or(series.iter().find(|(_, is_given)| *is_given)) {
+                return Err(input(format!("{flag}: is for one volume; leave --compare out")));
+            }
+            return self.compare.run(&compare::Job {
+                input: &self.input,
+                output: &self.output,
+                options,
+                validate: self.validate,
+                own_shaders: self.shaders.are_given(),
+            });
+        }
+        if self.series.is_given() && !self.explain {
+            if let Some((flag, _)) = alone {
                 return Err(input(format!("{flag}: is for one picture; leave --turntable and --volumes out")));
             }
             return self.series.run(&Job {

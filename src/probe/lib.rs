@@ -10,6 +10,7 @@ mod frame;
 pub mod geometry;
 pub mod grid;
 pub mod motor;
+mod rigid;
 mod samples;
 pub mod world;
 
@@ -20,5 +21,6 @@ pub use file::ProbeFile;
 pub use frame::Frame;
 pub use geometry::{Advance, Array, Firing, GeometryError, Indices, Motion, Probe, Volumes};
 pub use grid::{Geometry, Grid};
+pub use rigid::Rigid;
 pub use samples::{SampleType, StoredType};
 pub use world::{AxisOrder, DepthAxis, World, is_rigid};

@@ -1,9 +1,10 @@
 //! Sessions, which last longer than one picture: streams of frames that are rendered while they arrive ([`live`]), measurements
-//! ([`measure`]) and marks on saved pictures ([`marked`]), presets and workspaces of a user ([`user_presets`], [`workspace`]), and the
+//! ([`measure`]), marks on saved pictures ([`marked`]) and pictures beside each other ([`compare`]), presets and workspaces of a user ([`user_presets`], [`workspace`]), and the
 //! configuration, the logs and the support bundle of a kiosk display ([`kiosk`]).
 
 #![forbid(unsafe_code)]
 
+pub mod compare;
 #[cfg(feature = "kiosk")]
 pub mod kiosk;
 pub mod live;

@@ -4,7 +4,7 @@
 use super::segmentation::{self, Segment};
 use super::volume_file::VolumeFile;
 use crate::files::InputError;
-use crate::probe::{Geometry, Grid, Probe, World};
+use crate::probe::{Geometry, Grid, Indices, Probe, World};
 use crate::{Frame, Source};
 use crate::{SampleType, StoredType};
 use glam::DVec3;
@@ -184,6 +184,31 @@ impl Volume {
             }
         }
         Some(sum)
+    }
+
+    /// The volume as a sweep or lattice of another geometry would hold it, of a body that was moved: a sample is the value at the place where
+    /// `back` puts its own place, `outside` where that is outside the insonified region. The result is again of stored values.
+    pub fn moved_onto(&self, geometry: &Geometry, back: impl Fn(DVec3) -> DVec3 + Sync, outside: f64) -> Volume {
+        let mut moved = Volume::new(geometry.clone(), self.stored);
+        let [samples, lines, slices] = moved.size;
+        let value = |line: usize, slice: usize, sample: usize| {
+            let place = match geometry {
+                Geometry::Cartesian(grid) => place_of(grid, [sample, line, slice]),
+                Geometry::Sweep(probe) => {
+                    let [sample, line, slice] = [sample, line, slice].map(|n| n as f64);
+                    probe.to_space(Indices { sample, line, slice })
+                }
+            };
+            self.at(back(place)).unwrap_or(outside)
+        };
+        let frame = |slice: usize| {
+            let mut bytes = Vec::with_capacity(samples * lines * self.stored.bytes());
+            (0..lines)
+                .for_each(|line| (0..samples).for_each(|n| self.stored.append(value(line, slice, n), &mut bytes)));
+            bytes
+        };
+        moved.frames = (0..slices).into_par_iter().map(frame).collect();
+        moved
     }
 
     /// Fills a slice of a grid with stored values, lateral fastest; NaN outside the insonified region.

@@ -5,6 +5,7 @@ mod bounds;
 mod budget;
 #[path = "../common/mod.rs"]
 mod common;
+mod compare;
 mod demo_data;
 mod devices;
 #[cfg(feature = "view")]

@@ -28,6 +28,27 @@ pub struct Picture {
 }
 
 impl Picture {
+    /// A picture of one opaque colour.
+    pub fn filled([width, height]: [u32; 2], [red, green, blue]: [u8; 3]) -> Picture {
+        Picture { width, height, rgba: [red, green, blue, 255].repeat(width as usize * height as usize) }
+    }
+
+    /// The brightness of each pixel by Rec. 709, 0..=255.
+    pub fn brightness(&self) -> Vec<u16> {
+        brightness::<4, u8>(&self.rgba)
+    }
+
+    /// Copies a picture to a place in this one, pixels. What is beyond its edges is left out.
+    pub fn paste(&mut self, other: &Picture, [left, top]: [u32; 2]) {
+        let columns = other.width.min(self.width.saturating_sub(left)) as usize;
+        let rows = other.height.min(self.height.saturating_sub(top)) as usize;
+        for row in 0..rows {
+            let to = 4 * ((top as usize + row) * self.width as usize + left as usize);
+            let from = 4 * row * other.width as usize;
+            self.rgba[to..to + 4 * columns].copy_from_slice(&other.rgba[from..from + 4 * columns]);
+        }
+    }
+
     /// Encodes an opaque PNG; with one channel if all pixels are grey.
     ///
     /// # Errors
@@ -118,8 +139,8 @@ impl Grey {
         let values = match (colour.has_color(), sixteen) {
             (false, false) => image.into_luma8().into_raw().into_iter().map(u16::from).collect(),
             (false, true) => image.into_luma16().into_raw(),
-            (true, false) => brightness(&image.into_rgb8().into_raw()),
-            (true, true) => brightness(&image.into_rgb16().into_raw()),
+            (true, false) => brightness::<3, _>(&image.into_rgb8().into_raw()),
+            (true, true) => brightness::<3, _>(&image.into_rgb16().into_raw()),
         };
         Ok(Grey { width, height, sixteen, values, from_colour: colour.has_color() })
     }
@@ -175,9 +196,10 @@ fn save(file: &Path, encoded: impl Fn(PictureFormat) -> Result<Vec<u8>, String>)
     replace(file, &bytes.map_err(|e| format!("{}: cannot be written: {e}", file.display()))?)
 }
 
-fn brightness<T: Copy + Into<f64>>(rgb: &[T]) -> Vec<u16> {
+/// Brightness of pixels of `CHANNELS` values, of which the first three are red, green and blue.
+fn brightness<const CHANNELS: usize, T: Copy + Into<f64>>(pixels: &[T]) -> Vec<u16> {
     let of = |[r, g, b]: [f64; 3]| (0.2126 * r + 0.7152 * g + 0.0722 * b).round() as u16;
-    rgb.chunks_exact(3).map(|p| of([p[0].into(), p[1].into(), p[2].into()])).collect()
+    pixels.chunks_exact(CHANNELS).map(|p| of([p[0].into(), p[1].into(), p[2].into()])).collect()
 }
 
 /// A rectangle of pixels. Its ratios of signal to noise and of contrast to noise measure how a filter smooths and preserves contrast
@@ -278,9 +300,9 @@ mod tests {
 
     #[test]
     fn brightness_weighs_as_rec_709_and_leaves_grey_alone() {
-        assert_eq!(brightness(&[255u8, 0, 0, 0, 255, 0, 0, 0, 255]), [54, 182, 18]);
+        assert_eq!(brightness::<3, _>(&[255u8, 0, 0, 0, 255, 0, 0, 0, 255]), [54, 182, 18]);
         for v in [0u16, 1, 77, 254, 255, 65535] {
-            assert_eq!(brightness(&[v; 3]), [v]);
+            assert_eq!(brightness::<3, _>(&[v; 3]), [v]);
         }
     }
 

@@ -124,7 +124,7 @@ pub fn measured(
 }
 
 /// Writes what the picture is of into its lower left corner; in a narrow one without what stands in brackets.
-fn label(picture: &mut Picture, origin: &str) -> Result<(), String> {
+pub(crate) fn label(picture: &mut Picture, origin: &str) -> Result<(), String> {
     let text = text_height(picture.width);
     let width = |words: &str| ((words.chars().count() as f64 * CHARACTER + 1.0) * f64::from(text)).ceil() as u32;
     let words = if width(origin) <= picture.width { origin } else { origin.split(" (").next().unwrap_or(origin) };
@@ -136,7 +136,7 @@ fn label(picture: &mut Picture, origin: &str) -> Result<(), String> {
 }
 
 /// Height of the text of a bar or a label, pixels.
-fn text_height(width: u32) -> u32 {
+pub(crate) fn text_height(width: u32) -> u32 {
     (width / 70).clamp(11, 26)
 }
 

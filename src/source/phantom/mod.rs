@@ -30,9 +30,10 @@ pub use vessels::{Vessel, VesselTree};
 use crate::Frame;
 use crate::files::InputError;
 use crate::probe::SampleType;
-use crate::probe::{Advance, Array, Axis, Motion, Probe, Volumes};
+use crate::probe::{Advance, Array, Axis, Motion, Probe, Rigid, Volumes};
 use crate::sequence::{self, MAX_FRAMES};
 use body::{Scatterers, refusal};
+use glam::DVec3;
 use rayon::prelude::*;
 use speckle::{Beam, Echo, grey};
 use std::fmt::Write as _;
@@ -106,6 +107,13 @@ pub struct PhantomOptions {
     pub gap: f64,
     /// Level of clutter in body head, dB re full scale, -60..=0: haze of reverberations and side lobes everywhere. None is none.
     pub clutter_db: Option<f64>,
+    /// The bodies head and vessels: how the body was moved before the sweep. Its place without is that of the other bodies.
+    pub moved: Rigid,
+}
+
+impl PhantomOptions {
+    /// The middle of the head, mm.
+    pub const CENTRE: DVec3 = DVec3::new(0.0, ARRAY_RADIUS + 55.0, 0.0);
 }
 
 impl Default for PhantomOptions {
@@ -126,6 +134,7 @@ impl Default for PhantomOptions {
             heart_swing: 0.0,
             gap: GAP,
             clutter_db: None,
+            moved: Rigid::default(),
         }
     }
 }
@@ -169,6 +178,9 @@ impl Phantom {
         }
         if let Some(level) = options.clutter_db.filter(|level| !(-60.0..=0.0).contains(level)) {
             return Err(refusal("clutter", format!("is {level}, must lie in -60..=0")));
+        }
+        if options.moved != Rigid::default() && !matches!(options.body, Body::Head | Body::Vessels) {
+            return Err(refusal("moved", "is for the bodies head and vessels"));
         }
         options.point_spread.check()?;
         let volumes = Volumes {
@@ -220,10 +232,11 @@ impl Phantom {
         let backward = self.volumes.backward(volume);
         let frames = self.options.frames;
 
+        let back = self.options.moved.map().inverse();
         let along = |frame: usize, slice: f64, echoes: &mut [Echo]| {
             for (line, out) in echoes.chunks_exact_mut(self.options.samples).enumerate() {
                 let time = self.line_time(volume, frame, line);
-                self.scatterers.along(&Beam::new(&probe, line, slice, time), out);
+                self.scatterers.along(&Beam::new(&probe, line, slice, time).moved(&back), out);
             }
         };
         let still = || -> Vec<Vec<Echo>> {

@@ -6,7 +6,7 @@
 
 use super::sampling::PointSpread;
 use crate::probe::{Indices, Probe};
-use glam::{DVec3, Vec3};
+use glam::{DAffine3, DVec3, Vec3};
 use rayon::prelude::*;
 
 /// Range of the grey scale, dB: 255 is 0 dB, 0 is so far below.
@@ -47,6 +47,12 @@ impl Beam {
             motor_angle: probe.slice_position(line, slice),
             time,
         }
+    }
+
+    /// The beam as a body sees it that was moved by the inverse of this map.
+    pub fn moved(mut self, back: &DAffine3) -> Beam {
+        (self.first, self.step) = (back.transform_point3(self.first), back.transform_vector3(self.step));
+        self
     }
 
     pub fn place(&self, sample: usize) -> DVec3 {

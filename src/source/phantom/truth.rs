@@ -35,8 +35,8 @@ impl Phantom {
     /// A body other than head and vessels, which has a formula instead: [`Phantom::truth`].
     pub fn label(&self, volume: usize, place: DVec3) -> Result<Label, InputError> {
         Ok(match self.labelled()? {
-            Labelled::Head(head) => head.label(place.as_vec3(), self.time_at(volume, place)),
-            Labelled::Vessels(tree) => match tree.distance(place) {
+            Labelled::Head(head) => head.label(self.own(place).as_vec3(), self.time_at(volume, place)),
+            Labelled::Vessels(tree) => match tree.distance(self.own(place)) {
                 away if away <= 0.0 => Label::Blood,
                 away if away <= tree.wall => Label::VesselWall,
                 _ => Label::Liver,
@@ -51,8 +51,8 @@ impl Phantom {
     /// As [`Phantom::label`].
     pub fn distance(&self, volume: usize, place: DVec3) -> Result<f64, InputError> {
         Ok(match self.labelled()? {
-            Labelled::Head(head) => f64::from(head.distance(place.as_vec3(), self.time_at(volume, place))),
-            Labelled::Vessels(tree) => tree.distance(place),
+            Labelled::Head(head) => f64::from(head.distance(self.own(place).as_vec3(), self.time_at(volume, place))),
+            Labelled::Vessels(tree) => tree.distance(self.own(place)),
         })
     }
 
@@ -85,6 +85,11 @@ impl Phantom {
             return Err(InputError::new(path, "file", "must end in .mha or .seg.nrrd"));
         }
         write_grid(grid, SampleType::F32, &distance_path(path), |place| self.distance(0, place).ok(), || ())
+    }
+
+    /// The place in the body that was not moved.
+    fn own(&self, place: DVec3) -> DVec3 {
+        self.options.moved.map().inverse().transform_point3(place)
     }
 
     fn labelled(&self) -> Result<Labelled<'_>, InputError> {
