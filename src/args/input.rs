@@ -23,12 +23,12 @@ use std::sync::Arc;
 /// A flag as it was typed, and the assignment of a setting that it stands for.
 type Assigned = (String, String);
 
-/// An open recording, and the scene of one of its volumes.
+/// An open recording, the scene of one of its volumes, and what that scene was made from.
 #[cfg_attr(not(feature = "lab"), expect(dead_code, reason = "only reports read all of it"))]
 pub struct Opened {
     pub source: Box<dyn Source>,
     pub recorded: Recorded,
-    /// The settings before they are completed.
+    /// The chosen settings, before defaults are derived from the recording.
     pub layers: Layers,
     pub scene: Scene,
 }
@@ -52,24 +52,27 @@ pub struct InputArgs {
 
 impl InputArgs {
     /// Opens the recording and builds the scene of the chosen volume. Settings that were not chosen are derived from the recording.
+    ///
+    /// # Errors
+    /// The recording or a setting is wrong, or there is no such volume.
     pub fn open(&self) -> Result<(Box<dyn Source>, Scene), Failure> {
         self.open_with(&[])
     }
 
-    /// As [`InputArgs::open`]. `chosen`: assignments that form a layer below the flags and `--set`.
+    /// As [`InputArgs::open`]. `chosen`: assignments of settings over which the flags and `--set` take precedence.
     pub fn open_with(&self, chosen: &[Assigned]) -> Result<(Box<dyn Source>, Scene), Failure> {
         let opened = self.open_recorded(chosen, None)?;
         Ok((opened.source, opened.scene))
     }
 
-    /// As [`InputArgs::open`], with the scene of volume `first`, the first of `--volumes`.
+    /// As [`InputArgs::open`], with the scene of the volume with index `first`, the first that `--volumes` selects.
     pub fn open_volumes(&self, first: usize) -> Result<(Box<dyn Source>, Scene), Failure> {
         let opened = self.open_recorded(&[], Some(first))?;
         Ok((opened.source, opened.scene))
     }
 
-    /// As [`InputArgs::open_with`], with everything that other scenes of the same volume are made from. `asked`: the volume, if the
-    /// arguments do not state it.
+    /// As [`InputArgs::open_with`]; the result can also be used for other scenes of the same volume. `asked`: index of the volume, used in place
+    /// of that of the arguments.
     pub fn open_recorded(&self, chosen: &[Assigned], asked: Option<usize>) -> Result<Opened, Failure> {
         let mut source = self.source()?;
         let volume = asked.map_or_else(|| self.volume(), Ok)?;
@@ -113,8 +116,8 @@ impl InputArgs {
         }
     }
 
-    /// Refuses `--volumes` together with `--volume`, and volumes that do not include that of the workspace, because its measurements belong
-    /// to that volume.
+    /// Checks `--volumes`. It must not be given together with `--volume`, and must include the volume of the workspace, if there is one, because
+    /// its measurements belong to that volume. `is_among`: true for an index that `--volumes` includes.
     pub fn check_volumes(&self, flag: &str, is_among: impl Fn(usize) -> bool) -> Result<(), Failure> {
         if self.volume.is_some() {
             return Err(input("--volume and --volumes: give one of them"));
@@ -134,7 +137,7 @@ impl InputArgs {
         self.input.as_deref().is_some_and(|file| file.as_os_str() == STANDARD)
     }
 
-    /// The recording as it was typed, or `phantom`.
+    /// The recording as the user typed it, or `phantom`.
     pub fn name(&self) -> String {
         match &self.input {
             None => "phantom".into(),
@@ -143,19 +146,19 @@ impl InputArgs {
         }
     }
 
-    /// Refuses outputs that would replace an input: the files of the source or of the settings. See [`check_outputs`].
+    /// Checks the output files, which must not replace an input: a file of the source or of the settings. See [`check_outputs`].
     pub fn check_outputs(&self, outputs: &[Output], source: &dyn Source) -> Result<(), Failure> {
         check_outputs(outputs, self.read_files(source).iter().map(PathBuf::as_path))
     }
 
-    /// When pictures state that they are of the phantom. None if the volumes are not. Pictures of a workspace always state it, as in the
-    /// viewer.
+    /// When pictures say that they are of the phantom. None if the volumes are not of the phantom. Pictures of a workspace always say it, as in
+    /// the viewer.
     pub fn demo(&self, source: &dyn Source) -> Option<Demo> {
         let is_workspace = self.input.as_deref().is_some_and(workspace::is_named);
         source.is_synthetic().then_some(if is_workspace { Demo::Always } else { Demo::WithOthers })
     }
 
-    /// Every file that is read, of the source and of the settings.
+    /// All files that are read for the source and the settings.
     pub fn read_files(&self, source: &dyn Source) -> Vec<PathBuf> {
         let mut read = source.files();
         read.extend(self.geometry.probe.clone());
@@ -164,7 +167,7 @@ impl InputArgs {
         read
     }
 
-    /// Calls `each` with every frame of the volume, in the order of the recording, and shows a progress bar.
+    /// Calls `each` with every frame of the chosen volume, in the order of the recording, and shows a progress bar.
     #[cfg(feature = "lab")]
     pub fn for_each_frame(
         &self,
@@ -181,7 +184,8 @@ impl InputArgs {
         Ok(())
     }
 
-    /// `scene` with the way of sampling that the chosen device will use. Without a device the scene stays unchanged.
+    /// The scene with the volume format and the way of sampling that the chosen device will use. If there is no device, the scene stays
+    /// unchanged. Opens no device.
     pub fn resolve_sampling(&self, scene: Scene) -> Scene {
         match self.candidate() {
             Some(device) => stored_on(&device, scene).sampled(TexelAccess::for_device(&device).sampling()),
@@ -189,7 +193,7 @@ impl InputArgs {
         }
     }
 
-    /// The scene with the volume format that the device of these flags would use. Opens no device.
+    /// The scene with the volume format that the chosen device will use. If there is no device, the scene stays unchanged. Opens no device.
     #[cfg(feature = "lab")]
     pub fn resolve_format(&self, scene: Scene) -> Scene {
         match self.candidate() {
@@ -206,7 +210,7 @@ impl InputArgs {
         Some(devices.swap_remove(chosen))
     }
 
-    /// Opens the chosen device and prints its name.
+    /// Opens the chosen device and prints its name. `validation`: with the Vulkan validation layer.
     pub fn open_device(&self, validation: bool) -> Result<Arc<Context>, Failure> {
         self.scene.open_device(validation)
     }
@@ -225,7 +229,7 @@ impl InputArgs {
         }
     }
 
-    /// The requested device. None for the best one.
+    /// The device that was chosen. None: the best one.
     #[cfg(feature = "lab")]
     pub fn device(&self) -> Option<DeviceChoice> {
         self.scene.device.clone()
@@ -281,7 +285,11 @@ pub struct SceneArgs {
 }
 
 impl SceneArgs {
-    /// The layers of settings before they are resolved. `chosen` assignments form a layer below the flags and `--set`.
+    /// The chosen settings as layers, before defaults are derived. `is_phantom`: the layers begin with the presets of the phantom. `chosen`:
+    /// assignments over which the flags and `--set` take precedence.
+    ///
+    /// # Errors
+    /// A preset, a file or a setting is wrong.
     pub fn layers(&self, is_phantom: bool, chosen: &[Assigned]) -> Result<Layers, Failure> {
         let mut layers = Layers::default();
         if is_phantom {
@@ -295,7 +303,10 @@ impl SceneArgs {
         self.layers_over(layers, chosen)
     }
 
-    /// Adds the presets, files and flags on top of `layers`.
+    /// Adds the chosen presets, files, assignments (`chosen`) and flags on top of `layers`.
+    ///
+    /// # Errors
+    /// A preset, a file or a setting is wrong.
     pub fn layers_over(&self, mut layers: Layers, chosen: &[Assigned]) -> Result<Layers, Failure> {
         for preset in &self.preset {
             add_preset(&mut layers, preset)?;
@@ -356,13 +367,13 @@ impl SceneArgs {
         Ok(set)
     }
 
-    /// True if a device or its time-out was given.
+    /// True if a device or the device's time-out was chosen.
     #[cfg(feature = "verify")]
     pub fn has_device(&self) -> bool {
         self.device.is_some() || self.device_timeout.is_some()
     }
 
-    /// The time after which a device that does not finish is given up.
+    /// The time after which a device that does not finish counts as lost.
     pub fn deadline(&self) -> Result<Deadline, Failure> {
         match self.device_timeout.as_deref() {
             None => Ok(Deadline::ByDevice),
@@ -374,7 +385,7 @@ impl SceneArgs {
         }
     }
 
-    /// Opens the chosen device and prints its name. A signal that is held ends waits for the device.
+    /// Opens the chosen device and prints its name. While a signal is held back, waiting for the device ends.
     pub fn open_device(&self, validation: bool) -> Result<Arc<Context>, Failure> {
         let (device, deadline) = (self.device.clone().unwrap_or_default(), self.deadline()?);
         open(&ContextOptions {
@@ -388,7 +399,7 @@ impl SceneArgs {
     }
 }
 
-/// Calls `each` with every frame of a volume, in the order of the recording.
+/// Calls `each` with every frame of the volume with this index, in the order of the recording.
 pub fn frames_of(
     source: &mut dyn Source,
     volume: usize,
@@ -407,7 +418,7 @@ pub fn frames_of(
     Ok(())
 }
 
-/// Refuses a volume that a recording does not hold. The message has the recording's `name` and the `flag` that asks for the volume.
+/// Checks that the recording has a volume with this index. The message has the recording's `name` and the `flag` that selects the volume.
 pub fn check_volume(
     source: &dyn Source,
     flag: &str,
@@ -420,7 +431,7 @@ pub fn check_volume(
     }
 }
 
-/// The common data of all scenes of a volume of a recording, except for the levels of its echoes.
+/// What all scenes of a volume have in common: its geometry and sample format. The levels of its echoes are left empty.
 pub fn recorded(source: &dyn Source, volume: usize) -> Recorded {
     Recorded {
         geometry: source.geometry(volume),
@@ -474,7 +485,7 @@ fn mode_setting(mode: &str) -> String {
     format!("mode={name}")
 }
 
-/// Opens the chosen device, or the best one, and prints its name on one line.
+/// Opens the chosen device, or the best one, and prints its name on one line. `validation`: with the Vulkan validation layer.
 #[cfg(feature = "lab")]
 pub fn open_device(choice: Option<DeviceChoice>, validation: bool) -> Result<Arc<Context>, Failure> {
     open(&ContextOptions {
@@ -485,7 +496,7 @@ pub fn open_device(choice: Option<DeviceChoice>, validation: bool) -> Result<Arc
     })
 }
 
-/// Opens a device. Waits for it end once `stop` returns true. Prints nothing.
+/// Opens the chosen device, or the best one. Once `stop` returns true, waiting for the device ends. Prints nothing.
 #[cfg(feature = "verify")]
 pub fn open_device_until(
     choice: Option<DeviceChoice>,
@@ -501,7 +512,7 @@ pub fn open_device_until(
     })
 }
 
-/// As [`open_device`], for statistics on the compilation of pipelines: no pipeline comes from an earlier run.
+/// As [`open_device`], for statistics of compiled pipelines: no pipeline is taken from the cache of an earlier run.
 #[cfg(feature = "lab")]
 pub fn open_device_for_statistics(choice: Option<DeviceChoice>) -> Result<Arc<Context>, Failure> {
     let device = choice.unwrap_or_default();
@@ -520,7 +531,7 @@ fn open(options: &ContextOptions) -> Result<Arc<Context>, Failure> {
     Ok(context)
 }
 
-/// The failure for an error while a device is opened or devices are listed. A missing device has its own exit code.
+/// The failure for an error of opening or listing devices. A missing device has an exit code of its own.
 pub fn device_failure(error: GpuError) -> Failure {
     match error {
         GpuError::NoLoader(_) | GpuError::NoDevice | GpuError::NoneFits(_) | GpuError::NoSuchDevice { .. } => {
@@ -530,10 +541,10 @@ pub fn device_failure(error: GpuError) -> Failure {
     }
 }
 
-/// The flag that names an output, and its file if the flag was given.
+/// The flag that names an output, and its path if the flag was given.
 pub type Output<'a> = (&'a str, Option<&'a Path>);
 
-/// Refuses outputs that cannot be written, that would replace an input (`read`), or that are written twice.
+/// Checks that outputs can be written, do not replace an input (`read`), and that none is written twice.
 pub fn check_outputs<'a>(outputs: &[Output], read: impl IntoIterator<Item = &'a Path>) -> Result<(), Failure> {
     let read: Vec<&Path> = read.into_iter().collect();
     let outputs: Vec<(&str, &Path)> = outputs.iter().filter_map(|(flag, file)| Some((*flag, (*file)?))).collect();
@@ -553,7 +564,7 @@ pub fn check_outputs<'a>(outputs: &[Output], read: impl IntoIterator<Item = &'a 
     Ok(())
 }
 
-/// Writes a report that contains no patient data completely or not at all, and prints its path.
+/// Writes a report, which must not contain data about a patient, and prints its path. The file is complete or not written.
 #[cfg(feature = "lab")]
 pub fn write_report(file: &Path, text: &str) -> Result<(), Failure> {
     crate::files::replace_shared(file, text.as_bytes()).map_err(failed)?;
@@ -561,7 +572,7 @@ pub fn write_report(file: &Path, text: &str) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Refuses files that would replace an input (`read`).
+/// Checks that none of `files`, which `flag` names, would replace an input (`read`).
 pub(super) fn check_inputs(flag: &str, files: &[PathBuf], read: &[PathBuf]) -> Result<(), Failure> {
     let inputs: HashSet<PathBuf> = read.iter().filter_map(|file| file.canonicalize().ok()).collect();
     match files.iter().find(|file| file.canonicalize().is_ok_and(|there| inputs.contains(&there))) {

@@ -39,18 +39,18 @@ pub struct MotorArgs {
     serial: SerialArgs,
 }
 
-/// A sweep that the motor can carry out. The port is not open yet.
+/// A sweep that was checked against the limits of the motor. The port is not open yet.
 pub struct PlannedSweep<'a> {
     arguments: &'a MotorArgs,
     settings: PortSettings,
     table: MotorTable,
     sweep: Sweep,
-    /// Speed between the acceleration ramps, degrees per second.
+    /// Speed of the array between the ramps at both ends, deg/s.
     pub speed: f64,
 }
 
 impl MotorArgs {
-    /// Checks the values that need no device.
+    /// Checks the values that can be checked without opening the port.
     pub fn check(&self) -> Result<(), Failure> {
         match (0.0..=10_000.0).contains(&self.delay) {
             true => Ok(()),
@@ -58,8 +58,8 @@ impl MotorArgs {
         }
     }
 
-    /// The requested sweep, or None without `--motor`. `recording`: the recording that is played, whose probe file is used if `probe` is
-    /// None. `fan`: the angle of the frames, degrees, for a probe file that does not state it.
+    /// The requested sweep; None without `--motor`. `recording`: path of the recording that is played, whose probe file is used if `probe` is
+    /// None. `fan`: angle between the first and the last frame, degrees, for a probe file that does not state it.
     pub fn plan(
         &self,
         probe: Option<&Path>,
@@ -86,13 +86,13 @@ impl MotorArgs {
 }
 
 impl PlannedSweep<'_> {
-    /// Opens the port and starts homing, then sweeping.
+    /// Opens the port, and starts a thread that finds home and then sweeps.
     pub fn start(&self) -> Result<BackgroundSweep, Failure> {
         let drive = Drive::open(&self.settings, &self.table).map_err(motor_failure)?;
         BackgroundSweep::start(drive, self.sweep, self.arguments.homed).map_err(failed)
     }
 
-    /// Wraps `source` so that each frame gets its position from the motor. `holds`: see [`MotorTrackingOptions::holds`].
+    /// The frames of `source`, assigned to slices by the position of `motor`. `holds`: see [`MotorTrackingOptions::holds`].
     pub fn track(&self, source: Box<dyn Live>, motor: BackgroundSweep, holds: bool) -> Box<dyn Live> {
         let clock = match self.arguments.stamps {
             true => Clock::Stamp,
@@ -127,7 +127,7 @@ enum ParityName {
 }
 
 impl SerialArgs {
-    /// The settings of the port at `port`.
+    /// The settings for opening the serial port of this name.
     pub fn settings(&self, port: &str) -> PortSettings {
         PortSettings {
             path: port.into(),
@@ -151,7 +151,7 @@ pub fn motor_failure(error: MotorError) -> Failure {
     }
 }
 
-/// The [motor] table of the probe file, if one is given.
+/// The `[motor]` table of a probe file; None if no file is given.
 pub fn motor_table(file: Option<&PathBuf>) -> Result<Option<MotorTable>, Failure> {
     let Some(file) = file else { return Ok(None) };
     required_motor_table(&ProbeFile::read(file).map_err(input)?).map(Some)

@@ -5,20 +5,20 @@ use crate::picture::PictureFormat;
 use crate::terminal::{self, Failure, failed, input, say};
 use std::path::Path;
 
-/// The name that stands for standard input and output.
+/// The path that stands for standard input or standard output.
 pub const STANDARD: &str = "-";
 
-/// The target of a picture.
+/// Where a picture is written.
 #[derive(Clone, Copy, Debug)]
 pub enum PictureFile<'a> {
-    /// A file and its format.
+    /// To a file, in this format.
     File(&'a Path, PictureFormat),
-    /// A PNG on standard output, which then gets nothing else.
+    /// To standard output as PNG. Messages then go to standard error.
     StandardOutput,
 }
 
 impl<'a> PictureFile<'a> {
-    /// The target that a flag names. With standard output, messages go to standard error from now on.
+    /// The target of the path that a flag was given. With standard output, messages go to standard error from now on.
     ///
     /// # Errors
     /// The ending belongs to no known format, or standard output is a terminal.
@@ -31,7 +31,7 @@ impl<'a> PictureFile<'a> {
         Ok(PictureFile::File(path, format))
     }
 
-    /// The file; None for standard output.
+    /// Path of the file; None for standard output.
     pub fn path(&self) -> Option<&'a Path> {
         match self {
             PictureFile::File(path, _) => Some(path),
@@ -39,12 +39,12 @@ impl<'a> PictureFile<'a> {
         }
     }
 
-    /// The name for messages.
+    /// The target as text for messages.
     pub fn name(&self) -> String {
         self.path().map_or("standard output".into(), |path| path.display().to_string())
     }
 
-    /// Writes a picture, and prints its path. `encode`: returns the bytes of the picture in a format.
+    /// Writes a picture and prints its path. `encode`: returns the picture as bytes of the given format.
     pub fn write(&self, encode: impl Fn(PictureFormat) -> Result<Vec<u8>, String>) -> Result<(), Failure> {
         let unwritable = |e: String| failed(format!("{}: cannot be written: {e}", self.name()));
         match self {

@@ -13,21 +13,21 @@ use crate::picture::film::FilmWriter;
 /// Most digits of a number in a pattern.
 const MAX_DIGITS: usize = 9;
 
-/// The target of a series of pictures.
+/// Where the pictures of a series are written.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SeriesTarget {
-    /// Numbered files: the name before and after the number, its least number of digits, and the folder to create, if one was named.
+    /// To numbered files: path before and after the number, its least number of digits, and the folder to create, if a folder was named.
     Files { before: OsString, digits: usize, after: String, format: PictureFormat, folder: Option<PathBuf> },
-    /// A film in one file.
+    /// To one film file.
     Film(PathBuf),
 }
 
 impl SeriesTarget {
-    /// The target that `-o` names. `name`: base name of the pictures in a folder, as in `picture-000000.png`.
+    /// The target that `-o` names. `name`: base name of the pictures if that is a folder, as in `picture-000000.png`.
     ///
     /// # Errors
-    /// One line: the name is that of a single picture, the pattern is not valid, the ending belongs to no known format, or the program was
-    /// built without films.
+    /// One line: the name is that of a single picture, the pattern is not valid, the ending belongs to no known format, or the program was built
+    /// without films.
     pub fn of(path: &Path, name: &str) -> Result<SeriesTarget, Failure> {
         let text = path.to_string_lossy();
         let refuse = |why: &str| Err(input(format!("-o {text}: {why}")));
@@ -76,7 +76,7 @@ impl SeriesTarget {
         Ok(SeriesTarget::Files { before, digits, after: after.into(), format, folder: None })
     }
 
-    /// The file of a picture.
+    /// Path of the file of the picture with this number.
     pub fn file(&self, number: usize) -> PathBuf {
         match self {
             SeriesTarget::Files { before, digits, after, .. } => {
@@ -88,7 +88,7 @@ impl SeriesTarget {
         }
     }
 
-    /// Refuses targets that cannot be written or would replace an input (`read`), and creates the folder that was named.
+    /// Checks that the files of these numbers can be written and would not replace an input (`read`), and creates the folder that was named.
     pub fn check(&self, numbers: impl Iterator<Item = usize>, read: &[PathBuf]) -> Result<(), Failure> {
         let files: Vec<PathBuf> = match self {
             SeriesTarget::Files { .. } => numbers.map(|n| self.file(n)).collect(),
@@ -103,7 +103,7 @@ impl SeriesTarget {
     }
 }
 
-/// A series of pictures that is being written. Each file is complete or does not exist.
+/// A series of pictures that is being written. Each of its files is complete or does not exist.
 pub struct PictureSeries<'a> {
     target: &'a SeriesTarget,
     /// Pictures of a film in a second.
@@ -125,7 +125,7 @@ impl<'a> PictureSeries<'a> {
         }
     }
 
-    /// Writes a picture to its file, or to the end of the film, and counts it.
+    /// Writes a picture to the file of its number, or appends it to the film.
     pub fn write(&mut self, number: usize, picture: &Picture) -> Result<(), Failure> {
         let file = self.target.file(number);
         let unwritable = |e: String| failed(format!("{}: cannot be written: {e}", file.display()));
@@ -152,12 +152,12 @@ impl<'a> PictureSeries<'a> {
         Err("this program was built without films".into())
     }
 
-    /// Number of written pictures.
+    /// Number of pictures written so far.
     pub fn count(&self) -> usize {
         self.count
     }
 
-    /// Ends the series. A film gets its final name.
+    /// Ends the series; a film is completed and gets its final name.
     pub fn finish(self) -> Result<(), Failure> {
         #[cfg(feature = "video")]
         if let Some(film) = self.film {

@@ -42,7 +42,7 @@ fn three(text: &str) -> Result<[f64; 3], String> {
 }
 
 impl GeometryArgs {
-    /// The first flag that is for recordings of files only, if one was given.
+    /// Name of the first of these flags that was given; they apply only to recorded files. None if none was given.
     pub fn for_files(&self) -> Option<&'static str> {
         let given = [
             ("--depth-axis", self.depth_axis.is_some()),
@@ -54,7 +54,7 @@ impl GeometryArgs {
         given.iter().find(|(_, is_given)| *is_given).map(|(flag, _)| *flag)
     }
 
-    /// The description of a recording with this geometry that a workspace stores.
+    /// The recording and these flags as a workspace stores them.
     #[cfg(feature = "view")]
     pub fn origin(&self, recording: Option<PathBuf>) -> Origin {
         let absolute = |path: &PathBuf| std::path::absolute(path).unwrap_or_else(|_| path.clone());
@@ -65,10 +65,10 @@ impl GeometryArgs {
         origin
     }
 
-    /// These arguments, and where they do not state probe file, depth axis or voxel spacing, those of a workspace. Nothing else is taken from it.
+    /// These arguments; probe file, depth axis and voxel spacing are those of a workspace (`origin`) where the arguments do not state them.
     ///
     /// # Errors
-    /// The axis of the workspace is not valid, even if these arguments state one.
+    /// The depth axis of the workspace is not valid, even if the arguments state one.
     pub fn or(&self, origin: &Origin) -> Result<GeometryArgs, Failure> {
         let kept = origin.depth_axis.as_deref().map(str::parse).transpose();
         let kept = kept.map_err(|e: String| input(format!("workspace.depth_axis: {e}")))?;
@@ -80,7 +80,7 @@ impl GeometryArgs {
         })
     }
 
-    /// The arguments as options of the library.
+    /// These arguments as options for opening a recording.
     pub fn options(&self) -> OpenOptions<'_> {
         OpenOptions {
             probe: self.probe.as_deref(),
@@ -94,14 +94,14 @@ impl GeometryArgs {
     }
 }
 
-/// Opens a recording and prints which probe file its geometry is from, if any.
+/// Opens a recording, and prints the path of the probe file that its geometry comes from, if there is one.
 pub fn open_recording(path: &Path, options: OpenOptions) -> Result<Box<dyn Source>, Failure> {
     let source = source::open_with(path, options).map_err(input)?;
     say_probe_file(source.probe_file());
     Ok(source)
 }
 
-/// Prints on one line which probe file is used. Nothing if there is none, or if the line before named the same file.
+/// Prints on one line which probe file is used. Prints nothing if there is none, or if the previous line named the same one.
 pub fn say_probe_file(file: Option<&Path>) {
     let mut said = SAID.lock().unwrap_or_else(|e| e.into_inner());
     if let Some(file) = file.filter(|file| said.as_deref() != Some(*file)) {
@@ -110,7 +110,7 @@ pub fn say_probe_file(file: Option<&Path>) {
     }
 }
 
-/// Help of an argument that is a recording.
+/// Help text of an argument that is a recording: the formats that can be read.
 pub fn recording_help() -> String {
     format!("{}; a folder or a 'pattern*.png' of numbered pictures; - for standard input", described())
 }

@@ -14,7 +14,7 @@ pub struct ShaderArgs {
 }
 
 impl ShaderArgs {
-    /// The shaders of the folder, or the embedded ones. A shader is compiled when a pipeline needs it.
+    /// Loads the shaders of the given folder, or the embedded ones. A shader of a folder is compiled when a pipeline needs it.
     ///
     /// # Errors
     /// There is no compiler, or the folder cannot be read or holds no shader.
@@ -25,19 +25,20 @@ impl ShaderArgs {
         })
     }
 
-    /// True if shaders of the user were given.
+    /// True if a folder of shaders was given.
     pub fn are_given(&self) -> bool {
         self.glsl.is_some()
     }
 
-    /// The failure that ends the command.
+    /// The failure with which a command ends after a GPU error, see [`gpu_failure`].
     #[cfg(feature = "lab")]
     pub fn failure(&self, fault: GpuError) -> Failure {
         gpu_failure(fault, self.are_given())
     }
 }
 
-/// The failure that ends a command. With shaders of the user, a shader that does not compile is a fault of the input.
+/// The failure with which a command ends after a GPU error. If the shaders are the user's (`own_shaders`), one that does not compile is an error
+/// of the input.
 pub fn gpu_failure(fault: GpuError, own_shaders: bool) -> Failure {
     match fault {
         fault @ GpuError::Shader { .. } if own_shaders => input(fault),

@@ -88,7 +88,7 @@ struct SourceParser {
 }
 
 impl SourceArgs {
-    /// The source that a configuration states. Messages name its keys.
+    /// The source that a configuration file selects. Error messages name the keys of the file.
     pub fn from_config(config: &Config) -> Result<SourceArgs, Failure> {
         let parsed = SourceParser::try_parse_from(config.source_arguments()).map_err(|error| {
             let text = error.to_string();
@@ -110,13 +110,13 @@ impl SourceArgs {
         self.motor.check()
     }
 
-    /// These arguments for another file, with the geometry of the flags.
+    /// The same arguments for another recording; the geometry flags remain.
     #[cfg(feature = "view")]
     pub fn at_file(&self, file: &Path) -> SourceArgs {
         SourceArgs { source: file.to_string_lossy().into_owned(), ..self.clone() }
     }
 
-    /// These arguments for another file, with the geometry of that file alone.
+    /// The same arguments for another recording, without the geometry flags.
     #[cfg(feature = "view")]
     pub fn of_file(&self, file: &Path) -> SourceArgs {
         let geometry = GeometryArgs::default();
@@ -131,7 +131,7 @@ impl SourceArgs {
         }
     }
 
-    /// These arguments with the recording of a workspace.
+    /// The same arguments for the recording that a workspace names. `file`: path of the workspace.
     ///
     /// # Errors
     /// The workspace names no recording.
@@ -141,7 +141,7 @@ impl SourceArgs {
         Ok(SourceArgs { source, geometry: self.geometry.or(&workspace.origin)?, ..self.clone() })
     }
 
-    /// The description of the source that a workspace stores.
+    /// The source and its geometry flags as a workspace stores them.
     #[cfg(feature = "view")]
     pub fn origin(&self) -> Origin {
         match self.kind() {
@@ -151,7 +151,7 @@ impl SourceArgs {
         }
     }
 
-    /// True if the volumes are numbered as in the recording: it is played once.
+    /// True if the recording is played only once, so that volume numbers are those of the recording.
     #[cfg(feature = "view")]
     pub fn plays_once(&self) -> bool {
         self.rounds <= 1
@@ -162,7 +162,7 @@ impl SourceArgs {
         self.source == "phantom"
     }
 
-    /// The kind of the source.
+    /// Kind of the source, by its name.
     #[cfg(feature = "view")]
     pub fn kind(&self) -> SourceKind {
         match self.source.as_str() {
@@ -173,7 +173,7 @@ impl SourceArgs {
         }
     }
 
-    /// The name of the source for messages.
+    /// The name of the source as the user typed it, for messages.
     pub fn name(&self) -> &str {
         match self.source.as_str() {
             "-" => "standard input",
@@ -181,12 +181,12 @@ impl SourceArgs {
         }
     }
 
-    /// The source as a path, for a source that is a file.
+    /// Path of the source, if it is a file.
     pub fn path(&self) -> &Path {
         Path::new(&self.source)
     }
 
-    /// Opens the source. With a motor, also opens its port and starts it.
+    /// Opens the source. If a motor was requested, also opens its port and starts its sweep.
     pub fn open(&self) -> Result<Box<dyn Live>, Failure> {
         let network = self.source.strip_prefix(SCHEME);
         let is_file = !self.is_phantom() && self.source != "-" && network.is_none();
@@ -334,7 +334,7 @@ pub struct StreamArgs {
 }
 
 impl StreamArgs {
-    /// The value of `--update`.
+    /// How arriving frames become visible, as `--update` says.
     pub fn update(&self) -> Result<Update, Failure> {
         match self.update.as_str() {
             "whole" => Ok(Update::Whole),
@@ -343,12 +343,12 @@ impl StreamArgs {
         }
     }
 
-    /// The operations that are timed on the device.
+    /// Which operations are timed on the device.
     pub fn time_stamps(&self) -> TimeStamps {
         if self.timings { TimeStamps::EachPass } else { TimeStamps::Ends }
     }
 
-    /// The value of `--queues`.
+    /// Number of device queues to use, as `--queues` says; None: all.
     pub fn queues(&self) -> Option<usize> {
         self.queues.map(usize::from)
     }

@@ -20,27 +20,27 @@ const PRESETS: Place =
 #[cfg(feature = "view")]
 const RECENT: Place = Place { variable: "ECHOLUME_RECENT", xdg: ("XDG_STATE_HOME", ".local/state"), name: "recent" };
 
-/// The folder of compiled pipelines: `pipelines` in the user's cache folder, or what ECHOLUME_PIPELINE_CACHE names instead; none if that is
-/// `none` or empty, or if the system names no such folder.
+/// Path of the folder of compiled pipelines: `pipelines` in the user's cache folder, or the value of ECHOLUME_PIPELINE_CACHE. None if that is
+/// `none` or empty, or if the system has no such folder.
 pub fn pipeline_folder() -> Option<PathBuf> {
     PIPELINES.path(|name| std::env::var_os(name))
 }
 
-/// The file of the user's presets: `presets.toml` in the user's folder of configurations, or what ECHOLUME_PRESETS names instead; none if that is
-/// `none` or empty, or if the system names no such folder.
+/// Path of the file with the user's presets: `presets.toml` in the user's configuration folder, or the value of ECHOLUME_PRESETS. None if that
+/// is `none` or empty, or if the system has no such folder.
 pub fn presets_file() -> Option<PathBuf> {
     PRESETS.path(|name| std::env::var_os(name))
 }
 
-/// The list of recent files: `recent` in the user's folder of state, or what ECHOLUME_RECENT names instead; none if that is `none` or empty, or if
-/// the system names no such folder.
+/// Path of the list of recent files: `recent` in the user's state folder, or the value of ECHOLUME_RECENT. None if that is `none` or empty, or
+/// if the system has no such folder.
 #[cfg(feature = "view")]
 pub fn recent_list() -> Option<PathBuf> {
     RECENT.path(|name| std::env::var_os(name))
 }
 
-/// The file that marks that the hints of the first start were shown. None unless this is the first start: the mark, a list of recent files
-/// beside it, and presets of the user must all be missing. Also None if no list of recent files is kept.
+/// Path of an empty file that is to be created once the hints of the first start were shown. None unless this is the first start: neither this
+/// file, nor a list of recent files, nor presets of the user exist. Also None if no list of recent files is kept.
 #[cfg(feature = "view")]
 pub fn first_steps() -> Option<PathBuf> {
     first_steps_beside(recent_list()?, presets_file())

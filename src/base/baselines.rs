@@ -11,48 +11,49 @@ use std::path::Path;
 
 /// A result that is stored as a JSON file. The field `format` of the file is the name and the version of the format.
 pub trait Stored: Serialize + DeserializeOwned {
-    /// The format that is written.
+    /// Content of the field `format` in files that are written: name and version of the format.
     const FORMAT: &'static str;
-    /// Earlier versions that are read, too.
+    /// Contents of the field `format` of earlier versions that can still be read.
     const EARLIER: &'static [&'static str] = &[];
-    /// Around names of formats in messages.
+    /// Quotation mark around names of formats in messages.
     const QUOTE: char = '\'';
-    /// What a file of it is, in messages: `a profile`.
+    /// What such a file is, with its article, for messages: `a profile`.
     const WHAT: &'static str;
-    /// How to make one in this format, in messages: `profile again with it`.
+    /// Advice at the end of the message about another format: how to make a new file, for example `profile again with it`.
     const AGAIN: &'static str;
-    /// Its kind where a file is too long, in messages: `profile`.
+    /// Name of this kind of file in the messages of reading it: `profile`.
     const KIND: &'static str;
     /// Longest file that is read, bytes.
     const MAX_BYTES: u64;
 
-    /// The first field that contradicts others or that no run gives, and what is wrong with it.
+    /// Name of the first field whose value contradicts other fields or is impossible, and what is wrong with it. None if the result is
+    /// consistent.
     fn fault(&self) -> Option<(String, String)>;
 
-    /// Makes what was read in an earlier version one of [`Stored::FORMAT`].
+    /// Converts a result that was read in one of the [`Stored::EARLIER`] versions to the current one. Also called for the current version.
     fn renew(&mut self) {}
 
-    /// Checks that the contents are consistent.
+    /// Checks that no field contradicts another one or is impossible.
     ///
     /// # Errors
-    /// One line: the first field that is not.
+    /// One line that names the first faulty field.
     fn check(&self) -> Result<(), String> {
         self.fault().map_or(Ok(()), |(field, fault)| Err(format!("{}: {}", escaped(&field), escaped(&fault))))
     }
 
-    /// The result as JSON. Every number is exact: what is read back is the same.
+    /// The result as JSON text. Reading it gives exactly the same numbers.
     ///
     /// # Errors
-    /// One line: [`Stored::check`] refuses it.
+    /// One line: [`Stored::check`] refuses the result.
     fn to_json(&self) -> Result<String, String> {
         self.check()?;
         serde_json::to_string_pretty(self).map(|text| text + "\n").map_err(|e| escaped(&e.to_string()))
     }
 
-    /// Reads a result. Any text gives a consistent one or an error.
+    /// Reads a result from JSON text and checks it.
     ///
     /// # Errors
-    /// One line: another format, no JSON of such a result, or contents that [`Stored::check`] refuses.
+    /// One line: the text is of another format, is not JSON of such a result, or [`Stored::check`] refuses it.
     fn from_json(text: &str) -> Result<Self, String> {
         let json = |e: serde_json::Error| format!("not {}: {}", Self::WHAT, escaped(&e.to_string()));
         let format = stated_format(text).map_err(json)?;
@@ -66,10 +67,10 @@ pub trait Stored: Serialize + DeserializeOwned {
         Ok(result)
     }
 
-    /// Reads a result from a file.
+    /// Reads a result from a file and checks it.
     ///
     /// # Errors
-    /// One line that names the file: it cannot be read, or those of [`Stored::from_json`].
+    /// One line that names the file: it cannot be read, or [`Stored::from_json`] refuses it.
     fn load(file: &Path) -> Result<Self, String> {
         let text = read_text(file, Self::MAX_BYTES, Self::KIND);
         text.and_then(|text| Self::from_json(&text)).map_err(|e| format!("{}: {e}", file.display()))

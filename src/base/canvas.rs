@@ -23,7 +23,7 @@ pub const GRID: [RGBColor; 2] = [RGBColor(208, 208, 208), RGBColor(236, 236, 236
 
 pub type Drawn = Result<(), String>;
 
-/// Left, top, right, bottom, pixels.
+/// Left, top, right and bottom edge of a rectangle in the output, pixels from its upper left corner.
 pub type Frame = [f64; 4];
 
 /// The kind of output.
@@ -31,7 +31,7 @@ pub type Frame = [f64; 4];
 struct Medium {
     /// Supersampling factor along each edge, for smooth text and slanted lines.
     pub scale: u32,
-    /// Offset by which `plotters` places text too high, as a share of the text's size.
+    /// How far above the requested position `plotters` draws text in this medium, as a share of the text's height.
     pub raised: f64,
 }
 
@@ -83,7 +83,7 @@ impl<'a, B: DrawingBackend> Canvas<'a, B> {
             .map_err(|e| fault(&e))
     }
 
-    /// One of five shapes that differ without colour, about 9 pixels across.
+    /// Draws a marker of a data point, about 9 pixels across. `shape` modulo 5 selects one of five shapes that differ without colour.
     pub fn mark(&self, at: [f64; 2], shape: usize, colour: RGBColor) -> Drawn {
         let polygon = |corners: &[[f64; 2]]| {
             let points: Vec<_> = corners.iter().map(|c| self.pixel([at[0] + c[0], at[1] + c[1]])).collect();
@@ -98,7 +98,8 @@ impl<'a, B: DrawingBackend> Canvas<'a, B> {
         }
     }
 
-    /// Text at its anchor: `across` and `down` are 0 for left and top, 1 for the middle, 2 for right and bottom.
+    /// Draws text of `size` pixels. `at` is its anchor: `across` 0, 1 and 2 are the left end, the middle and the right end of the text; `down`
+    /// 0, 1 and 2 are its top, middle and bottom.
     pub fn text(&self, text: &str, at: [f64; 2], size: u32, colour: RGBColor, [across, down]: [usize; 2]) -> Drawn {
         let h = [HPos::Left, HPos::Center, HPos::Right][across.min(2)];
         let v = [VPos::Top, VPos::Center, VPos::Bottom][down.min(2)];
@@ -108,6 +109,9 @@ impl<'a, B: DrawingBackend> Canvas<'a, B> {
     }
 
     /// Width and height of a text, pixels.
+    ///
+    /// # Errors
+    /// One line: the text cannot be measured.
     pub fn measure(&self, text: &str, size: u32) -> Result<[f64; 2], String> {
         let style = (FONT, size * self.medium.scale).into_font().color(&INK);
         let (w, h) = self.area.estimate_text_size(text, &style).map_err(|e| fault(&e))?;
@@ -135,6 +139,8 @@ fn fault(e: &dyn std::fmt::Display) -> String {
 
 /// A drawing that can be rendered as SVG and as a picture.
 pub trait Drawing {
+    /// Draws on the canvas.
+    ///
     /// # Errors
     /// One line: the drawing failed.
     fn draw<B: DrawingBackend>(&self, canvas: &Canvas<B>) -> Drawn;

@@ -8,12 +8,12 @@ use std::sync::OnceLock;
 /// Largest volume, bytes.
 static LIMIT: OnceLock<u64> = OnceLock::new();
 
-/// Sets the limit, bytes. It has no effect once a limit was set or checked.
+/// Sets the largest memory of a volume, bytes. Ignored once a limit was set or checked.
 pub fn set_limit(bytes: u64) {
     LIMIT.get_or_init(|| bytes);
 }
 
-/// Checks that a volume of `bytes` bytes does not exceed the limit.
+/// Checks that a volume of `bytes` bytes is within the limit: that of [`set_limit`], else half of the memory that this process may have.
 ///
 /// # Errors
 /// One line: the size and the limit.

@@ -5,21 +5,21 @@ use std::fmt::{self, Debug, Formatter};
 use std::io::{self, Write};
 use std::sync::{Mutex, PoisonError};
 
-/// The environment variable that asks for such lines, and its value.
+/// The environment variable that requests progress lines, and the value that it must have.
 pub const ASKED_BY: (&str, &str) = ("ECHOLUME_PROGRESS", "lines");
 /// What a line begins with.
 const PREFIX: &str = "progress: ";
 /// Most lines a second.
 const RATE: u8 = 10;
 
-/// Progress of a task.
+/// Progress of a task: `done` of `of` steps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Progress {
     pub done: u64,
     pub of: u64,
 }
 
-/// Parses a progress line. None if the line is something else.
+/// Parses a line such as `progress: 12/72 pictures`. None if the line is something else.
 pub fn parse(line: &str) -> Option<Progress> {
     let (done, rest) = line.strip_prefix(PREFIX)?.split_once('/')?;
     let of = rest.split_whitespace().next()?;
@@ -31,7 +31,7 @@ pub fn is_asked() -> bool {
     std::env::var_os(ASKED_BY.0).is_some_and(|value| value == ASKED_BY.1)
 }
 
-/// A progress bar that writes lines such as `progress: 12/72 pictures` to standard error instead of drawing itself.
+/// A bar of `count` steps that does not draw itself but writes lines such as `progress: 12/72 pictures` to standard error.
 pub fn bar(count: u64) -> ProgressBar {
     to(count, io::stderr())
 }

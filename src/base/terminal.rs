@@ -69,12 +69,12 @@ impl Failure {
     }
 }
 
-/// A failure of the input or the command line.
+/// The failure that the input or the command line is wrong.
 pub fn input(error: impl std::fmt::Display) -> Failure {
     Failure::Input(error.to_string())
 }
 
-/// A failure of a valid request.
+/// The failure that a valid request could not be carried out.
 pub fn failed(error: impl std::fmt::Display) -> Failure {
     Failure::Failed(error.to_string())
 }
@@ -102,7 +102,7 @@ pub fn keep_standard_output() -> Result<(), &'static str> {
     Ok(())
 }
 
-/// Writes bytes to standard output as they are. An error is reported when the command ends, as by [`print`].
+/// Writes bytes to standard output unchanged. A write error is reported when the command ends, as with [`print`].
 pub fn write(bytes: &[u8]) {
     match std::io::stdout().write_all(bytes).and_then(|()| std::io::stdout().flush()) {
         Ok(()) => {}
@@ -111,7 +111,7 @@ pub fn write(bytes: &[u8]) {
     }
 }
 
-/// Prints a remark on standard error as one line: the command goes on, and succeeds.
+/// Prints a warning on standard error as one line. The command goes on, and its exit code stays 0.
 pub fn remark(message: &str) {
     let _ = writeln!(std::io::stderr(), "echolume: {}", single_line(message));
 }
@@ -128,7 +128,7 @@ pub fn print_failure(failure: &Failure) {
     let _ = writeln!(std::io::stderr(), "echolume: {}", single_line(message));
 }
 
-/// True if standard error may carry colours and move its cursor: a terminal that can, of a user who did not refuse colours (NO_COLOR).
+/// True if standard error is a terminal that has colours and a cursor that can be moved, and the user did not refuse colours (NO_COLOR).
 pub fn has_colours() -> bool {
     std::io::stderr().is_terminal() && !is_dumb() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
 }
@@ -146,12 +146,12 @@ pub fn progress_bar(count: u64) -> ProgressBar {
     if is_dumb() { ProgressBar::hidden() } else { ProgressBar::new(count) }
 }
 
-/// True if the reader of standard output has closed it.
+/// True if the process that reads standard output has closed the pipe.
 pub fn is_closed() -> bool {
     IS_CLOSED.load(Ordering::Relaxed)
 }
 
-/// The first error of writing to standard output since the last call.
+/// Takes the first error of writing to standard output since the last call; None if there was none.
 pub fn take_write_error() -> Option<std::io::Error> {
     WRITE_ERROR.lock().unwrap_or_else(|e| e.into_inner()).take()
 }

@@ -23,7 +23,7 @@ pub fn single_line(text: &str) -> String {
     printable(text).chars().take(MAX_LINE).collect()
 }
 
-/// One line of bounded length: control characters and other invisible ones, line breaks included, become escapes.
+/// The text on one line of at most about 600 characters: control characters and other invisible ones, line breaks included, are escaped.
 pub fn escaped(text: &str) -> String {
     let mut line = String::new();
     for c in text.chars() {
@@ -39,17 +39,17 @@ pub fn escaped(text: &str) -> String {
     line
 }
 
-/// A CSV field in quotes.
+/// The text as a CSV field in quotes.
 pub fn csv_quoted(text: &str) -> String {
     format!("\"{}\"", text.replace('"', "\"\""))
 }
 
-/// A CSV field (RFC 4180), quoted if it contains a comma, quote or line break.
+/// The text as a CSV field (RFC 4180), in quotes if it contains a comma, quote or line break.
 pub fn csv_field(text: &str) -> String {
     if text.contains([',', '"', '\n', '\r']) { csv_quoted(text) } else { text.into() }
 }
 
-/// Text without Markdown table markup and terminal control characters.
+/// The text for a cell of a Markdown table, with table markup and terminal control characters escaped.
 pub fn markdown_text(text: &str) -> String {
     text.chars()
         .flat_map(|c| if c.is_control() { c.escape_default().collect() } else { vec![c] })
@@ -57,7 +57,7 @@ pub fn markdown_text(text: &str) -> String {
         .replace('|', "\\|")
 }
 
-/// A Markdown table with aligned pipes: the first column left-aligned, the others right-aligned.
+/// A Markdown table with aligned pipes from rows of cells, the header first. The first column is left-aligned, the others right-aligned.
 pub fn markdown_table(rows: &[Vec<String>]) -> String {
     let columns = rows.first().map_or(0, Vec::len);
     let width = |c: usize| rows.iter().map(|r| r[c].chars().count()).max().unwrap_or(0).max(3);

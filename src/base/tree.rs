@@ -9,7 +9,7 @@ use std::ops::Range;
 use toml::Value;
 use toml::de::{DeTable, DeValue};
 
-/// A value and the range of bytes of the text that it was read from.
+/// A parsed value and the range of bytes of the text that it was parsed from.
 #[derive(Clone, Debug)]
 pub struct Node {
     span: Option<Range<usize>>,
@@ -39,7 +39,7 @@ pub struct NodeError {
     span: Option<Range<usize>>,
 }
 
-/// The kind of a fault.
+/// The kinds of errors that are told apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
     /// A table lacks a key that its type needs.
@@ -59,7 +59,7 @@ impl NodeError {
         self.fault
     }
 
-    /// The message, without the position.
+    /// The message, without the position in the text.
     pub fn message(&self) -> &str {
         &self.message
     }
@@ -165,21 +165,21 @@ impl Node {
         Ok(Node { span: Some(table.span()), content: content_of_table(table.into_inner()) })
     }
 
-    /// Removes the value of a key from a table and returns it.
+    /// Removes a key from this table and returns its value. None if the key is missing or this value is not a table.
     pub fn take(&mut self, key: &str) -> Option<Node> {
         let Content::Table(table) = &mut self.content else { return None };
         let at = table.iter().position(|(name, _)| matches!(&name.content, Content::Text(name) if name == key))?;
         Some(table.remove(at).1)
     }
 
-    /// The value of a key of a table.
+    /// The value of a key of this table. None if the key is missing or this value is not a table.
     pub fn at(&mut self, key: &str) -> Option<&mut Node> {
         let Content::Table(table) = &mut self.content else { return None };
         let is_named = |name: &Node| matches!(&name.content, Content::Text(name) if name == key);
         table.iter_mut().find(|(name, _)| is_named(name)).map(|(_, value)| value)
     }
 
-    /// Adds a number to a table that does not have the key.
+    /// Adds a key with an integer to this table. Does nothing if the key exists or this value is not a table.
     pub fn add(&mut self, key: &str, value: i64) {
         let is_there = self.at(key).is_some();
         if let (Content::Table(table), false) = (&mut self.content, is_there) {

@@ -5,7 +5,7 @@ use crate::verify::report::Figure;
 use crate::verify::{Findings, compare_picture};
 use serde::{Deserialize, Serialize};
 
-/// A device and its driver.
+/// The device that drew a picture, and its driver.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Drawer {
@@ -15,18 +15,18 @@ pub struct Drawer {
     pub is_software: bool,
 }
 
-/// How much two pictures may differ.
+/// How far two pictures of one unit may differ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Class {
-    /// The same device and driver, or no device at all: the bytes must be equal.
+    /// They were drawn by the same device and driver, or by none: their bytes must be equal.
     SameDriver,
-    /// Another device or driver: the pictures must agree within the tolerance of `verify`.
+    /// They were drawn by different devices or drivers: they must agree within the tolerance of `verify`.
     OtherDriver,
 }
 
 impl Class {
-    /// The class of results by these two devices.
+    /// The class of two pictures, given the devices that drew them; None: no device was used.
     pub fn of(a: Option<&Drawer>, b: Option<&Drawer>) -> Class {
         if a == b { Class::SameDriver } else { Class::OtherDriver }
     }
@@ -45,21 +45,21 @@ impl Class {
 #[serde(deny_unknown_fields)]
 pub struct Agreement {
     pub class: Class,
-    /// The device that drew the stored picture.
+    /// The device that drew the stored picture; None if none did.
     pub with: Option<Drawer>,
     pub same_bytes: bool,
-    /// Whether the difference is within what the class allows.
+    /// True if the difference is within what the class allows.
     pub agrees: bool,
     /// Errors between the two pictures, each with its limit in `verify`; empty if the bytes are equal.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub figures: Vec<Figure>,
-    /// One line that describes the difference, if the pictures do not agree.
+    /// One line that describes the difference; None if the pictures agree.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fault: Option<String>,
 }
 
 impl Agreement {
-    /// Compares a picture with the stored one. Equal pixels mean equal bytes, as both are encoded alike.
+    /// Compares the picture `drawn` with the stored one, `kept`. Equal pixels mean equal bytes, as both are encoded alike.
     pub fn of(kept: &Picture, kept_by: Option<&Drawer>, drawn: &Picture, drawn_by: Option<&Drawer>) -> Agreement {
         let class = Class::of(kept_by, drawn_by);
         // A file has no transparency.

@@ -4,17 +4,17 @@ use super::agreement::{Class, Drawer};
 use super::results::{Record, Status};
 use std::collections::BTreeMap;
 
-/// The outputs of one pair of devices: how many were compared, how many have the same bytes, and which do not agree.
+/// Comparisons of outputs of the same units by two devices: how many there are, how many outputs have the same bytes, and which do not agree.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Pair {
     pub compared: usize,
     pub same_bytes: usize,
-    /// Input, work and fault of each unit that does not agree.
+    /// For each unit whose outputs do not agree: its input, its work, and what differs.
     pub faults: Vec<(String, String, String)>,
 }
 
-/// All comparisons of results, by class and pair of devices: units that were drawn again, and units that two processes did, by the digests of
-/// their outputs.
+/// All comparisons in the results, by class and pair of devices. There is one for each unit that was drawn again and, by the digests of its
+/// outputs, for each unit that two processes did.
 pub fn pairs(records: &[Record]) -> BTreeMap<(Class, Option<Drawer>, Option<Drawer>), Pair> {
     let mut pairs: BTreeMap<(Class, Option<Drawer>, Option<Drawer>), Pair> = BTreeMap::new();
     let mut first: BTreeMap<&str, &Record> = BTreeMap::new();

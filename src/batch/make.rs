@@ -13,10 +13,10 @@ use std::path::{Path, PathBuf};
 /// Largest depth of folders that are searched below a named one.
 const MAX_DEPTH: usize = 64;
 
-/// The result of looking at a file.
+/// Whether a file becomes a unit of the manifest.
 pub enum Found {
     Unit(Box<Unit>),
-    /// The file and why it is left out.
+    /// The file does not; the text names it and the reason.
     LeftOut(String),
 }
 
@@ -69,7 +69,8 @@ fn walk(folder: &Path, depth: usize, found: &mut Vec<PathBuf>) -> Result<(), Str
     Ok(())
 }
 
-/// The unit of a file: its absolute path, digest, length and expected cost. The file is opened and read.
+/// Makes the unit of a file: its absolute path, digest, length and expected cost. The file is opened and read. `command`: what is to be done
+/// with it.
 ///
 /// # Errors
 /// The command is wrong, independently of the file.

@@ -14,25 +14,25 @@ const MAX_UNITS: usize = 1 << 27;
 /// Largest number of outputs of a unit.
 const MAX_OUTPUTS: usize = 4;
 
-/// A unit of work: one line of the manifest.
+/// A unit of work, which is one line of the manifest: a recording and what is done with it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Unit {
     /// Path of the recording, absolute or relative to the manifest's folder.
     pub input: String,
-    /// SHA-256 of the recording, 64 hexadecimal digits. Without it the recording is read to compute the key.
+    /// SHA-256 of the recording, 64 hexadecimal digits. None: the recording has to be read to compute the key of its outputs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub digest: Option<String>,
-    /// Length of the recording's files in bytes.
+    /// Length of the recording's files, bytes; None if not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bytes: Option<u64>,
-    /// Expected cost in a unit that all lines share; 1 if not given.
+    /// Expected cost, relative to the other lines; 1 if not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cost: Option<f64>,
-    /// Settings as in a scene file, with which the recording is rendered. Excludes `command`.
+    /// Settings as in a scene file, with which the recording is rendered. Not allowed together with `command`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scene: Option<Map<String, Value>>,
-    /// `render`, `convert`, `measure` or `verify` with its flags; `render` if neither this nor a scene is given.
+    /// What is done: `render`, `convert`, `measure` or `verify` with its flags. None: `render`, with `scene` if that is given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub command: Option<Vec<String>>,
     /// File names of the outputs, one for each output of the command.
@@ -40,7 +40,7 @@ pub struct Unit {
     pub outputs: Vec<String>,
 }
 
-/// A unit and the number of its line, from 1.
+/// A unit and the number of its line in the manifest, from 1.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Numbered {
     pub line: u64,
@@ -133,7 +133,7 @@ pub fn costs(file: &Path) -> Result<Vec<f64>, String> {
     }
 }
 
-/// The units that `is_chosen` selects by their index (from 0), in the order of the manifest.
+/// The units that `is_chosen` selects by their index in the manifest, from 0, in the order of the manifest.
 ///
 /// # Errors
 /// One line that names the file, the line and the fault.
@@ -152,7 +152,7 @@ pub fn units(file: &Path, is_chosen: impl Fn(usize) -> bool) -> Result<Vec<Numbe
     Ok(units)
 }
 
-/// Calls `each` with every unit, one at a time in memory.
+/// Calls `each` with every unit of a manifest. Only one is in memory at a time.
 ///
 /// # Errors
 /// As of [`units`].

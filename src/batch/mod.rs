@@ -32,12 +32,15 @@ fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|b| format!("{b:02x}")).collect()
 }
 
-/// SHA-256 of bytes, as `sha256sum` prints it.
+/// SHA-256 of bytes as hexadecimal digits, as `sha256sum` prints it.
 pub(crate) fn sha256(bytes: &[u8]) -> String {
     hex(&Sha256::digest(bytes))
 }
 
-/// SHA-256 and length of a file, in bounded memory.
+/// SHA-256 (hexadecimal digits) and length (bytes) of a file, which is read in parts.
+///
+/// # Errors
+/// The file cannot be read.
 pub(crate) fn sha256_of_file(path: &Path) -> io::Result<(String, u64)> {
     let (mut file, mut digest, mut length) = (File::open(path)?, Sha256::new(), 0);
     let mut part = vec![0; 1 << 16];
@@ -53,11 +56,11 @@ pub(crate) fn sha256_of_file(path: &Path) -> io::Result<(String, u64)> {
     }
 }
 
-/// SHA-256 of a recording, and the length of its files in bytes. For a recording of several files (samples apart from the header, a probe file) it
-/// is the hash of their digests, one a line.
+/// SHA-256 of a recording, and the length of its files in bytes. For a recording of several files (samples apart from the header, a probe file)
+/// it is the hash of their digests, one a line.
 ///
 /// # Errors
-/// One line that names the file.
+/// One line that names the file that cannot be read.
 pub(crate) fn digest_of(files: &[PathBuf]) -> Result<(String, u64), String> {
     let mut seen: Vec<&PathBuf> = Vec::new();
     let (mut digests, mut bytes) = (Vec::new(), 0);

@@ -11,16 +11,16 @@ use crate::verify::Findings;
 use crate::verify::{compare_picture, render};
 use std::sync::Arc;
 
-/// How a device is opened.
+/// Which Vulkan device is used, and how long it is waited for.
 #[derive(Clone)]
 pub struct DeviceOptions {
     pub device: Option<DeviceChoice>,
     pub deadline: Deadline,
-    /// Waits for the device end once it returns true.
+    /// Once this returns true, waiting for the device ends.
     pub stop: fn() -> bool,
 }
 
-/// A device, and the renderer that drew the last picture.
+/// Draws pictures of a batch: a device, and the renderer of the last picture.
 pub struct Painter {
     context: Arc<Context>,
     renderer: Option<Renderer>,
@@ -30,6 +30,8 @@ pub struct Painter {
 }
 
 impl Painter {
+    /// Opens the device.
+    ///
     /// # Errors
     /// There is no such device, or it cannot be opened.
     pub fn open(options: &DeviceOptions) -> Result<Painter, GpuError> {
@@ -47,10 +49,11 @@ impl Painter {
         }
     }
 
-    /// Draws a volume. A lost device is opened again and the work repeated in smaller and smaller parts.
+    /// Draws a volume. If the device is lost, it is opened again and the work is repeated in smaller and smaller parts. `is_whole`: `frames` has
+    /// every slice.
     ///
     /// # Errors
-    /// The device lacks something, has too little memory, or was lost again.
+    /// The device lacks a feature, has too little memory, or was lost again.
     pub fn draw(&mut self, scene: &Scene, frames: &[Frame], is_whole: bool) -> Result<Picture, GpuError> {
         self.losses = Losses::default();
         loop {
@@ -92,7 +95,7 @@ impl Painter {
     }
 }
 
-/// Compares a picture with the f64 reference, as `verify` does. `frames`: one for every slice.
+/// Compares a picture with that of the f64 reference renderer, as `verify` does. `frames`: one for every slice.
 pub fn against_reference(scene: &Scene, frames: &[Frame], picture: &Picture) -> Findings {
     let format = Slot::Frames.format(scene);
     let [width, height] = scene.geometry.frame_size();

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 /// Interval of the lines where standard error is no terminal.
 const LINE: Duration = Duration::from_secs(60);
 
-/// Counts the units of a shard and shows its progress.
+/// Counts the units of a shard that ended, and shows the progress.
 pub struct Progress {
     bar: Option<ProgressBar>,
     begun: Instant,
@@ -25,7 +25,7 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// `cost`: expected cost of all units together.
+    /// `units`: number of units of the shard; `cost`: sum of their expected costs.
     pub fn new(units: usize, cost: f64) -> Progress {
         let bar = std::io::stderr().is_terminal().then(|| {
             let bar = ProgressBar::new(units as u64);
@@ -39,7 +39,7 @@ impl Progress {
         Progress { bar, begun: now, said: now, units, ended: 0, found: 0, failed: 0, cost, spent: 0.0, saved: 0.0 }
     }
 
-    /// Counts a unit that was done before.
+    /// Counts a unit of this expected cost that an earlier run had done.
     pub fn found(&mut self, cost: f64) {
         self.found += 1;
         self.saved += cost;
@@ -50,7 +50,7 @@ impl Progress {
         self.ends(cost);
     }
 
-    /// Counts a unit that failed, and prints `line`.
+    /// Counts a unit of this expected cost that failed, and prints `line`.
     pub fn failed(&mut self, cost: f64, line: &str) {
         self.failed += 1;
         match &self.bar {
@@ -90,7 +90,7 @@ impl Progress {
         format!("{rate:.2} units a second{left}{failed}")
     }
 
-    /// Removes the bar and returns a summary of one line.
+    /// Removes the progress bar and returns a summary in one line.
     pub fn finish(self) -> String {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();

@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-/// A unit with its work and the place of its recording.
+/// A unit, its parsed work and the path of its recording.
 #[derive(Clone)]
 pub struct Task {
     pub numbered: Numbered,
@@ -24,11 +24,11 @@ pub struct Task {
     pub input: PathBuf,
 }
 
-/// What the reader found for a task.
+/// What reading the recording of a task gave.
 pub enum Read {
-    /// The unit was done before: its record.
+    /// Nothing is to be done: an earlier run did the unit and left this record.
     Finished(Task, Box<Record>),
-    /// The unit is to be done. `earlier`: the record of a unit that was done before and is drawn again for comparison.
+    /// The unit is to be done. `earlier`: the record of an earlier run if the unit is drawn again only for comparison.
     Ready {
         task: Task,
         key: Key,
@@ -59,8 +59,8 @@ pub enum Contents {
     Figures(Map<String, Value>),
 }
 
-/// Reads what a task needs. A unit with a known digest whose record is in `folder` is not read, unless `again` is true for its key. With `verified`
-/// the digests of its outputs are compared first.
+/// Reads what a task needs. Nothing is read of a unit whose digest is given and whose record is in `folder`, unless `again` is true for its key.
+/// With `verified`, the digests of the record's outputs have to be correct, too.
 pub(super) fn read(task: Task, folder: &Path, verified: Option<&Verified>, again: impl Fn(&Key) -> bool) -> Read {
     let begun = Instant::now();
     let (mut key, mut earlier) = (None, None);
@@ -257,7 +257,7 @@ impl Statistics {
     }
 }
 
-/// The file name of a path, for messages.
+/// The file name of a path as text for messages.
 pub fn shown(path: &Path) -> String {
     escaped(&path.display().to_string(), 300)
 }

@@ -30,10 +30,10 @@ fn rank(record: &Record) -> (bool, bool, &str) {
     (record.status == Status::Done, record.agreement.is_none(), &record.date)
 }
 
-/// The results of all shards, one for each unit.
+/// The results of all shards, reduced to one for each unit.
 #[derive(Default)]
 pub struct Merged<'a> {
-    /// By input and work: the last success or, if there is none, the last failure.
+    /// The result of each unit, by its input and work: the last success or, if there is none, the last failure.
     pub units: BTreeMap<(&'a str, &'a str), &'a Record>,
 }
 
@@ -49,18 +49,19 @@ impl<'a> Merged<'a> {
         Merged { units }
     }
 
-    /// Units that are not done.
+    /// The results of units that are not done.
     pub fn failures(&self) -> impl Iterator<Item = &'a Record> {
         self.units.values().copied().filter(|record| record.status != Status::Done)
     }
 
-    /// Units that are done.
+    /// The results of units that are done.
     pub fn done(&self) -> impl Iterator<Item = &'a Record> {
         self.units.values().copied().filter(|record| record.status == Status::Done)
     }
 }
 
-/// The page. `folder`: the batch's, with the pictures of the thumbnails. `torn`: number of lines that killed processes left unfinished.
+/// The HTML report of a batch. `folder`: that of the batch, from which thumbnails are read. `torn`: number of incomplete lines that killed
+/// processes left in the results.
 pub fn html(records: &[Record], torn: usize, folder: &Path) -> String {
     let merged = Merged::of(records);
     let (units, failures) = (merged.units.len(), merged.failures().count());

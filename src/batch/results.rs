@@ -15,60 +15,60 @@ use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Version of the format of records.
+/// Name and version of the format of records.
 pub const FORMAT: &str = "echolume-batch-1";
 /// Most bytes of a line of results and of a record.
 const MAX_LINE: u64 = 1 << 20;
 
-/// How a unit ended.
+/// How an attempt to do a unit ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Status {
     Done,
-    /// The recording or the command is wrong: another try would end the same.
+    /// The recording or the command is wrong, so that another attempt would fail, too.
     Bad,
-    /// The work failed.
+    /// The work failed for another reason.
     Failed,
     /// The device was lost during the work.
     Lost,
 }
 
-/// Wall-clock seconds by stage.
+/// Wall-clock time that a unit took in each stage, s.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Seconds {
-    /// Reading the recording, on the thread that reads ahead.
+    /// Time for reading the recording, on the thread that reads ahead, s.
     pub read: f64,
-    /// Waiting for the recording to be read.
+    /// Time for which the worker waited for the recording, s.
     pub wait: f64,
-    /// Drawing, converting or comparing.
+    /// Time for drawing, converting or comparing, s.
     pub work: f64,
-    /// Writing and renaming the outputs.
+    /// Time for writing and renaming the outputs, s.
     pub write: f64,
 }
 
-/// A file that a unit made.
+/// An output file of a unit, with its length and digest.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct OutputFile {
-    /// Path relative to the batch's folder.
+    /// Path of the file relative to the batch's folder.
     pub file: String,
     pub bytes: u64,
     pub sha256: String,
 }
 
-/// One try of one unit.
+/// The result of one attempt to do a unit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Record {
-    /// Version of the format; [`FORMAT`] when written by this program.
+    /// Name and version of the format; [`FORMAT`] if this version of the program wrote it.
     pub format: String,
-    /// Key of the outputs; empty if the recording could not be read.
+    /// Key of the outputs, with which their file names begin; empty if the recording could not be read.
     pub key: String,
     /// Number of the unit's line in the manifest, from 1.
     pub line: u64,
     pub input: String,
-    /// The command or the scene, as text.
+    /// The command or the scene of the unit, as text.
     pub work: String,
     pub status: Status,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -76,25 +76,25 @@ pub struct Record {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub outputs: Vec<OutputFile>,
     pub seconds: Seconds,
-    /// The device that was used, if any.
+    /// The device that was used; None if none was needed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub drawer: Option<Drawer>,
     pub program: String,
     pub host: String,
-    /// End of the try, RFC 3339.
+    /// Date and time of the end of the attempt, RFC 3339.
     pub date: String,
     #[serde(default, skip_serializing_if = "Map::is_empty")]
     pub figures: Map<String, Value>,
-    /// The comparison with the stored picture, if a finished unit was drawn again.
+    /// The comparison with the stored picture; None unless a finished unit was drawn again for it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub agreement: Option<Agreement>,
 }
 
-/// Counts of outputs whose digests were compared with their records.
+/// Numbers of outputs whose digests were compared with those in their records.
 #[derive(Default)]
 pub(super) struct Verified {
     pub whole: AtomicU64,
-    /// Outputs that differ or cannot be read. Each is reported in a line, and its unit is done again.
+    /// Number of outputs that differ or cannot be read. Each is reported in a line, and its unit is done again.
     pub damaged: AtomicU64,
 }
 
@@ -116,7 +116,8 @@ impl Verified {
     }
 }
 
-/// The record of a unit, if it is valid and all outputs exist with the stated length. With `verified` their digests must agree, too.
+/// The record of a finished unit. None unless it is valid and all outputs exist with the recorded length and, with `verified`, the recorded
+/// digest.
 pub(super) fn read_record(folder: &Path, key: &Key, verified: Option<&Verified>) -> Option<Record> {
     let bytes = files::read(&folder.join(key.record()), MAX_LINE, "record").ok()?;
     let record: Record = serde_json::from_slice(&bytes).ok()?;
@@ -135,7 +136,7 @@ fn hash_of(input: &str, work: &str) -> u64 {
     hasher.finish()
 }
 
-/// The units of a manifest, as hashes: a million take 16 MiB.
+/// The set of units in a manifest, as hashes: a million take 16 MiB.
 #[derive(Default)]
 pub struct Asked(HashSet<u64>);
 
@@ -145,14 +146,14 @@ impl Asked {
     }
 }
 
-/// Results that earlier processes wrote into a folder.
+/// Results that earlier runs wrote into a folder.
 #[derive(Debug, Default)]
 pub struct Earlier {
-    /// Whether the folder has results of a batch, possibly without a line.
+    /// True if the folder has files of results, even if these have no line.
     pub is_begun: bool,
-    /// Whether the results have a line.
+    /// True if there is at least one line of results.
     pub has_lines: bool,
-    /// Whether a line is that of a unit that was asked for.
+    /// True if at least one line is about a unit of the present manifest.
     pub is_of_these: bool,
     /// Keys and recordings of this shard's units with a line that says done.
     done: HashSet<(String, String)>,
@@ -163,11 +164,11 @@ pub struct Earlier {
 }
 
 impl Earlier {
-    /// Reads the results of a shard; with `asked` those of all shards, also of divisions into another number. Each file is read once. Nothing is
-    /// written.
+    /// Reads the earlier results of a shard. If `asked`, the units of the manifest, is given, results of all other shards are read, too,
+    /// also of divisions into another number of shards. Each file is read once, and nothing is written.
     ///
     /// # Errors
-    /// One line that names the file.
+    /// One line that names the file that cannot be read.
     pub fn read(folder: &Path, shard: Shard, asked: Option<&Asked>) -> Result<Earlier, String> {
         let mut found = Earlier::default();
         let own = file_of(folder, shard);
@@ -200,7 +201,7 @@ impl Earlier {
         Ok(found)
     }
 
-    /// Whether any shard has done this unit, which must be among those asked for.
+    /// True if any shard has done this unit. It must be among the units that were given to [`Earlier::read`].
     pub fn says_done(&self, input: &str, work: &str) -> bool {
         self.done_anywhere.contains(&hash_of(input, work))
     }
@@ -210,7 +211,7 @@ fn file_of(folder: &Path, shard: Shard) -> PathBuf {
     folder.join("results").join(format!("shard-{:04}-of-{:04}.ndjson", shard.index, shard.count))
 }
 
-/// The file of results of a shard, open for appending.
+/// The file with the results of a shard, open for appending.
 pub struct Results {
     file: File,
     path: PathBuf,
@@ -218,11 +219,11 @@ pub struct Results {
 }
 
 impl Results {
-    /// Opens or creates `results/shard-I-of-N.ndjson`, and ends a line that a killed process left unfinished. `earlier`: the results that were
-    /// read before.
+    /// Opens or creates `results/shard-I-of-N.ndjson`, and completes a line that a killed process left unfinished. `earlier`: the results that
+    /// were read before.
     ///
     /// # Errors
-    /// One line that names the file.
+    /// One line that names the file that cannot be opened or written.
     pub fn open(folder: &Path, shard: Shard, earlier: Earlier) -> Result<Results, String> {
         let place = folder.join("results");
         fs::create_dir_all(&place).map_err(|e| format!("{}: cannot be made: {e}", place.display()))?;
@@ -243,10 +244,10 @@ impl Results {
         &self.earlier
     }
 
-    /// Appends a line in one write, so that lines of two processes do not mix.
+    /// Appends a record as a line, in one write, so that lines of two processes do not mix.
     ///
     /// # Errors
-    /// One line that names the file.
+    /// One line that names the file that cannot be written.
     pub fn add(&mut self, record: &Record) -> Result<(), String> {
         let fault = |e: &dyn std::fmt::Display| format!("{}: cannot be written: {e}", self.path.display());
         let mut line = serde_json::to_vec(record).map_err(|e| fault(&e))?;
@@ -258,12 +259,13 @@ impl Results {
         Ok(())
     }
 
-    /// Whether a line says that the unit is done. There may be none although the record exists: a process may be killed between the two.
+    /// True if a line says that the unit is done. It may be missing although the unit's record exists: a process may be killed between writing
+    /// the two.
     pub fn has(&self, record: &Record) -> bool {
         self.earlier.done.contains(&(record.key.clone(), record.input.clone()))
     }
 
-    /// Number of times that a device was lost by this unit.
+    /// Number of times that the device was lost while this unit was done.
     pub fn losses(&self, input: &str, work: &str) -> usize {
         // Nearly always empty, and a key has to be copied.
         let is_known = !self.earlier.lost.is_empty();
@@ -307,7 +309,7 @@ fn files_of(folder: &Path) -> Result<Vec<PathBuf>, (PathBuf, io::Error)> {
     Ok(files)
 }
 
-/// All results of a folder without their figures, and the number of lines that killed processes left unfinished.
+/// All results in a folder, without their figures, and the number of incomplete lines that killed processes left.
 ///
 /// # Errors
 /// One line: there are no results, or they cannot be read.

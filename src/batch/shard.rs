@@ -8,17 +8,19 @@ use std::str::FromStr;
 /// Largest number of shards.
 const MAX_SHARDS: u32 = 1 << 20;
 
-/// One part of a manifest.
+/// One of several parts into which the units of a manifest are divided.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {
-    /// From 0.
+    /// Number of this part, from 0; `count` is the number of parts.
     pub index: u32,
     pub count: u32,
 }
 
 impl Shard {
+    /// Part `index` of `count`.
+    ///
     /// # Errors
-    /// There is no such shard.
+    /// There is no such part.
     pub fn new(index: u32, count: u32) -> Result<Shard, String> {
         match () {
             _ if count == 0 || count > MAX_SHARDS => Err(format!("{count} shards: must be 1..={MAX_SHARDS}")),
@@ -27,9 +29,9 @@ impl Shard {
         }
     }
 
-    /// The shard of this process by the environment of Slurm (task of an array) or Kubernetes (completion of an Indexed Job); the whole manifest
-    /// elsewhere. `count` is the number of shards, if known. Kubernetes does not tell it. With it, an array that is submitted again in part
-    /// keeps its division.
+    /// The shard of this process according to the environment variables of Slurm (task of an array) or Kubernetes (completion of an Indexed
+    /// Job); the whole manifest if there are none. `count`: the number of shards, which Kubernetes does not state; if it is given, an array that
+    /// is submitted again in part keeps its division.
     ///
     /// # Errors
     /// One line: an invalid number, an array with gaps, or a Job without a count.
@@ -108,8 +110,8 @@ impl PartialOrd for Load {
     }
 }
 
-/// The shard of every unit by Graham's LPT rule: the most expensive unit first, each to the shard with the least cost so far. No shard costs more
-/// than the mean plus one unit. O(n log n), deterministic.
+/// The index of the shard of every unit by Graham's LPT rule: the most expensive unit first, each to the shard with the least cost so far. No
+/// shard costs more than the mean plus one unit. O(n log n), deterministic.
 pub fn assign(costs: &[f64], count: u32) -> Vec<u32> {
     let mut order: Vec<usize> = (0..costs.len()).collect();
     order.sort_by(|a, b| costs[*b].total_cmp(&costs[*a]).then(a.cmp(b)));

@@ -19,7 +19,7 @@ const SCHEME: &str = "echolume-batch-1";
 /// Hexadecimal digits of a key: 128 bits.
 const KEY_LENGTH: usize = 32;
 
-/// What can be done with a recording.
+/// What can be done with a recording in a batch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     Render,
@@ -29,7 +29,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// The subcommand's name.
+    /// Name of the subcommand for work of this kind.
     pub fn word(self) -> &'static str {
         match self {
             Kind::Render => "render",
@@ -49,7 +49,7 @@ impl Kind {
         }
     }
 
-    /// Whether the work needs a Vulkan device.
+    /// True if the work needs a Vulkan device.
     pub fn needs_device(self) -> bool {
         matches!(self, Kind::Render | Kind::Verify)
     }
@@ -107,27 +107,27 @@ struct MeasureUnit {
     volume: usize,
 }
 
-/// What is done with a recording: a checked command with all its settings. Units that differ only in their recording share one.
+/// What is done with a recording: a checked command with all its settings. Units that differ only in their recording share it.
 pub struct Work {
     pub kind: Kind,
-    /// The command or scene as results name it ([`text`]).
+    /// The command or the scene as text in the results ([`text`]).
     pub text: String,
     pub geometry: GeometryArgs,
-    /// Volume of the recording, from 0.
+    /// Index of the volume in the recording, from 0.
     pub volume: usize,
-    /// Settings of a picture, by layer.
+    /// Settings with which pictures are drawn, as layers.
     pub layers: Layers,
-    /// Voxel spacing of a converted volume, mm.
+    /// Voxel spacing of a converted volume, mm; `None`: that of the recording.
     pub spacing: Option<f64>,
-    /// Value of a converted volume outside the sector; `None`: the value of no echo.
+    /// Value of a converted volume outside the insonified region; `None`: the value of no echo.
     pub outside: Option<f64>,
-    /// File name of the output.
+    /// File name of the output, without the key that precedes it.
     pub output: String,
     /// Hash of the fields above and of the files that settings are read from.
     digest: Vec<u8>,
 }
 
-/// The command or the scene of a unit as results name it.
+/// The command or the scene of a unit as text in the results.
 pub fn text(unit: &Unit) -> String {
     match (&unit.scene, &unit.command) {
         (Some(scene), _) => format!("scene {}", serde_json::to_string(scene).unwrap_or_default()),
@@ -137,10 +137,10 @@ pub fn text(unit: &Unit) -> String {
 }
 
 impl Work {
-    /// The work of a unit. Reads the files that its flags name, relative to the working folder.
+    /// Parses the work of a unit. Reads the files that its flags name, relative to the working folder.
     ///
     /// # Errors
-    /// The command line or a setting is wrong, or the command does not make the format of the output.
+    /// The command line or a setting is wrong, or the command cannot write the format of the output.
     pub fn of(unit: &Unit) -> Result<Work, Failure> {
         let text = text(unit);
         let mut work = match &unit.scene {
@@ -239,7 +239,7 @@ impl Work {
         Ok(hash.finalize().to_vec())
     }
 
-    /// The key of the outputs for a recording with this digest.
+    /// The key of the outputs of this work for a recording with this digest.
     pub fn key(&self, digest: &str) -> Key {
         let mut hash = Sha256::new();
         hash.update(&self.digest);
@@ -264,22 +264,23 @@ impl Key {
         &self.0
     }
 
-    /// Folder of the unit's files, relative to the batch's folder. There are at most 65536, so that each has some tens of files of a million units.
+    /// Path of the folder with the unit's files, relative to the batch's folder. There are at most 65536 such folders, so that a million units
+    /// leave some tens of files in each.
     pub fn folder(&self) -> PathBuf {
         Path::new("units").join(&self.0[..2]).join(&self.0[2..4])
     }
 
-    /// Path of the unit's record, relative to the batch's folder.
+    /// Path of the unit's record file, relative to the batch's folder.
     pub fn record(&self) -> PathBuf {
         self.folder().join(format!("{}.json", self.0))
     }
 
-    /// Path of an output, relative to the batch's folder.
+    /// Path of the output `name`, relative to the batch's folder.
     pub fn output(&self, name: &str) -> PathBuf {
         self.folder().join(format!("{}-{name}", self.0))
     }
 
-    /// A number in 0..=1 derived from the key, evenly distributed: the units with numbers below a limit are a random sample.
+    /// A number in 0..=1 that is derived from the key and evenly distributed: units whose number is below a limit are a random sample.
     pub fn share(&self) -> f64 {
         u32::from_str_radix(&self.0[4..12], 16).map_or(0.0, |n| f64::from(n) / f64::from(u32::MAX))
     }

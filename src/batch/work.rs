@@ -28,33 +28,33 @@ const MAX_TRIES: usize = 3;
 /// A temporary file that was not written to for so long is deleted as abandoned.
 const ABANDONED: Duration = Duration::from_secs(3600);
 
-/// A shard and how it is run.
+/// The units of a shard, and how they are to be done.
 pub struct Job<'a> {
-    /// Units of the shard. Paths of recordings are relative to `beside`.
+    /// The units of the shard. Paths of their recordings are relative to the folder `beside`.
     pub units: Vec<Numbered>,
     pub beside: &'a Path,
     /// The batch's folder, for outputs, records and results.
     pub folder: &'a Path,
     pub shard: Shard,
     pub device: DeviceOptions,
-    /// Whether the digests of finished outputs are compared with their records.
+    /// True if the digests of finished outputs are compared with their records.
     pub verifies: bool,
-    /// Share of the finished pictures that is drawn again and compared, 0..=1.
+    /// Share of the finished pictures that are drawn again and compared, 0..=1.
     pub recheck: f64,
-    /// Results that earlier processes wrote for this shard. [`Job::run`] takes them.
+    /// Results that earlier runs wrote for this shard. [`Job::run`] takes them.
     pub earlier: Earlier,
-    /// Whether the run begins with a line that counts the units done before.
+    /// True if the run begins with a line that states how many units were done before.
     pub resumes: bool,
-    /// Returns true once no further unit is to be started.
+    /// Called before each unit: once it returns true, no further unit is started.
     pub stops: &'a dyn Fn() -> bool,
 }
 
-/// How a shard ended.
+/// How the run of a shard ended: numbers of all units and of those that failed.
 #[derive(Debug, Default)]
 pub struct Ended {
     pub units: usize,
     pub failed: usize,
-    /// Whether a signal ended the run before all units were tried.
+    /// True if a signal ended the run before all units were tried.
     pub stopped: bool,
 }
 
@@ -87,7 +87,7 @@ impl Made {
 }
 
 impl Job<'_> {
-    /// Runs the shard. A unit that fails is reported in one line, and the others are still done.
+    /// Does the units of the shard. A unit that fails is reported in one line, and the others are still done.
     ///
     /// # Errors
     /// A unit's command is wrong ([`Failure::Input`], before any work); there is no device, or it is lost ([`Failure::NoDevice`]); nothing can

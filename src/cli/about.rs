@@ -20,7 +20,7 @@ pub struct Completions {
 }
 
 impl Completions {
-    /// Writes the script to standard output. `program`: the command line that it completes.
+    /// Prints the completion script for `program`.
     pub fn run(&self, mut program: Command) -> Result<(), Failure> {
         let name = program.get_name().to_string();
         let mut script = Vec::new();
@@ -40,7 +40,7 @@ pub struct ManPages {
 }
 
 impl ManPages {
-    /// Writes the pages of `program`.
+    /// Writes the manual pages of `program`.
     pub fn run(&self, mut program: Command) -> Result<(), Failure> {
         program.build();
         let Some(folder) = &self.output else {

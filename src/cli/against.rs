@@ -16,13 +16,13 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::str::FromStr;
 
-/// The other side of a comparison.
+/// What this program is compared with.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Other {
     Program(PathBuf),
-    /// A folder of shaders.
+    /// This program with the shaders of this folder.
     Shaders(PathBuf),
-    /// By number or name, as in `--device`.
+    /// This program on another device, by number or name as in `--device`.
     Device(String),
 }
 
@@ -141,9 +141,9 @@ impl Block {
 /// What a process says when a volume is done.
 const DONE: &str = "in turn: done";
 
-/// Keeps this process, which measures a block, on the last core that it may run on. The distribution of the threads of a software device
-/// and of other load over several cores differs between two processes and stays the same for seconds. Alternate volumes would not share it,
-/// and more volumes would not average it out.
+/// Binds this process, which measures a block, to the last core that it may run on. Otherwise the distribution of threads of a software device
+/// and of other load over the cores differs between two processes and stays the same for seconds: alternating volumes would not cancel it, and
+/// more volumes would not average it out.
 pub fn keep_to_one_core() {
     #[cfg(target_os = "linux")]
     if let Ok(cores) = rustix::thread::sched_getaffinity(None)
@@ -157,7 +157,10 @@ pub fn keep_to_one_core() {
     }
 }
 
-/// In a process that measures a block: waits for a line of standard input, which requests a volume.
+/// In a process that measures a block: waits for a line on standard input, which requests the next volume.
+///
+/// # Errors
+/// Standard input has ended.
 pub fn await_turn() -> Result<(), Failure> {
     match std::io::stdin().read_line(&mut String::new()) {
         Ok(length) if length > 0 => Ok(()),
@@ -165,13 +168,14 @@ pub fn await_turn() -> Result<(), Failure> {
     }
 }
 
-/// Reports that the volume is done.
+/// In a process that measures a block: reports on standard output that the volume is done.
 pub fn end_turn() {
     say!("{DONE}");
 }
 
-/// Measures this program with its own arguments and `other` alternately, A B B A, and compares them. `repeats`: number of volumes for each,
-/// in blocks; each block is a pair of processes with `warm_up` additional volumes at its beginning.
+/// Measures this program with its own arguments and `other` alternately, in the order A B B A, and compares the times. `repeats`: number of
+/// measured volumes of each side, divided into blocks. Each block is a pair of processes, which first draw `warm_up` volumes that are not
+/// measured.
 pub fn compared(other: &Other, repeats: u32, warm_up: u32, options: &CompareOptions) -> Result<Comparison, Failure> {
     let mut sides = sides(other)?;
     let folder = WorkFolder::new(&std::env::temp_dir(), "echolume-profile-").map_err(failed)?;

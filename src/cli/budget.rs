@@ -9,7 +9,8 @@ use crate::scene::Scene;
 use crate::terminal::{Failure, failed, input, say};
 use std::path::Path;
 
-/// The settings with the smallest error that keep the budget, by the report in `file`. `scene` opens the scene without them.
+/// The settings with the smallest error whose time is within the budget, according to the error report in `file`, as assignments. `scene`: opens
+/// the scene to which they are added.
 pub(super) fn chosen(
     budget: &str,
     file: &Path,
@@ -33,7 +34,7 @@ pub(super) fn chosen(
     Ok(choice.set.clone())
 }
 
-/// Prints whether the picture kept the budget.
+/// Prints whether the times of a picture's passes are within the budget.
 pub(super) fn judge(budget: &str, times: &[PassTime]) -> Result<(), Failure> {
     let (time, taken) = (parse_nanoseconds("--budget", budget)?, times.iter().map(|t| t.total).sum::<f64>());
     let kept = if taken <= time { "within" } else { "over" };

@@ -6,7 +6,7 @@ use crate::source::{Frame, Source};
 use crate::terminal::{Failure, failed};
 use std::sync::Arc;
 
-/// The reason why a picture could not be drawn.
+/// Why a picture could not be drawn.
 pub enum DrawFault {
     Gpu(GpuError),
     Source(Failure),
@@ -19,7 +19,7 @@ impl From<GpuError> for DrawFault {
 }
 
 impl DrawFault {
-    /// The failure of a command that draws in order to measure, for which a loss of the device is final.
+    /// The failure with which a command ends that draws in order to measure; it does not draw again after the device was lost.
     pub fn failed(self) -> Failure {
         self.failure(false)
     }
@@ -32,9 +32,9 @@ impl DrawFault {
     }
 }
 
-/// Draws on the device of `context`. If it is lost, `reopen` opens it again and `draw` is called again, with smaller bands in `options`,
-/// until it was lost too often in a row ([`Losses`]). `progress` describes how many of several pictures are finished. The argument of
-/// `draw` is true if it is called again: a part of the source may then have been read.
+/// Draws on the device of `context`. If the device is lost, `reopen` opens it again and `draw` is called again, with smaller bands in `options`,
+/// until it was lost too often in a row ([`Losses`]). `progress` returns how many of several pictures are finished. The last argument of `draw`
+/// is true if it is called again: then a part of the source may have been read.
 ///
 /// # Errors
 /// The error of `draw` or `reopen`.
@@ -63,10 +63,10 @@ pub fn draw_despite_losses<T>(
     }
 }
 
-/// Sends every frame of a volume to volume image 0. `each` receives the frame before it is sent.
+/// Sends every frame of the volume with this index to volume image 0 of the renderer. `each` is called with each frame before it is sent.
 ///
 /// # Errors
-/// The source cannot be read, `each` fails, or the device fails. A loss of the device is a case of its own, so that the caller can try
+/// The source cannot be read, `each` fails, or the device fails. The loss of the device is a variant of its own, so that the caller can try
 /// again.
 pub fn send_volume(
     renderer: &mut Renderer,

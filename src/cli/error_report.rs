@@ -212,7 +212,7 @@ fn write(report: &error_report::Report, measure: Measure, folder: &Path) -> Resu
     Ok(())
 }
 
-/// Reads a stored report.
+/// Reads an error report that was stored as JSON.
 pub(crate) fn read_report(file: &Path) -> Result<error_report::Report, Failure> {
     let fault = |e: &dyn std::fmt::Display| input(format!("{}: {e}", file.display()));
     let text = read_text(file, MAX_REPORT, "report").map_err(|e| fault(&e))?;

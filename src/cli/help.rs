@@ -199,7 +199,7 @@ const SHORT: [(&str, &str); 15] = [
 /// Most characters of a line of help behind the flag.
 const LINE: usize = 64;
 
-/// Sorts the flags of the command line into groups.
+/// Sorts the flags of all commands into groups for their help.
 pub fn grouped(program: Command) -> Command {
     let of_all = ["verbose", "log_file", "max_memory"];
     let program =
@@ -219,7 +219,7 @@ fn in_group(arg: Arg, own: &[(&str, &'static str)]) -> Arg {
     }
 }
 
-/// Reduces the command line for `-h` to the usual flags, one line each.
+/// Reduces the help of all commands to that of `-h`: the usual flags, one line each.
 pub fn short(program: Command) -> Command {
     let is_rare = |arg: &Arg| ["log_file", "max_memory"].contains(&arg.get_id().as_str());
     let program = program.mut_args(|arg| short_line(arg.clone()).hide(is_rare(&arg)));
@@ -262,7 +262,7 @@ fn first_part(help: &str) -> String {
     line.to_string()
 }
 
-/// Adds the values that a shell completes. They are fewer than the program accepts: modes have synonyms, and presets may be a user's own.
+/// Adds the values that a shell completes. The program accepts more of them: modes have synonyms, and presets may be the user's own.
 pub fn completed(program: Command) -> Command {
     program.mut_subcommands(|command| command.mut_args(with_values))
 }

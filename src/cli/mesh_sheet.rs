@@ -12,8 +12,8 @@ use crate::terminal::{Failure, failed, input, say};
 use glam::DVec3;
 use std::path::Path;
 
-/// Writes the sheet of the distance map that a renderer drew last, in the colours of its picture. `world`: position of the voxels of a
-/// Cartesian volume in the world.
+/// Writes the surface in the distance map that a renderer drew last as an open mesh (sheet), in the colours of its picture. `world`: map from
+/// the voxels of a Cartesian volume to the world; None for a sweep.
 pub(super) fn write(
     renderer: &mut Renderer,
     picture: &Picture,

@@ -208,7 +208,7 @@ enum Command {
     Man(about::ManPages),
 }
 
-/// Parses the command line and runs it.
+/// Parses the command line and runs the command. Returns the exit code of the process.
 pub fn run() -> ExitCode {
     let arguments = match parsed() {
         Ok(arguments) => arguments,

@@ -12,13 +12,13 @@ use crate::source::StoredType;
 /// What fills a picture in which nothing is visible.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Nothing {
-    /// One colour: red, green, blue.
+    /// A single colour: red, green, blue.
     Colour([u8; 3]),
-    /// The ground behind a volume, which fills the picture.
+    /// The ground behind the volume (`light.volume.ground`).
     Ground,
 }
 
-/// The content of a picture of at least two pixels in which nothing is visible. None for any other picture.
+/// What fills the picture of at least two pixels if nothing is visible in it; otherwise None.
 pub fn of(scene: &Scene, picture: &Picture) -> Option<Nothing> {
     let mut pixels = picture.rgba.chunks_exact(4).map(|p| [p[0], p[1], p[2]]);
     let first = pixels.next().filter(|_| picture.rgba.len() > 4)?;
@@ -43,7 +43,7 @@ fn is_ground(scene: &Scene, picture: &Picture) -> bool {
     })
 }
 
-/// The message for standard error.
+/// The warning about a picture in which nothing is visible. `file`: name of the picture; `why`: the cause, if known.
 pub fn line(file: &str, nothing: Nothing, why: Option<&str>) -> String {
     let shown = match nothing {
         Nothing::Ground => "the ground alone (light.volume.ground)".into(),
@@ -54,7 +54,7 @@ pub fn line(file: &str, nothing: Nothing, why: Option<&str>) -> String {
     format!("{file}: is {shown}: {}", why.unwrap_or("the scene has no volume"))
 }
 
-/// The cause in words. `volume`: the texels of the scene's volume. `shift`: stored sample minus the value of the file.
+/// The reason in words why nothing is visible. `volume`: texels of the scene's volume; `shift`: stored sample minus the value in the file.
 pub fn cause(scene: &Scene, volume: &Texels, shift: f64) -> String {
     let seen = survey(scene, volume);
     if seen.met == 0 {

@@ -16,11 +16,11 @@ use crate::source::{self, Description, Frame, Source};
 use crate::terminal::{Failure, failed, input, progress_bar, remark, say};
 use std::path::{Path, PathBuf};
 
-/// The name of the output in messages.
+/// Name of the output file in messages.
 pub(super) const OUTPUT: &str = "output";
 
-/// Reads one volume of a recording, and its geometry. `each` is called with every frame before it is kept. The number of frames that are
-/// there comes last.
+/// Reads the volume with the index `number`. Returns its geometry, its samples and the number of frames that were there. `each` is called with
+/// every frame. `file`: path of the recording, for messages.
 pub(super) fn read_volume(
     recording: &mut dyn Source,
     file: &Path,
@@ -51,8 +51,8 @@ fn check_number(recording: &dyn Source, file: &Path, number: usize) -> Result<()
     }
 }
 
-/// As [`read_volume`], and also finds the threshold between the darker and the brighter class of echoes as a share of the range, if there
-/// are two classes.
+/// As [`read_volume`], and also finds the levels of the echoes, among them the threshold between the darker and the brighter class; None if
+/// there are no two classes.
 pub(super) fn read_with_threshold(
     recording: &mut dyn Source,
     file: &Path,
@@ -68,13 +68,17 @@ pub(super) fn read_with_threshold(
     Ok((geometry, volume, found))
 }
 
-/// The threshold of the user, or the one that was found.
+/// The threshold of the user (`asked`), otherwise the one that was found, as a share of the sample range.
+///
+/// # Errors
+/// There is neither.
 pub(super) fn share_of(asked: Option<f64>, found: Option<&EchoLevels>, file: &Path) -> Result<f64, Failure> {
     let none = || input(format!("{}: the echoes have no two classes; give --threshold", file.display()));
     asked.or(found.map(|levels| levels.threshold)).ok_or_else(none)
 }
 
-/// The lattice of a conversion: that of the volume itself, or one with the requested spacing, mm.
+/// The grid of a converted volume: with the requested voxel spacing, mm, otherwise that of a Cartesian volume itself, or for a sweep one with
+/// the distance of its samples.
 pub(super) fn target_grid(geometry: &Geometry, spacing: Option<f64>) -> Result<Grid, Failure> {
     match (geometry, spacing) {
         // Every voxel stays what and where it is.
@@ -383,7 +387,7 @@ pub struct Info {
 }
 
 impl Info {
-    /// `all`: also each key that the file states and that was not used.
+    /// Prints the description. `all`: also each key that the file states and that was not used.
     pub fn run(&self, all: bool) -> Result<(), Failure> {
         let Description { rows: mut facts, unused } =
             source::description(&self.file, self.geometry.options()).map_err(input)?;

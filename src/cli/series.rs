@@ -70,7 +70,7 @@ fn rate(text: &str) -> Result<f64, String> {
     number.ok_or_else(|| "must lie in 0.1..=240 pictures a second".into())
 }
 
-/// How the pictures are drawn, and where they are written.
+/// How the pictures of a series are drawn, and where they are written.
 pub struct Job<'a> {
     pub input: &'a InputArgs,
     pub output: &'a Path,
@@ -107,12 +107,12 @@ impl Views {
 }
 
 impl SeriesArgs {
-    /// True if several pictures are asked for.
+    /// True if the flags request several pictures.
     pub fn is_given(&self) -> bool {
         self.turntable.is_some() || self.volumes.is_some()
     }
 
-    /// Refuses flags that apply only to a series if no series is requested.
+    /// Checks that no flag of a series is given if no series is requested.
     pub fn check(&self) -> Result<(), Failure> {
         match self.rate {
             Some(_) if !self.is_given() => {
@@ -122,7 +122,7 @@ impl SeriesArgs {
         }
     }
 
-    /// Draws and writes the pictures. A signal ends the command after the file that is being written.
+    /// Draws and writes the pictures. A signal ends the command after the file that is being written is complete.
     pub fn run(&self, job: &Job) -> Result<(), Failure> {
         let name = if self.volumes.is_some() { "volume" } else { "picture" };
         let target = SeriesTarget::of(job.output, name)?;

@@ -62,14 +62,15 @@ impl ServeArgs {
     }
 }
 
-/// A running server, and what was printed about it.
+/// A running OpenIGTLink server, and the counts that were printed last.
 pub struct Serving {
     pub publisher: Publisher,
     said: PublisherStatistics,
 }
 
 impl Serving {
-    /// Prints changes on one line: clients that connected or disconnected, and data that slow clients did not get.
+    /// Prints on one line what has changed since the last call: clients that connected or disconnected, and data that slow clients did not get.
+    /// Prints nothing if nothing did.
     pub fn say(&mut self, began: Instant) {
         let now = self.publisher.statistics();
         let (server, said) = (&now.server, &self.said.server);

@@ -10,9 +10,9 @@ use crate::terminal::{Failure, input};
 /// The values of `--still`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct StillArgs {
-    /// Assignments of settings, each with the part of the flag that gave it.
+    /// Assignments of settings, each after the part of the flag that stands for it.
     pub set: Vec<(String, String)>,
-    /// Time that the paths may take, s. It replaces their number.
+    /// Time that the path tracing of a picture may take, s; None: not limited. It determines the number of paths.
     pub time: Option<f64>,
 }
 
@@ -44,9 +44,9 @@ impl StillArgs {
     }
 }
 
-/// The number of samples that fits into a time. `taken` draws the given number of samples and returns the time, s. The first picture also
-/// takes time that does not depend on the number, such as the compilation of shaders. The time of a sample is the additional time of a
-/// picture with more samples.
+/// The number of samples per pixel that fits into `time` s. `taken`: draws with the given number of samples and returns the time, s. The first
+/// picture also takes time that does not depend on the number, such as compiling shaders; the time of a sample is therefore taken from the
+/// additional time of a picture with more samples.
 pub fn samples_within(time: f64, mut taken: impl FnMut(u32) -> Result<f64, Failure>) -> Result<u32, Failure> {
     let first = taken(1)?;
     if first >= time {
@@ -65,8 +65,8 @@ pub fn samples_within(time: f64, mut taken: impl FnMut(u32) -> Result<f64, Failu
     Ok((1.0 + (time - first) / each.max(1e-12)).clamp(1.0, f64::from(Still::MAX_SAMPLES)) as u32)
 }
 
-/// A line about the noise of a still: median and 95th percentile over the lit pixels of the relative standard error of a pixel's luminance.
-/// `None` if the scene has no still.
+/// A line about the noise of a path-traced still: median and 95th percentile, over the lit pixels, of the relative standard error of a pixel's
+/// luminance. `None` if the scene has no still.
 pub fn noise(renderer: &mut Renderer) -> Result<Option<String>, GpuError> {
     let Some(still) = renderer.scene().still().copied() else { return Ok(None) };
     let [light, squares] = final_sums(renderer.scene());

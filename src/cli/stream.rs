@@ -278,7 +278,7 @@ fn explain_one_colour(stream: &mut Live, shown: &FinishedPicture, file: &Path) -
     Ok(true)
 }
 
-/// Refuses a recording that would replace an existing file or the recording that is played.
+/// Checks that a recording to be written (`file`) replaces neither an existing file nor the recording that is played.
 pub fn check_record(file: &Path, played: &Path) -> Result<(), Failure> {
     let refuse = |why: &str| Err(input(format!("--record {}: {why}", file.display())));
     if file.extension().is_none_or(|e| e != "frames") {

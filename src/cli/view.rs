@@ -196,7 +196,7 @@ impl View {
         self.kiosk
     }
 
-    /// False if the configuration lets the umask decide who may read files.
+    /// True if the files that the program writes are readable by its user alone; false if the configuration lets the umask decide.
     pub fn is_private(&self) -> bool {
         self.config().and_then(Result::ok).is_none_or(|config| config.files.private)
     }
@@ -214,7 +214,8 @@ impl View {
         Ok(())
     }
 
-    /// The log of the configuration: its path, the size limit of a file in bytes, and the number of files.
+    /// The log that the configuration asks for: its path, the largest size of a file in bytes, and the number of files. None if it asks for
+    /// none.
     pub fn log(&self) -> Option<(PathBuf, u64, u32)> {
         let files = self.config()?.ok()?.files;
         Some((files.log?, u64::from(files.log_size_mb) << 20, files.log_files))

@@ -26,16 +26,16 @@ const DEFAULT_SIZE: [u32; 2] = [1280, 800];
 const WINDOW_AFTER: Duration = Duration::from_secs(1);
 const PANICKED: &str = "the thread that opens the source panicked";
 
-/// The device and the window. They stay the same for the whole run.
+/// The device and the window of the viewer, which stay the same for the whole run.
 pub struct WindowConfig {
     pub device: ContextOptions,
     pub shape: WindowOptions,
-    /// The monitor to use without a desktop, instead of a window.
+    /// The monitor to draw on directly, without a window system. None: a window.
     pub direct: Option<MonitorChoice>,
 }
 
 impl WindowConfig {
-    /// The default: the best device, a window of [`DEFAULT_SIZE`].
+    /// The default: the best device, and a window of [`DEFAULT_SIZE`].
     pub fn usual() -> WindowConfig {
         let device = ContextOptions { pipeline_cache: pipeline_folder(), ..ContextOptions::default() };
         let (monitor, present_mode, time) = (None, PresentMode::Fifo, None);
@@ -54,7 +54,7 @@ impl WindowConfig {
         }
     }
 
-    /// Opens the window and runs the console that `make` creates, until the user leaves.
+    /// Opens the window and runs the console (the viewer's user interface) that `make` creates, until the user leaves it.
     ///
     /// # Errors
     /// Those of [`window::run`].
@@ -73,7 +73,7 @@ impl WindowConfig {
         }
     }
 
-    /// The device and window of a configuration.
+    /// The device and the window that a configuration asks for.
     pub fn configured(config: &Config) -> Result<WindowConfig, Failure> {
         let mut place = WindowConfig::usual();
         let display = &config.display;
@@ -97,31 +97,31 @@ impl WindowConfig {
     }
 }
 
-/// A source that is already open, or is being opened.
+/// A source whose opening began before the window was opened.
 pub enum First {
     Open(Box<dyn Live>),
-    /// Another thread is opening it.
+    /// Another thread is opening the source, and sends it when it is open.
     BeingOpened(Receiver<Result<Box<dyn Live>, Failure>>),
 }
 
 /// The source, and the options of the console: the viewer's interface. A kiosk reads its configuration again after a fault.
 pub struct ConsoleConfig {
-    /// None: the console shows only a message.
+    /// The source of frames. None: the console shows only a message.
     pub source: Option<SourceArgs>,
-    /// The source, if it was opened, or its opening was started, before the window.
+    /// The source itself, if it was opened before the window or another thread is opening it.
     pub first: Option<First>,
     pub options: ConsoleOptions,
 }
 
 impl ConsoleConfig {
-    /// A console that shows only a message. The default exit keys work.
+    /// A console without a source, which shows only a message. The default exit keys work.
     pub fn nothing() -> ConsoleConfig {
         let exit = Config::default().keys.exit;
         let options = ConsoleOptions { panels: false, exit, is_kiosk: true, ..ConsoleOptions::default() };
         ConsoleConfig { source: None, first: None, options }
     }
 
-    /// The console of a configuration. The flags of `scene` override its settings.
+    /// The console that a configuration asks for. The flags in `scene` take precedence over its settings.
     pub fn configured(config: &Config, scene: &SceneArgs) -> Result<ConsoleConfig, Failure> {
         let layers = config.layers().map_err(|e| input(config.flag_error(&e.to_string())))?;
         let (live, display, files) = (&config.live, &config.display, &config.files);
@@ -148,7 +148,8 @@ impl ConsoleConfig {
         Ok(ConsoleConfig { source: Some(SourceArgs::from_config(config)?), first: None, options })
     }
 
-    /// The same configuration with its source open, or being opened if that takes long. In that case the window shows the progress.
+    /// The same configuration after its source was opened. If that takes longer than a second, the source is still being opened by a thread, and
+    /// the window shows the progress.
     ///
     /// # Errors
     /// The source cannot be opened.
@@ -170,7 +171,8 @@ impl ConsoleConfig {
         Ok(self)
     }
 
-    /// The arguments of the console: a function that opens the source, and its options. `factor`: pixels per point of the window system.
+    /// A function that opens the source, and the options of the console. `factor`: pixels per point of the window system. `wake`: wakes the
+    /// event loop.
     pub fn options(self, factor: f32, wake: Wake, startup_fault: Option<StartupFault>) -> (OpenSource, ConsoleOptions) {
         let scale = self.options.scale * factor;
         let kind = self.source.as_ref().map_or(SourceKind::default(), SourceArgs::kind);
@@ -194,7 +196,7 @@ fn stamp() -> String {
     crate::ui::export::timestamp(SystemTime::now())
 }
 
-/// The quality steps that keep the frame budget: those of a report, or the built-in ones.
+/// The quality ladder for the frame budget: from the error report in this file, or the built-in one.
 pub fn rungs(report: Option<&Path>) -> Result<Vec<Rung>, Failure> {
     match report {
         None => Ok(built_in_ladder()),

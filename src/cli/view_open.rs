@@ -12,17 +12,17 @@ use crate::workspace::{self, Workspace};
 use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard};
 
-/// A source, and the settings of the workspace that named it.
+/// A source that the viewer shows, and the settings of the workspace that named it, if there was one.
 #[derive(Clone)]
 pub struct Shown {
     pub source: SourceArgs,
     pub workspace: Option<Layers>,
-    /// True if it was given with the flags, which then apply to it.
+    /// True if the source was given on the command line, so that its flags apply.
     pub is_given: bool,
 }
 
 impl Shown {
-    /// The source that the flags select. `file`: a recording or a workspace that replaces it.
+    /// The source that the command line selects. `file`: a recording or a workspace that takes its place.
     pub fn of(source: &SourceArgs, file: Option<&Path>) -> Result<Shown, Failure> {
         let named = file.unwrap_or(source.path());
         if workspace::is_named(named) {
@@ -34,13 +34,13 @@ impl Shown {
         Ok(Shown { source, workspace: None, is_given: true })
     }
 
-    /// The source of a file that was opened in the window. The geometry flags do not apply to it.
+    /// The source for a recording or a workspace that was opened in the window. The geometry flags of the command line do not apply to it.
     pub fn opened(flags: &SourceArgs, file: &Path) -> Result<Shown, Failure> {
         Ok(Shown { is_given: false, ..Shown::of(&flags.of_file(file), None)? })
     }
 }
 
-/// Refuses a missing file that would be shown later. A pattern of names is checked only when it is opened.
+/// Checks that a file that is to be shown later exists. A pattern of names is checked only when it is opened.
 pub fn check_later(file: &Path) -> Result<(), Failure> {
     let is_pattern = file.to_string_lossy().contains(['*', '?']);
     match std::fs::metadata(file) {
@@ -49,7 +49,7 @@ pub fn check_later(file: &Path) -> Result<(), Failure> {
     }
 }
 
-/// The source that was opened last in the window, and the list of open ones.
+/// The source that was opened last in the window, and the list of open recordings.
 #[derive(Default)]
 pub struct OpenedInWindow {
     current: Arc<Current>,
@@ -69,7 +69,8 @@ pub(super) fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl OpenedInWindow {
-    /// Prepares the next console to show this source. `shown`: None for the source that the program was started with.
+    /// Returns a function that makes the next console show this source. `shown`: how it was selected; None for the source with which the program
+    /// was started.
     pub fn next(&self, shown: Option<Shown>, source: Box<dyn Live>) -> Opened {
         let current = self.current.clone();
         Box::new(move || (*locked(&current.source), *locked(&current.shown)) = (Some(source), shown))
@@ -79,12 +80,12 @@ impl OpenedInWindow {
         locked(&self.current.shown).is_some()
     }
 
-    /// The source that was opened last.
+    /// How the source was selected that was opened last in the window. None if none was.
     pub fn shown(&self) -> Option<Shown> {
         locked(&self.current.shown).clone()
     }
 
-    /// Takes the open source of what was opened last. It is there only once.
+    /// Takes the open source that was opened last in the window. None if it was taken before.
     pub fn take_source(&self) -> Option<Box<dyn Live>> {
         locked(&self.current.source).take()
     }

@@ -4,13 +4,13 @@ use serde::{Deserialize, Serialize};
 
 /// Strictly increasing positions along an axis, one for each index: angles in rad or lengths in mm.
 ///
-/// The inverse of a uniform axis is `(v - first) / pitch`. A table, as Kretz files have it, is inverted by bracketing and linear
+/// The inverse of a uniform axis is `(v - first) / pitch`. A table of positions, as Kretz files have it, is inverted by bracketing and linear
 /// interpolation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Axis {
     /// Uniformly spaced: `first + pitch * index`.
     Even { first: f64, pitch: f64, count: usize },
-    /// Any spacing.
+    /// One position for each index, of any spacing.
     Table(Vec<f64>),
 }
 
@@ -21,7 +21,7 @@ impl Axis {
         Axis::Even { first, pitch, count }
     }
 
-    /// A table, or the uniform axis that it equals to within 1e-9 of its span: many files store uniform positions as tables.
+    /// An axis of the given positions: uniform if they are so to within 1e-9 of their span, since many files store uniform positions as tables.
     pub fn from_table(table: Vec<f64>) -> Axis {
         let count = table.len();
         if count < 2 {
@@ -51,7 +51,7 @@ impl Axis {
         self.at(0.0)
     }
 
-    /// Last position.
+    /// Last position; 0 of an empty table.
     pub fn last(&self) -> f64 {
         self.at(self.len().saturating_sub(1) as f64)
     }
@@ -77,7 +77,7 @@ impl Axis {
         }
     }
 
-    /// Fractional index of a position: the inverse of [`Axis::at`]. NaN in, NaN out.
+    /// Fractional index of a position: the inverse of [`Axis::at`], also beyond both ends. NaN gives NaN.
     pub fn index_of(&self, position: f64) -> f64 {
         match self {
             Axis::Even { first, pitch, .. } => (position - first) / pitch,

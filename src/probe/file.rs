@@ -10,9 +10,9 @@ use crate::tree;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
-/// Largest probe file, bytes.
+/// Largest size of a probe file, bytes.
 pub(super) const MAX_BYTES: u64 = 1 << 20;
-/// Thickness of the slab that a single frame is drawn as, mm.
+/// Thickness of the slab as which a single frame is drawn, mm.
 pub const SLAB: f64 = 1.0;
 /// Time stamps are rounded: a motor that turns by one frame in a frame's time may seem to turn by so much more, as a share.
 const ROUNDED: f64 = 1e-3;
@@ -45,7 +45,7 @@ impl ProbeFile {
         ProbeFile { path: path.into(), tables, interval: None }.checked()
     }
 
-    /// As [`ProbeFile::read`], from the tables as JSON objects. `path` names their origin in messages.
+    /// As [`ProbeFile::read`], with the file's tables given as a JSON object. `path` names their origin in messages.
     ///
     /// # Errors
     /// As [`ProbeFile::read`].
@@ -70,22 +70,22 @@ impl ProbeFile {
         own.into_iter().chain([recording.with_file_name("probe.toml")]).find(|p| p.is_file())
     }
 
-    /// The file that was read.
+    /// Path of the file that was read.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// The same probe file for a recording whose time stamps state an interval of `interval` s between frames.
+    /// The same probe file for a recording whose time stamps state an interval of `interval` s between frames; None if it has no time stamps.
     pub fn timed(self, interval: Option<f64>) -> ProbeFile {
         ProbeFile { interval, ..self }
     }
 
-    /// Sample values that are shown as 0 and 1, in the unit of the recording; None if the file has none.
+    /// The sample values that are displayed as 0 and 1, in the unit of the recording; None if the file does not state them.
     pub fn range(&self) -> Option<[f64; 2]> {
         self.tables.samples.range
     }
 
-    /// Angle from the first to the last frame of a fan, degrees. None for other motions.
+    /// Angle between the first and the last frame of a volume that is swept as a fan, degrees. None for other motions.
     pub fn fan_angle(&self) -> Option<f64> {
         let motion = &self.tables.motion;
         let table = motion.frame_angles_deg.as_ref().and_then(|table| Some(table.last()? - table.first()?));
@@ -166,11 +166,11 @@ impl ProbeFile {
         }
     }
 
-    /// The probe and the volumes of a recording with so many samples a line, lines a frame, and frames. The probe stands still during a
-    /// frame ([`Advance::None`]); [`Volumes::swept`] adds the motor's motion in a volume.
+    /// The probe and how the frames make up volumes, for a recording of `samples` samples a line, `lines` lines a frame and `frames` frames. The
+    /// probe stands still during a frame ([`Advance::None`]); [`Volumes::swept`] adds the motor's motion in a volume.
     ///
     /// # Errors
-    /// A table of the probe file with another number of lines or frames, fewer frames than one volume, and numbers that make no valid
+    /// The probe file has a table for another number of lines or frames, there are fewer frames than one volume, or numbers make no valid
     /// [`Probe`].
     pub fn geometry(&self, samples: usize, lines: usize, frames: usize) -> Result<(Probe, Volumes), InputError> {
         let mut volumes = self.volumes(frames)?;
@@ -326,7 +326,7 @@ impl ProbeFile {
     }
 }
 
-/// Converts a fault of the geometry to an error of the file that the geometry comes from.
+/// The error of a geometry as an error of `file`, which the geometry comes from.
 pub fn geometry_error(file: &Path, error: &GeometryError) -> InputError {
     InputError::new(file, error.field, &error.fault)
 }

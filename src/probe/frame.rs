@@ -9,14 +9,14 @@ pub struct Frame {
     pub volume: u32,
     /// Index in its volume in order of acquisition, from 0.
     pub number: u32,
-    /// Index in its volume in geometric order, from 0: K - 1 - `number` if it was swept backwards (K frames a volume).
+    /// Index in its volume in geometric order, from 0. Of K frames a volume it is K - 1 - `number` if the volume was swept backwards.
     pub slice: usize,
-    /// The volume was swept backwards.
+    /// True if the volume was swept backwards.
     pub backward: bool,
-    /// Time stamp, s, on the clock of the device that acquired it.
+    /// Time stamp, s, on the clock of the device that acquired it; None if it has none.
     pub time: Option<f64>,
-    /// Rigid map from the space of the geometry, mm, to the world (LPS) or to the space of a tracker. The pose of a volume is that of its
-    /// first frame that has one.
+    /// Rigid map from the volume's coordinates, mm, to the world (LPS) or to the space of a tracker; None if it is not known. The pose of a
+    /// volume is that of its first frame that has one.
     pub pose: Option<DAffine3>,
     /// Samples of the stored type (`Header::stored` of the source), little-endian, line by line (samples fastest).
     pub bytes: Vec<u8>,

@@ -13,18 +13,18 @@ use std::f64::consts::PI;
 /// Shape of the transducer array.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Array {
-    /// Elements on an arc of `radius` mm (Ra, from the apex to the face); 0 is a phased array. Scan lines are angles in rad.
+    /// Elements on an arc of `radius` mm (Ra, from the apex to the face); radius 0 is a phased array. Positions of scan lines are angles in rad.
     Curved { radius: f64 },
-    /// Elements on a straight line. Scan lines are lateral positions in mm.
+    /// Elements on a straight line. Positions of scan lines are lateral, in mm.
     Linear,
 }
 
 /// How the array moves from frame to frame.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Motion {
-    /// The array rotates about an axis `wobble_radius` mm (Rw) behind the face. Slices are angles in rad.
+    /// The array rotates about an axis `wobble_radius` mm (Rw) behind its face. Positions of slices are angles in rad.
     Fan { wobble_radius: f64 },
-    /// The array is moved in elevation. Slices are positions in mm.
+    /// The array is moved in elevation. Positions of slices are in mm.
     Translated,
     /// A single frame, drawn as a slab of `thickness` mm.
     Still { thickness: f64 },
@@ -35,13 +35,13 @@ pub enum Motion {
 pub enum Advance {
     /// The motor stops for each frame.
     None,
-    /// The same for every slice: one direction, uniform pitch.
+    /// The same distance for every slice: the motor moves in one direction, and the slices are uniformly spaced.
     Same(f64),
-    /// One entry for each slice: mixed directions, or a non-uniform sweep.
+    /// One distance for each slice: lines fire in both orders, or the slices are not uniformly spaced.
     Each(Vec<f64>),
 }
 
-/// A swept probe: everything that determines the position of a sample in space.
+/// A swept probe: its geometry determines the position of each sample in space.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Probe {
     pub array: Array,
@@ -51,7 +51,7 @@ pub struct Probe {
     pub start_depth: f64,
     /// Distance between samples (dr), mm.
     pub sample_pitch: f64,
-    /// Samples a line, at least 2.
+    /// Number of samples of a line, at least 2.
     pub samples: usize,
     pub motion: Motion,
     /// Position of each slice when its line 0 was acquired, in geometric order: rad or mm, see [`Motion`].
@@ -69,7 +69,7 @@ pub struct Indices {
     pub slice: f64,
 }
 
-/// A number of a geometry that is out of its range: which one, and what is wrong with it.
+/// A number of a geometry that is out of its range: its name and what is wrong with it.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("probe geometry: {field}: {fault}")]
 pub struct GeometryError {
@@ -87,12 +87,12 @@ fn short(value: f64) -> String {
 }
 
 impl Probe {
-    /// Range of the first sample, mm: from the apex of a curved array, from the face of a linear one.
+    /// Distance of the first sample from the apex of a curved array or the face of a linear one, mm.
     pub fn first_range(&self) -> f64 {
         self.start_depth + self.array_radius()
     }
 
-    /// Range of the last sample, mm.
+    /// Distance of the last sample from the apex of a curved array or the face of a linear one, mm.
     pub fn last_range(&self) -> f64 {
         self.first_range() + self.sample_pitch * (self.samples - 1) as f64
     }
@@ -139,12 +139,12 @@ impl Probe {
         ((range - self.first_range()) / self.sample_pitch, self.lines.index_of(at))
     }
 
-    /// Position of a slice when the given line was acquired: rad or mm.
+    /// Position of a slice when the given line was acquired, rad or mm: see [`Motion`]. Both indices are fractional.
     pub fn slice_position(&self, line: f64, slice: f64) -> f64 {
         self.slices.at(slice) + self.advance_at(slice) * line / self.lines.len() as f64
     }
 
-    /// Distance that the motor travels while the frame at a fractional slice is acquired.
+    /// Distance that the motor travels while the frame at a fractional slice is acquired, rad or mm: see [`Advance`].
     pub fn advance_at(&self, slice: f64) -> f64 {
         match &self.advance {
             Advance::None => 0.0,
@@ -213,8 +213,8 @@ impl Probe {
         }
     }
 
-    /// Corners (low, high) of the smallest in-plane rectangle (x, y) that contains every sample that is drawn, mm. What lies before the
-    /// wobble axis is not ([`Probe::folded_share`]).
+    /// Corners (low, high) of the smallest in-plane rectangle (x, y) that contains every sample that is drawn, mm. Samples before the wobble
+    /// axis are not drawn ([`Probe::folded_share`]).
     pub fn plane_bounds(&self) -> ([f64; 2], [f64; 2]) {
         let (mut low, mut high) = self.sector_bounds();
         let axis = self.axis_depth();
@@ -263,7 +263,7 @@ impl Probe {
         folded / (count * self.samples) as f64
     }
 
-    /// A line for users on the part of the sector that is not drawn. None if all of it is drawn.
+    /// A sentence for users about the samples that are not drawn ([`Probe::folded_share`]). None if all are drawn.
     pub fn folded(&self) -> Option<String> {
         let share = 100.0 * self.folded_share();
         (share > 0.0).then(|| {
@@ -295,7 +295,8 @@ impl Probe {
         }
     }
 
-    /// Lowest and highest slice position of any line. The same for both directions, so that the bounds do not alternate with the motor.
+    /// Lowest and highest slice position of any line, rad or mm. They are the same for both directions of the motor, so that the bounds do not
+    /// alternate.
     pub fn slice_bounds(&self) -> (f64, f64) {
         let last = (self.slices.len() - 1) as f64;
         let share = 1.0 - 1.0 / self.lines.len() as f64;
@@ -419,17 +420,17 @@ impl Probe {
 /// How the frames of a recording make up volumes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Volumes {
-    /// Frames a volume (K).
+    /// Number of frames of a volume (K).
     pub frames: usize,
-    /// Complete volumes in the recording.
+    /// Number of complete volumes in the recording.
     pub count: usize,
-    /// Frames after the last complete volume.
+    /// Number of frames after the last complete volume.
     pub left_over: usize,
-    /// Every second volume was swept in the other direction.
+    /// Every second volume was swept in the direction opposite to that of the first.
     pub both_ways: bool,
-    /// The first volume was swept backwards.
+    /// True if the first volume was swept backwards.
     pub first_backward: bool,
-    /// Fraction of the distance to the next frame that the motor travels while one frame is acquired (s), 0..=1.
+    /// Share of the distance between two frames that the motor travels while one frame is acquired (s), 0..=1.
     pub speed_ratio: f64,
     pub firing: Firing,
 }
@@ -448,7 +449,7 @@ pub enum Firing {
 }
 
 impl Volumes {
-    /// `count` volumes of `frames`, all swept forwards by a motor that stops for each frame.
+    /// `count` volumes of `frames` frames, all swept forwards by a motor that stops for each frame.
     pub fn forward(frames: usize, count: usize) -> Volumes {
         Volumes {
             frames,
@@ -461,7 +462,7 @@ impl Volumes {
         }
     }
 
-    /// True if this volume was swept backwards.
+    /// True if the volume with this index was swept backwards.
     pub fn backward(&self, volume: usize) -> bool {
         self.first_backward ^ (self.both_ways && volume % 2 == 1)
     }
@@ -475,8 +476,9 @@ impl Volumes {
         }
     }
 
-    /// The probe in this volume: where each slice was at its line 0, and how far the motor travels over its lines. The line that fires
-    /// j-th in frame k, in the order of time, is at f = f_first + dir df (k + s j / L) (thesis 4.4.2.2, Fig. 40).
+    /// `probe` with the motor's motion in the volume of this index: where each slice was at its line 0, and how far the motor travels over its
+    /// lines. The line that fires j-th of L in frame k, in the order of time, is at f = f_first + dir df (k + s j / L) (thesis 4.4.2.2, Fig.
+    /// 40).
     pub fn swept(&self, volume: usize, probe: &Probe) -> Probe {
         let (lines, last) = (probe.lines.len() as f64, probe.slices.len() - 1);
         let late = (lines - 1.0) / lines;

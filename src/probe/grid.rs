@@ -10,7 +10,7 @@ const MAX_LENGTH: f64 = 1e6;
 /// Voxels on an axis-aligned Cartesian grid, as in a volume that was scan-converted elsewhere.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Grid {
-    /// Number of voxels along x (fastest), y, and z (one a frame).
+    /// Number of voxels along x (fastest), y and z. A frame is one slice of constant z.
     pub size: [usize; 3],
     /// Distance between voxels, mm.
     pub spacing: [f64; 3],
@@ -51,7 +51,7 @@ pub enum Geometry {
 }
 
 impl Geometry {
-    /// Samples and scan lines of a polar frame; width and height of a Cartesian slice. The first index is the fastest.
+    /// Samples a line and scan lines of a polar frame; width and height of a Cartesian slice. The first index is the fastest.
     pub fn frame_size(&self) -> [usize; 2] {
         match self {
             Geometry::Sweep(probe) => [probe.samples, probe.lines.len()],
@@ -69,7 +69,7 @@ impl Geometry {
 }
 
 impl Geometry {
-    /// True if the two differ at most in the motor's travel during a frame, which moves only the later lines of each slice.
+    /// True if the two geometries differ at most in the motor's travel during a frame, which moves only the later lines of each slice.
     pub fn equals_except_advance(&self, other: &Geometry) -> bool {
         match (self, other) {
             (Geometry::Sweep(a), Geometry::Sweep(b)) => {
@@ -80,8 +80,8 @@ impl Geometry {
         }
     }
 
-    /// True if the two differ at most in the motor's travel during a frame and in the line that fires first: a slice is where the other's is, or
-    /// within the travel of both.
+    /// True if the two geometries differ at most in the motor's travel during a frame and in the line that fires first. Each slice of one is
+    /// then at most as far from the same slice of the other as the motor travels during both.
     pub fn equals_except_travel(&self, other: &Geometry) -> bool {
         let (Geometry::Sweep(a), Geometry::Sweep(b)) = (self, other) else { return self == other };
         let moved = Geometry::Sweep(Probe { slices: a.slices.clone(), ..b.clone() });
@@ -94,7 +94,7 @@ impl Geometry {
             && (0..a.slices.len()).all(|k| is_near(k as f64))
     }
 
-    /// True if the two differ at most in the direction of the motor's travel during each frame.
+    /// True if the two geometries differ at most in the direction of the motor's travel during each frame.
     pub fn equals_except_direction(&self, other: &Geometry) -> bool {
         let travels = |geometry: &Geometry| match geometry {
             Geometry::Sweep(p) => (0..p.slices.len()).map(|k| p.advance_at(k as f64).abs()).collect(),
@@ -103,8 +103,8 @@ impl Geometry {
         self == other || (self.equals_except_advance(other) && travels(self) == travels(other))
     }
 
-    /// A volume with slices of both directions: a slice is as in `backward` if it is marked, else as in `self`. None if the last lines
-    /// of neighbouring slices would cross, or if the two geometries differ in more than the motor's travel.
+    /// The geometry of a volume that has slices of both directions: those that `marked` selects as in `backward`, the others as in `self`. None
+    /// if the last lines of neighbouring slices would cross, or if the two geometries differ in more than the motor's travel.
     pub fn with_mixed_directions(&self, backward: &Geometry, marked: &[bool]) -> Option<Geometry> {
         let (Geometry::Sweep(forward), Geometry::Sweep(back)) = (self, backward) else { return None };
         let of = |k: usize| if marked.get(k) == Some(&true) { back } else { forward };

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// Type of a sample in a file.
+/// Number type of the samples in an input file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SampleType {
     U8,
@@ -12,7 +12,7 @@ pub enum SampleType {
     F32,
 }
 
-/// Type of a sample in a [`Frame`](super::Frame).
+/// Number type of the samples in the memory of a [`Frame`](super::Frame).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum StoredType {
     U8,
@@ -24,12 +24,12 @@ pub enum StoredType {
 const I16_SHIFT: f64 = 32768.0;
 
 impl SampleType {
-    /// Size of a sample, bytes.
+    /// Size of one sample, bytes.
     pub fn bytes(self) -> usize {
         self.stored().bytes()
     }
 
-    /// The type that samples of this type are stored as.
+    /// The type in which samples of this type are stored in frames.
     pub fn stored(self) -> StoredType {
         match self {
             SampleType::U8 => StoredType::U8,
@@ -48,7 +48,7 @@ impl SampleType {
         }
     }
 
-    /// Stored value minus the file's value.
+    /// The stored value of a sample minus its value in the file: 32768 for i16, otherwise 0.
     pub fn shift(self) -> f64 {
         if self == SampleType::I16 { I16_SHIFT } else { 0.0 }
     }
@@ -65,7 +65,7 @@ impl From<StoredType> for SampleType {
 }
 
 impl StoredType {
-    /// Size of a sample, bytes.
+    /// Size of one sample, bytes.
     pub fn bytes(self) -> usize {
         match self {
             StoredType::U8 => 1,
@@ -74,7 +74,7 @@ impl StoredType {
         }
     }
 
-    /// Value of a little-endian sample. 0 if the number of bytes is not that of the type.
+    /// Value of one little-endian sample; 0 if the number of bytes is not that of the type.
     pub fn value(self, bytes: &[u8]) -> f64 {
         match (self, bytes) {
             (StoredType::U8, [a]) => f64::from(*a),
@@ -84,7 +84,7 @@ impl StoredType {
         }
     }
 
-    /// Appends a little-endian sample. Integers are rounded.
+    /// Appends a value to `bytes` as a little-endian sample, rounded if the type is an integer.
     pub fn append(self, value: f64, bytes: &mut Vec<u8>) {
         match self {
             StoredType::U8 => bytes.push(value.round() as u8),

@@ -12,17 +12,17 @@ const MAX_COSINE: f64 = 1e-3;
 /// Letters of the directions of the world: along x, y and z, and against them.
 const LETTERS: [[&str; 2]; 3] = [["left", "right"], ["posterior", "anterior"], ["superior", "inferior"]];
 
-/// The map from voxel indices to the world, mm (LPS).
+/// Affine map from voxel indices of a volume to world coordinates, mm (LPS).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct World {
     voxel_to_world: DMat4,
 }
 
 impl World {
-    /// The world of a lattice whose voxels are `axes` apart (mm, LPS), with voxel (0, 0, 0) centred on `origin`.
+    /// The map of a lattice whose neighbouring voxels are `axes` apart (mm, LPS), with the centre of voxel (0, 0, 0) at `origin`.
     ///
     /// # Errors
-    /// One line: numbers that are not finite, an axis of no length, axes that are not perpendicular to 0.06 degrees.
+    /// One line: a number is not finite, an axis has no length, or the axes are not perpendicular to within 0.06 degrees.
     pub fn new(axes: [DVec3; 3], origin: DVec3) -> Result<World, String> {
         if !(origin.is_finite() && axes.iter().all(|a| a.is_finite())) {
             return Err("holds a number that is not finite".into());
@@ -44,37 +44,37 @@ impl World {
         Ok(World { voxel_to_world: DMat4::from_cols(x, y, z, origin.extend(1.0)) })
     }
 
-    /// The world of a lattice whose own axes are those of the world.
+    /// The map of a grid whose coordinates are world coordinates already.
     pub fn of(grid: &Grid) -> World {
         World { voxel_to_world: lattice(grid) }
     }
 
-    /// The step from one voxel to the next along an axis, 0 to 2, mm.
+    /// The vector in the world from a voxel to the next one along an axis of the lattice (0 to 2), mm.
     pub fn axis(&self, axis: usize) -> DVec3 {
         self.voxel_to_world.col(axis.min(2)).truncate()
     }
 
-    /// The centre of voxel (0, 0, 0), mm.
+    /// The centre of voxel (0, 0, 0) in the world, mm.
     pub fn origin(&self) -> DVec3 {
         self.voxel_to_world.w_axis.truncate()
     }
 
-    /// The place of a fractional voxel index, mm.
+    /// The position in the world of a fractional voxel index, mm.
     pub fn at(&self, voxel: DVec3) -> DVec3 {
         self.voxel_to_world.transform_point3(voxel)
     }
 
-    /// The unit directions of the axes, as columns.
+    /// The unit vectors along the axes of the lattice in the world, as columns.
     pub fn directions(&self) -> DMat3 {
         DMat3::from_cols(self.axis(0).normalize(), self.axis(1).normalize(), self.axis(2).normalize())
     }
 
-    /// True if the axes are left-handed in the world: drawn in their order, the volume would look mirrored.
+    /// True if the axes of the lattice are left-handed in the world, so that a volume that is drawn along them in this order looks mirrored.
     pub fn is_left_handed(&self) -> bool {
         self.directions().determinant() < 0.0
     }
 
-    /// The world of the same voxels after [`AxisOrder`]. `size`: voxels along the axes as they are stored.
+    /// The map of the same voxels after their axes were put in another order. `size`: number of voxels along the stored axes.
     pub fn reordered(&self, order: &AxisOrder, size: [usize; 3]) -> World {
         let mut origin = self.origin();
         let axes = [0, 1, 2].map(|drawn| {
@@ -90,8 +90,8 @@ impl World {
         World { voxel_to_world: DMat4::from_cols(x, y, z, origin.extend(1.0)) }
     }
 
-    /// The lattice that is drawn: along its own axes, with the coordinates that the world has when it is turned into them. For axes along
-    /// those of the world, these are the coordinates of the world.
+    /// The grid on which the volume is drawn: its axes are those of the lattice, and its coordinates are the world's, rotated into them. For a
+    /// lattice that is parallel to the axes of the world, the coordinates are the world's. `size`: number of voxels along the axes.
     pub fn grid(&self, size: [usize; 3]) -> Grid {
         let spacing = [0, 1, 2].map(|n| self.axis(n).length());
         let origin = self.directions().transpose() * self.origin();
@@ -99,7 +99,7 @@ impl World {
         Grid { size, spacing, origin: origin.to_array().map(|v| v + 0.0) }
     }
 
-    /// The world of another lattice in the same drawn space: `of` is the lattice of `self`.
+    /// The map of another grid, `other`, in the same drawn coordinates. `of`: the grid of `self`.
     pub fn on(&self, of: &Grid, other: &Grid) -> World {
         if of.spacing == other.spacing && of.origin == other.origin {
             return *self;
@@ -107,17 +107,17 @@ impl World {
         World { voxel_to_world: self.voxel_to_world * lattice(of).inverse() * lattice(other) }
     }
 
-    /// The rigid map from the drawn space of a lattice, mm, to the world. `of`: the lattice whose voxels these are.
+    /// The rigid map from the coordinates in which a volume is drawn, mm, to the world. `of`: the grid of its voxels.
     pub fn pose(&self, of: &Grid) -> DAffine3 {
         DAffine3::from_mat4(self.voxel_to_world * lattice(of).inverse())
     }
 
-    /// The world of a lattice whose drawn space has this pose; None if the pose is not rigid ([`is_rigid`]).
+    /// The map of the voxels of a grid whose drawn coordinates have this pose in the world; None if the pose is not rigid ([`is_rigid`]).
     pub fn posed(pose: &DAffine3, of: &Grid) -> Option<World> {
         is_rigid(pose).then(|| World { voxel_to_world: DMat4::from(*pose) * lattice(of) })
     }
 
-    /// The direction of the world that each axis points to most, in words.
+    /// For each axis of the lattice the anatomical direction of the world that it points to most, in words.
     pub fn nearest(&self) -> [&'static str; 3] {
         [0, 1, 2].map(|n| {
             let step = self.axis(n);
@@ -132,7 +132,7 @@ const RIGID_TOLERANCE: f64 = 1e-3;
 /// Farthest place of a pose, mm.
 const MAX_DISTANCE: f64 = 1e6;
 
-/// True if a map turns and moves and does nothing else: a rotation to 0.06 degrees and 0.1 %, and a place within 1 km.
+/// True if the map is a rotation, to within 0.06 degrees and 0.1 % of scale, and a translation of at most 1 km.
 pub fn is_rigid(pose: &DAffine3) -> bool {
     let turn = pose.matrix3;
     let off = (turn.transpose() * turn - DMat3::IDENTITY).to_cols_array();
@@ -153,9 +153,9 @@ fn largest(step: DVec3) -> usize {
 /// The order in which the stored axes of a Cartesian volume are drawn as lateral, depth and elevation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AxisOrder {
-    /// The stored axis (0 fastest) of each drawn one.
+    /// For lateral, depth and elevation the stored axis (0 is the fastest) that is drawn as it.
     pub stored: [usize; 3],
-    /// Drawn from its last index to its first.
+    /// For lateral, depth and elevation: true if it is drawn from the last index of the stored axis to the first.
     pub reversed: [bool; 3],
 }
 
@@ -189,10 +189,10 @@ impl std::str::FromStr for DepthAxis {
 }
 
 impl AxisOrder {
-    /// The stored order.
+    /// The order in which axes are drawn as they are stored.
     pub const STORED: AxisOrder = AxisOrder { stored: [0, 1, 2], reversed: [false; 3] };
 
-    /// An order of the same handedness with a given depth. Frames stay frames where they can.
+    /// An order that keeps the handedness and draws the given stored axis as depth. If possible, drawn slices are stored frames.
     pub fn with_depth(depth: DepthAxis) -> AxisOrder {
         let (stored, reversed) = match (depth.axis, depth.reversed) {
             (0, false) => ([1, 0, 2], [true, false, false]),
@@ -205,8 +205,8 @@ impl AxisOrder {
         AxisOrder { stored, reversed }
     }
 
-    /// The order of the PLUS toolkit's image orientation: two or three letters, one a stored axis. M(arked) and U(nmarked) are lateral,
-    /// F(ar) and N(ear) depth, A(scending) and D(escending) elevation. None for other words.
+    /// The order for an image orientation of the PLUS toolkit: two or three letters, one for each stored axis. M(arked) and U(nmarked) are
+    /// lateral, F(ar) and N(ear) depth, A(scending) and D(escending) elevation. None for other words.
     pub fn of_plus(word: &str) -> Option<AxisOrder> {
         let letters: Vec<char> = word.chars().chain("A".chars().filter(|_| word.len() == 2)).collect();
         let mut order = AxisOrder { stored: [3; 3], reversed: [false; 3] };
@@ -225,8 +225,8 @@ impl AxisOrder {
         (letters.len() == 3 && order.stored.iter().all(|n| *n < 3)).then_some(order)
     }
 
-    /// The stored order with one axis reversed, so that a left-handed lattice becomes right-handed. Depth stays. An axis against its
-    /// direction of the world is preferred, lateral before elevation.
+    /// The stored order with the lateral or the elevation axis reversed, so that a left-handed lattice becomes right-handed. The first of the
+    /// two that runs against the world's axes is chosen, else the lateral one.
     pub fn with_other_hand(world: &World) -> AxisOrder {
         let is_against = |n: &usize| {
             let step = world.axis(*n);
@@ -236,7 +236,7 @@ impl AxisOrder {
         AxisOrder { stored: [0, 1, 2], reversed: [0, 1, 2].map(|n| n == chosen) }
     }
 
-    /// This order, and `next` after it.
+    /// The order that has the effect of this one, followed by `next`.
     pub fn then(&self, next: &AxisOrder) -> AxisOrder {
         AxisOrder {
             stored: next.stored.map(|n| self.stored[n]),
@@ -244,23 +244,23 @@ impl AxisOrder {
         }
     }
 
-    /// True if each drawn slice is a stored frame, with its pixels in another order at most.
+    /// True if each drawn slice is one stored frame; only the order of its pixels may differ.
     pub fn keeps_frames(&self) -> bool {
         self.stored[2] == 2
     }
 
-    /// The drawn size of a stored one.
+    /// The size of a volume in drawn order, from its size in stored order.
     pub fn size(&self, stored: [usize; 3]) -> [usize; 3] {
         self.stored.map(|axis| stored[axis])
     }
 
-    /// The stored axes by name, in drawn order: "x, -z, y".
+    /// The stored axes in drawn order as text, for example "x, -z, y"; a minus means reversed.
     pub fn names(&self) -> String {
         let name = |n: usize| format!("{}{}", if self.reversed[n] { "-" } else { "" }, ["x", "y", "z"][self.stored[n]]);
         [0, 1, 2].map(name).join(", ")
     }
 
-    /// Pixels of `width` bytes in drawn order. `size`: of the stored block, whose bytes are all there.
+    /// Puts the voxels of a stored block into drawn order. `bytes`: the complete block of `size` voxels in stored order, `width` bytes each.
     pub fn reorder(&self, bytes: &[u8], size: [usize; 3], width: usize) -> Vec<u8> {
         let stride = [1, size[0], size[0] * size[1]];
         let [columns, rows, slices] = self.size(size);

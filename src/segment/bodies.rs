@@ -18,53 +18,54 @@ const MAX_SAMPLES: usize = 1 << 21;
 /// Bins of the histogram of the first threshold.
 const BINS: usize = 512;
 
-/// What is searched for.
+/// How connected bodies, such as cysts or follicles, are searched for in the echoes of a volume.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Search {
-    /// Bodies are darker than what is around them.
+    /// True if bodies are darker than what is around them, false if brighter.
     pub is_dark: bool,
-    /// The level of the surface, as `Scale::searched`. None: half of the step between the two classes next to the surface.
+    /// Level of the echo at the surface of bodies, in the scale of `Scale::searched`. None: half of the step between the two classes of echoes
+    /// next to the surface.
     pub level: Option<f64>,
-    /// Standard deviation of the Gaussian that smooths the echoes first, mm.
+    /// Standard deviation, mm, of the Gaussian that smooths the echoes before the search.
     pub smoothing: f64,
-    /// Radius of the opening, mm: necks that are thinner than twice of it do not connect, and are given to no body.
+    /// Radius of the morphological opening, mm: necks thinner than twice the radius do not connect bodies, and belong to none.
     pub opening: f64,
-    /// A place within the only body that is searched for, mm.
+    /// A position (mm) within the only body that is searched for. None: all bodies are searched for.
     pub seed: Option<DVec3>,
-    /// Bodies of less than this are left out, mm^3.
+    /// Smallest volume of a body, mm^3; smaller ones are ignored.
     pub least: f64,
 }
 
-/// A labelled body.
+/// A body that was found, and its volume.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Body {
     pub label: u8,
-    /// The mean of its voxels, mm.
+    /// Mean position of its labelled voxels, mm.
     pub centroid: DVec3,
-    /// The volume of its voxels, mm^3.
+    /// Volume of its labelled voxels, mm^3.
     pub labelled: f64,
-    /// Its volume by the echoes at its surface, or why it cannot be measured.
+    /// Volume of the body as estimated from the echoes at its surface, or the reason why that is impossible.
     pub measured: Result<Measured, &'static str>,
-    /// It reaches the border of the lattice or of what is known.
+    /// True if the body touches the border of the grid or voxels without an echo, so that a part of it may be missing.
     pub is_cut: bool,
 }
 
-/// What was found: the largest body has label 1.
+/// The bodies that were found, the largest first, which has label 1.
 #[derive(Clone, Debug)]
 pub struct Found {
     pub labels: Labels,
     pub bodies: Vec<Body>,
-    /// The level of the search, as `Scale::searched`.
+    /// Level of the echo that bounded the bodies, in the scale of `Scale::searched`.
     pub level: f64,
-    /// Bodies that are not labelled: there are more than 255.
+    /// Number of bodies that have no label because there are more than 255.
     pub left_out: usize,
 }
 
-/// Finds, labels and measures bodies. Where the level is not stated, the surface of a measured body is moved to the level of the smoothed
-/// echoes that encloses its measured volume.
+/// Finds, labels and measures bodies. If the level is not given, the surface of each measured body is moved to the level of the smoothed echoes
+/// that encloses its measured volume.
 ///
 /// # Errors
-/// One line: no two classes of echoes, no body, a seed that is in none, a lattice without room for labels.
+/// One line: the echoes are not of two classes, there is no body, the seed is in none, or there is no memory for the labels.
 pub fn find(field: &Field, world: World, search: &Search) -> Result<Found, String> {
     let grid = *field.grid();
     let mut labels = Labels::new(grid, world)?;

@@ -15,8 +15,8 @@ use std::f64::consts::{PI, TAU};
 /// Most points of all contours.
 const MAX_POINTS: usize = 65_536;
 
-/// Gives the voxels within contours a label. Several contours in one plane are parts of one section; one within another is a hole. Returns
-/// the number of voxels that have the label now and had not before.
+/// Sets a label in all voxels of the body that contours describe. Several contours in one plane bound the same section; one within another is a
+/// hole. Returns the number of voxels that did not have this label before.
 ///
 /// # Errors
 /// One line: fewer than two planes, a contour without area, planes that are neither parallel nor share an axis, too many points.

@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
-/// The distance of each voxel of a lattice from the nearest voxel of a set, centre to centre, mm; infinite where it is more than `reach` along
-/// an axis. The squared distance is separable: a minimum along each axis in turn.
+/// For each voxel of a lattice the distance, centre to centre, from the nearest voxel of a set, mm; infinite if that is more than `reach` away
+/// along an axis. The squared distance is separable: a minimum along each axis in turn.
 pub(crate) fn distances(
     size: [usize; 3],
     spacing: [f64; 3],

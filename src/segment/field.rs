@@ -22,18 +22,19 @@ const NEAR: f64 = 0.1;
 /// Most pairs of samples that are compared.
 const MAX_PAIRS: usize = 1 << 20;
 
-/// What a stored value says of the echo.
+/// How stored sample values depend on the echo.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Scale {
-    /// It is proportional to the echo.
+    /// The value is proportional to the echo.
     Linear,
-    /// It is the logarithm of the echo, compressed to so many dB over the sample range.
+    /// The value is the logarithm of the echo. The sample range spans this number of dB.
     Decibels(f64),
 }
 
 impl Scale {
-    /// The scale of a volume by its speckle: levels of fully developed speckle differ by 4.77 dB in the median, whatever the tissue is (their
-    /// difference has a logistic distribution). Linear if the samples do not look like that. `range`: stored values.
+    /// Estimates the scale of a volume from its speckle: levels of fully developed speckle differ by 4.77 dB in the median, whatever the tissue
+    /// is (their difference has a logistic distribution). Linear if the samples do not look like that. `range`: the stored values at both ends
+    /// of the sample range.
     pub fn by_speckle(volume: &Volume, range: [f64; 2]) -> Scale {
         let (stride, pitch) = match volume.geometry() {
             Geometry::Sweep(probe) => (1, probe.sample_pitch),
@@ -78,7 +79,8 @@ impl Scale {
         }
     }
 
-    /// What bodies are searched by: the echo, or its amplitude, of which speckle is a smaller share.
+    /// The quantity that bodies are searched in, for a sample at `share` (0..=1) of the sample range: the echo itself if linear, otherwise the
+    /// amplitude of the echo, in which speckle is weaker than in its power.
     pub fn searched(self, share: f64) -> f64 {
         match self {
             Scale::Linear => self.echo(share),
@@ -87,7 +89,7 @@ impl Scale {
     }
 }
 
-/// Echoes of a lattice, 0..=1.
+/// The echo at each voxel of a grid, 0..=1.
 #[derive(Clone, Debug)]
 pub struct Field {
     grid: Grid,
@@ -97,11 +99,11 @@ pub struct Field {
 }
 
 impl Field {
-    /// The echoes of a volume on a lattice. They are made linear before they are interpolated: power adds up, levels do not. `range`: stored
-    /// values of the ends of the sample range. `each` is called after every slice.
+    /// Resamples the echoes of a volume on a grid. They are made linear before they are interpolated: power adds up, levels do not. `range`: the
+    /// stored values at both ends of the sample range. `each` is called after every slice.
     ///
     /// # Errors
-    /// One line: a lattice that is not valid or takes too much memory.
+    /// One line: the grid is not valid or takes too much memory.
     pub fn of(volume: &Volume, range: [f64; 2], scale: Scale, grid: Grid, each: impl Fn()) -> Result<Field, String> {
         let voxels = lattice::voxels(&grid)?;
         let linear = linear(volume, range, scale, voxels as u64)?;
@@ -126,7 +128,8 @@ impl Field {
         &self.amplitudes
     }
 
-    /// The echo of a voxel: what adds up where a voxel or the beam of the probe is partly in a body.
+    /// The echo at the voxel with index `n`, 0..=1, as a quantity that is additive where a voxel or the beam is partly in a body: the power if
+    /// samples are in dB.
     pub(crate) fn echo(&self, n: usize) -> f64 {
         let amplitude = f64::from(self.amplitudes[n]);
         match self.scale {
@@ -135,12 +138,12 @@ impl Field {
         }
     }
 
-    /// Whether echoes were made linear from levels whose range may be wrong.
+    /// True if the echoes were computed from levels in dB, whose range may be estimated wrongly.
     pub(crate) fn is_from_levels(&self) -> bool {
         self.scale != Scale::Linear
     }
 
-    /// The amplitudes, smoothed by a Gaussian with this standard deviation, mm.
+    /// The searched quantity at each voxel, smoothed by a Gaussian whose standard deviation is `deviation` mm.
     pub(crate) fn smoothed(&self, deviation: f64) -> Vec<f32> {
         let Grid { size, spacing, .. } = self.grid;
         let each = size[0] * size[1];

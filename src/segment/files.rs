@@ -18,10 +18,10 @@ const COLOURS: [[f64; 3]; 6] =
 /// Bins of the histogram by which the level of a surface is found.
 const BINS: usize = 1024;
 
-/// Writes the labels as a segmentation of 3D Slicer, each as a segment with this name and a colour.
+/// Writes labels as a segmentation of 3D Slicer. Each label becomes a segment with a colour and the name that `name` gives.
 ///
 /// # Errors
-/// A file that cannot be written. A file that is there is complete.
+/// The file cannot be written. A file that exists is complete.
 pub fn write(labels: &Labels, path: &Path, name: impl Fn(u8) -> String) -> Result<(), InputError> {
     let there: BTreeSet<u8> = labels.voxels().iter().copied().filter(|label| *label > 0).collect();
     let colour = |label: u8| COLOURS[(usize::from(label) - 1) % COLOURS.len()];
@@ -32,10 +32,10 @@ pub fn write(labels: &Labels, path: &Path, name: impl Fn(u8) -> String) -> Resul
     segmentation::write(path, labels.grid(), labels.world(), &segments, label, || ())
 }
 
-/// Reads a segmentation: its labels, in the coordinates of a volume whose axes have the same directions in the world, and its segments.
+/// Reads a segmentation: its labels, on a grid as that of a volume whose axes have the same directions in the world, and its segments.
 ///
 /// # Errors
-/// A file that is no volume of one layer of bytes, or cannot be read.
+/// The file is no volume of one layer of bytes, or cannot be read.
 pub fn read(path: &Path, options: OpenOptions) -> Result<(Labels, Vec<Segment>), InputError> {
     let segments = segmentation::segments(path)?;
     let fault = |why: String| InputError::new(path, "labels", why);
@@ -59,11 +59,11 @@ pub fn read(path: &Path, options: OpenOptions) -> Result<(Labels, Vec<Segment>),
     Ok((Labels::of(grid, world, voxels).map_err(fault)?, segments))
 }
 
-/// The closed surface of a label, in the world. A Gaussian of one voxel rounds off the steps of voxels; the surface is at the level that as many
-/// voxels reach as have the label, so that small bodies do not shrink.
+/// The closed surface around the voxels of a label, in the world, mm. A Gaussian of one voxel smooths the steps; the surface encloses as many
+/// voxels as have the label, so that small bodies do not shrink.
 ///
 /// # Errors
-/// One line: more triangles than are made.
+/// One line: there would be too many triangles.
 pub fn surface(labels: &Labels, label: u8) -> Result<Mesh, String> {
     let (grid, world) = (labels.grid(), labels.world());
     let each = grid.size[0] * grid.size[1];

@@ -5,7 +5,7 @@ use crate::memory;
 use crate::probe::{Grid, World};
 use glam::DVec3;
 
-/// Labels of the voxels of a lattice; 0 is none. Voxels are spheres of no extent at their centres.
+/// The label of each voxel of a grid; 0 is none. A voxel counts as inside a shape if its centre is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Labels {
     grid: Grid,
@@ -13,38 +13,38 @@ pub struct Labels {
     voxels: Vec<u8>,
 }
 
-/// The shape of a [`Brush`].
+/// Which voxels around its centre a [`Brush`] paints.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shape {
-    /// All voxels within the radius.
+    /// All whose distance is at most the radius.
     Ball,
-    /// Those of them that are no further than half of the thickness, mm, from the plane through the centre with this unit normal.
+    /// Those within the radius whose distance from the plane through the centre with this unit normal is at most half of the thickness, mm.
     Disc { normal: DVec3, thickness: f64 },
 }
 
-/// A stroke of a brush: a ball or disc that is moved along a straight line.
+/// A stroke of a brush: a ball or disc whose centre moves along a straight line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Brush {
-    /// Where it starts and ends, mm, in the coordinates of the grid.
+    /// Where the centre starts, and in `to` where it ends, mm, in the coordinates of the grid.
     pub from: DVec3,
     pub to: DVec3,
-    /// mm.
+    /// Radius of the ball or disc, mm.
     pub radius: f64,
     pub shape: Shape,
 }
 
 impl Labels {
-    /// A lattice without labels. `world`: where the voxels of the grid are in the world.
+    /// A grid without labels. `world`: map from its voxels to the world.
     ///
     /// # Errors
-    /// One line: a grid that is not valid, or one that takes more memory than is allowed.
+    /// One line: the grid is not valid, or takes more memory than is allowed.
     pub fn new(grid: Grid, world: World) -> Result<Labels, String> {
         let voxels = lattice::voxels(&grid)?;
         memory::check(voxels as u64).map_err(|why| format!("a label volume {why}"))?;
         Ok(Labels { grid, world, voxels: vec![0; voxels] })
     }
 
-    /// As [`Labels::new`], with labels: x is the fastest.
+    /// As [`Labels::new`], with a label for each voxel; x is the fastest axis.
     ///
     /// # Errors
     /// As [`Labels::new`], and a number of labels that is not that of the voxels.
@@ -63,7 +63,7 @@ impl Labels {
         &self.world
     }
 
-    /// The labels; x is the fastest.
+    /// The label of each voxel; x is the fastest axis.
     pub fn voxels(&self) -> &[u8] {
         &self.voxels
     }
@@ -72,7 +72,8 @@ impl Labels {
         &mut self.voxels
     }
 
-    /// Gives the voxels of a stroke a label; 0 removes them. With `only`, voxels of other labels stay as they are. Returns how many changed.
+    /// Sets the label of the voxels of a stroke; 0 removes it. With `only`, only voxels that have this label are changed. Returns how many
+    /// changed.
     pub fn paint(&mut self, brush: &Brush, label: u8, only: Option<u8>) -> usize {
         let reach = DVec3::splat(brush.radius);
         let within = [brush.from.min(brush.to) - reach, brush.from.max(brush.to) + reach];

@@ -6,10 +6,10 @@ use glam::DVec3;
 /// Most voxels of a lattice: their numbers fit into 32 bits.
 const MAX_VOXELS: usize = 1 << 30;
 
-/// The number of voxels.
+/// The number of voxels of a grid.
 ///
 /// # Errors
-/// One line: a grid that is not valid, or too many voxels.
+/// One line: the grid is not valid, or has too many voxels.
 pub(crate) fn voxels(grid: &Grid) -> Result<usize, String> {
     grid.check().map_err(|e| format!("the {} of the lattice {}", e.field, e.fault))?;
     let [x, y, z] = grid.size;
@@ -17,7 +17,7 @@ pub(crate) fn voxels(grid: &Grid) -> Result<usize, String> {
     count.ok_or_else(|| format!("{x} x {y} x {z} voxels are too many: at most {MAX_VOXELS}"))
 }
 
-/// The centre of a voxel at a fractional index, mm.
+/// The position of a fractional voxel index, mm, in the coordinates of the grid.
 pub(crate) fn place(grid: &Grid, at: DVec3) -> DVec3 {
     DVec3::from(grid.origin) + at * DVec3::from(grid.spacing)
 }
@@ -27,7 +27,7 @@ pub(crate) fn voxel_volume(grid: &Grid) -> f64 {
     grid.spacing.iter().product()
 }
 
-/// A box of voxels: the first one and the number of them along each axis, none of them 0.
+/// A box of voxels of a lattice: the index of its first voxel, and the number of voxels along each axis, at least 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Region {
     pub low: [usize; 3],
@@ -35,7 +35,7 @@ pub(crate) struct Region {
 }
 
 impl Region {
-    /// The voxels whose centres lie between two corners, mm; None if there are none.
+    /// The box of voxels whose centres lie between two corners, mm; None if there are none.
     pub fn within(grid: &Grid, [low, high]: [DVec3; 2]) -> Option<Region> {
         let index = |at: DVec3| (at - DVec3::from(grid.origin)) / DVec3::from(grid.spacing);
         let (from, to) = (index(low), index(high));
@@ -50,7 +50,8 @@ impl Region {
         Some(region)
     }
 
-    /// The smallest box around some voxels of a lattice with a margin, mm, as far as the lattice reaches.
+    /// The smallest box that contains the voxels with these linear indices and a margin of `margin` mm around them, cut at the border of the
+    /// lattice.
     pub fn around(voxels: &[u32], grid: &Grid, margin: f64) -> Region {
         let (mut low, mut high) = (grid.size, [0; 3]);
         for n in voxels {
@@ -69,7 +70,7 @@ impl Region {
         region
     }
 
-    /// The number of each voxel in the lattice; x is the fastest.
+    /// Linear indices in the lattice of the voxels of the box; x is the fastest. `size`: that of the lattice.
     pub fn indices(&self, size: [usize; 3]) -> impl Iterator<Item = usize> + use<> {
         let Region { low, size: [width, height, depth] } = *self;
         (low[2]..low[2] + depth).flat_map(move |z| {
@@ -80,7 +81,7 @@ impl Region {
         })
     }
 
-    /// The number of each voxel in the lattice, and its centre, mm.
+    /// For each voxel of the box its linear index in the lattice, and its centre, mm.
     pub fn places<'a>(&self, grid: &'a Grid) -> impl Iterator<Item = (usize, DVec3)> + use<'a> {
         self.indices(grid.size).map(|n| (n, place(grid, DVec3::from_array(voxel(n, grid.size).map(|i| i as f64)))))
     }
@@ -89,14 +90,14 @@ impl Region {
         self.size.iter().product()
     }
 
-    /// The number of a voxel of the lattice within the box, which it must be in.
+    /// Linear index within the box of the voxel with the index `at` in the lattice. It must be in the box.
     pub fn own(&self, at: [usize; 3]) -> usize {
         let [x, y, z] = [0, 1, 2].map(|axis| at[axis] - self.low[axis]);
         (z * self.size[1] + y) * self.size[0] + x
     }
 }
 
-/// The indices of a voxel by its number.
+/// The index (x, y, z) of the voxel with the linear index `n`.
 pub(crate) fn voxel(n: usize, [width, height, _]: [usize; 3]) -> [usize; 3] {
     [n % width, n / width % height, n / (width * height)]
 }

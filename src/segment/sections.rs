@@ -6,32 +6,32 @@ use glam::{DMat3, DVec3};
 const PARALLEL: f64 = 0.0175;
 /// Largest distance of the common axis from a plane that is turned about it, mm.
 const OFF_AXIS: f64 = 1.0;
-/// Contours of parallel planes that are closer than this lie in one plane, mm.
+/// Contours lie in the same plane if their parallel planes are less than this apart, mm.
 pub const SAME_PLANE: f64 = 0.05;
-/// Contours whose planes are turned by less than this lie in one plane, radians.
+/// Contours lie in the same plane if the angle between their planes is less than this, rad.
 pub const SAME_ANGLE: f64 = 0.002;
 
-/// The plane of a contour.
+/// The plane of a contour, and the area that the contour encloses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane {
     /// The mean of the contour's points, mm.
     pub at: DVec3,
-    /// Unit vector.
+    /// Unit normal of the plane.
     pub normal: DVec3,
-    /// Area within the contour, mm^2.
+    /// Area that the contour encloses, mm^2.
     pub area: f64,
 }
 
-/// How planes lie to each other.
+/// How the planes of contours are arranged.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Arrangement {
-    /// The normal of the first.
+    /// They are parallel; `normal` is that of the first.
     Parallel { normal: DVec3 },
-    /// They are turned about an axis, a unit vector, through a point, mm.
+    /// They contain a common axis, about which they are rotated: the unit vector `axis` through the point `through`, mm.
     Rotated { axis: DVec3, through: DVec3 },
 }
 
-/// The planes of contours, and their arrangement. Coordinates are in mm.
+/// The plane of each contour, and how the planes are arranged. Coordinates are in mm.
 ///
 /// # Errors
 /// One line: there are fewer than two contours, a contour has no area, or the planes are neither parallel nor share an axis.
@@ -84,14 +84,14 @@ fn common_axis(planes: &[Plane]) -> Option<(DVec3, DVec3)> {
     (axis != DVec3::ZERO && through.is_finite() && planes.iter().all(is_through)).then_some((axis, through))
 }
 
-/// The area of a contour as a vector along its normal, mm^2 (Newell). For a plane contour the length of the vector is the enclosed area, as
-/// by the shoelace formula. For another contour it is the area of its projection onto the plane where that is largest.
+/// The area of a closed contour as a vector along its normal, mm^2 (Newell). For a plane contour its length is the enclosed area, as by the
+/// shoelace formula. For another contour it is the area of the projection onto the plane in which that is largest.
 pub fn vector_area(contour: &[DVec3]) -> DVec3 {
     let Some((first, rest)) = contour.split_first() else { return DVec3::ZERO };
     rest.windows(2).map(|ends| (ends[0] - first).cross(ends[1] - first)).sum::<DVec3>() / 2.0
 }
 
-/// The mean of points.
+/// The mean of the points.
 pub fn centroid(points: &[DVec3]) -> DVec3 {
     points.iter().sum::<DVec3>() / points.len().max(1) as f64
 }

@@ -37,7 +37,7 @@ const DRAWS: usize = 400;
 /// Exponents of the echo: as it is, and with a range of the log compression that is 10 % smaller and larger.
 const EXPONENTS: [f64; 3] = [1.0, 0.9, 1.1];
 
-/// A volume and its interval of 95 %, mm^3.
+/// An estimated volume and its 95 % confidence interval (`low` to `high`), mm^3.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measured {
     pub volume: f64,
@@ -45,7 +45,7 @@ pub struct Measured {
     pub high: f64,
 }
 
-/// A measured body with the shell around its surface.
+/// The estimated volume of a body, and the shell of voxels around its surface.
 pub(crate) struct Shell {
     pub measured: Measured,
     /// Numbers of the voxels that belong to the body beyond doubt.
@@ -81,7 +81,11 @@ impl Sum {
 /// Sums of a patch: inside, shell, outside.
 type Patch = [Sum; 3];
 
-/// Measures the body of a label, whose voxels are `body`. `smoothing`: standard deviation of what found it, mm.
+/// Estimates the volume of the body with a label from the echoes at its surface. `body`: linear indices of its voxels; `smoothing`: standard
+/// deviation, mm, of the Gaussian that was used to find it.
+///
+/// # Errors
+/// One line: the reason why it cannot be measured.
 pub(crate) fn measure(
     field: &Field,
     labels: &Labels,
@@ -212,7 +216,8 @@ fn share_of(sums: &Patch, exponent: usize) -> Option<f64> {
 }
 
 impl Shell {
-    /// Gives as many voxels the label as the volume has: the core, and of the shell those with the largest `order`.
+    /// Changes the labels of the shell so that as many voxels have the label as the estimated volume needs: besides the core, those of the shell
+    /// with the largest `order`.
     pub(crate) fn relabel(&self, labels: &mut Labels, label: u8, order: impl Fn(usize) -> f32) {
         let each = lattice::voxel_volume(labels.grid());
         let count = ((self.measured.volume / each).round() as usize).saturating_sub(self.core);

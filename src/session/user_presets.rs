@@ -12,12 +12,12 @@ use toml::Table;
 const MAX_BYTES: u64 = 4 << 20;
 /// The version of the file that this program writes and reads.
 const VERSION: u32 = 1;
-/// Most presets of a file.
+/// Largest number of presets in a file.
 pub const MAX_PRESETS: usize = 32;
-/// Longest name, characters.
+/// Longest name of a preset, characters.
 pub const MAX_NAME: usize = 40;
 
-/// A named look.
+/// A preset that a user saved: a name, and the settings of a look.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct UserPreset {
@@ -35,7 +35,7 @@ struct Kept {
 }
 
 impl UserPreset {
-    /// A preset with this name and the look of `settings`.
+    /// A preset of this name with those of `settings` that belong to a look.
     ///
     /// # Errors
     /// One line: the name is not allowed, or the settings cannot be written as TOML.
@@ -45,7 +45,7 @@ impl UserPreset {
         settings.map(|settings| UserPreset { name, settings }).map_err(|e| format!("a preset cannot be written: {e}"))
     }
 
-    /// The settings of the preset. Settings that belong to an examination have their defaults.
+    /// The settings of the preset. Settings that belong to an examination and not to a look have their defaults.
     ///
     /// # Errors
     /// One line that names the preset: a setting is not known, or not allowed.
@@ -57,7 +57,7 @@ impl UserPreset {
     }
 }
 
-/// Returns a name without blanks at its ends.
+/// The name without blanks at its ends.
 ///
 /// # Errors
 /// One line: it is empty, longer than [`MAX_NAME`], has control characters, or is that of a built-in preset.
@@ -78,7 +78,7 @@ fn spelled(name: &str) -> Result<&str, String> {
     }
 }
 
-/// Reads the presets of a file. None are returned if there is no file.
+/// Reads the presets in a file; none if there is no file.
 ///
 /// # Errors
 /// One line that names the file: it cannot be read, or is damaged.
@@ -108,7 +108,7 @@ pub fn read(file: &Path) -> Result<Vec<UserPreset>, String> {
     Ok(kept.preset)
 }
 
-/// Replaces the presets of a file. If this fails, the file stays as it is.
+/// Replaces the presets in a file. If this fails, the file stays unchanged.
 ///
 /// # Errors
 /// One line: the existing file is damaged, there are more than [`MAX_PRESETS`] presets, or the file cannot be written.

@@ -17,23 +17,23 @@ const MAX_BYTES: u64 = 4 << 20;
 const VERSION: u32 = 1;
 /// The table that tells a workspace from a scene file.
 const TABLE: &str = "workspace";
-/// The name of the built-in phantom in place of a recording.
+/// Value of [`Origin::recording`] that stands for the built-in phantom.
 pub const PHANTOM: &str = "phantom";
 /// Bytes at the start of a file in which the table must be, to be listed as a workspace.
 const HEAD: u64 = 4096;
 
-/// The source of the volumes of a workspace.
+/// Which recording and which of its volumes a workspace shows, with the flags of its geometry.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Origin {
     version: u32,
-    /// The recording, or [`PHANTOM`]. None: the volumes were live and are in no file.
+    /// Path of the recording, or [`PHANTOM`]. None: the volumes were live and are in no file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub recording: Option<PathBuf>,
-    /// Number of the volume that was shown, from 0.
+    /// Index of the volume that was shown, from 0.
     #[serde(default)]
     pub volume: usize,
-    /// The flags that gave the recording's geometry, if there were any.
+    /// Path of the probe file that was given with `--probe`; None if it was not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub probe: Option<PathBuf>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -43,7 +43,7 @@ pub struct Origin {
 }
 
 impl Origin {
-    /// The origin with this recording and defaults for everything else.
+    /// The origin with this recording, its first volume and no flags.
     pub fn of(recording: Option<PathBuf>) -> Origin {
         Origin { version: VERSION, recording, ..Origin::default() }
     }
@@ -53,16 +53,16 @@ impl Origin {
 #[derive(Clone, Debug)]
 pub struct Workspace {
     pub origin: Origin,
-    /// All of its settings as one layer.
+    /// All settings of the workspace as one layer.
     pub layers: Layers,
 }
 
-/// True if a path has the ending of a workspace, which no recording has.
+/// True if a path has the file name ending of a workspace, which no recording has.
 pub fn is_named(path: &Path) -> bool {
     path.extension().is_some_and(|end| end.eq_ignore_ascii_case("toml"))
 }
 
-/// True if a file has the ending of a workspace and begins like one. Reads at most 4 KiB.
+/// True if a file has the ending of a workspace and begins as one. At most 4 KiB of it are read.
 pub fn is_workspace(path: &Path) -> bool {
     if !(is_named(path) && std::fs::metadata(path).is_ok_and(|about| about.is_file())) {
         return false;
@@ -73,7 +73,7 @@ pub fn is_workspace(path: &Path) -> bool {
 }
 
 impl Workspace {
-    /// Reads a workspace. Paths in it are relative to its folder.
+    /// Reads a workspace file. Paths in it are relative to its folder.
     ///
     /// # Errors
     /// One line that names the file: it cannot be read, is no workspace, or has a setting that is not allowed.
@@ -108,7 +108,7 @@ impl Workspace {
         Ok(Workspace { origin, layers })
     }
 
-    /// The recording to open.
+    /// Path of the recording to open. `path`: that of the workspace, for messages.
     ///
     /// # Errors
     /// One line: the workspace was saved from live volumes.

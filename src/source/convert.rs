@@ -16,26 +16,27 @@ use std::path::Path;
 const MAX_EDGE: f64 = 16384.0;
 const MAX_VOXELS: f64 = 8_589_934_592.0;
 
-/// What is written: the lattice, its place in the world, the type of the samples, and the value outside the insonified region.
+/// How a volume is written to a file: the grid, its position in the world, the type of the samples, and the value outside the insonified region.
 #[derive(Clone, Copy, Debug)]
 pub struct Target {
     pub grid: Grid,
-    /// Where the voxels are (LPS).
+    /// Map from voxels to the world (LPS).
     pub world: World,
     pub sample: SampleType,
-    /// Value outside the insonified region, in the units of the file.
+    /// Value of voxels outside the insonified region, in the units of the file.
     pub outside: f64,
-    /// Some: write a DICOM secondary capture; the stored values that become 0 and 255. None: write a volume with the values of the file.
+    /// None: a volume with the values of the original file is written. Some: a DICOM secondary capture of 8 bits, with the stored values that
+    /// become 0 and 255.
     pub capture: Option<[f64; 2]>,
 }
 
 impl Target {
-    /// A lattice whose axes are those of the world, with 0 outside.
+    /// A target on a grid whose axes are those of the world, with 0 outside the insonified region.
     pub fn new(grid: Grid, sample: SampleType) -> Target {
         Target { grid, world: World::of(&grid), sample, outside: 0.0, capture: None }
     }
 
-    /// This target as a DICOM secondary capture of 8 bits. `shown`: the stored values that become 0 and 255.
+    /// The same target as a DICOM secondary capture of 8 bits. `shown`: the stored values that become 0 and 255.
     pub fn captured(self, shown: [f64; 2]) -> Target {
         Target { sample: SampleType::U8, capture: Some(shown), ..self }
     }
@@ -49,16 +50,15 @@ impl Target {
         }
     }
 
-    /// Checks that a file can hold the volume, before any work is done.
+    /// Checks, before any work is done, that the file of this name can hold the volume.
     ///
     /// # Errors
-    /// An extension that is not a format, an axis that is too long for the format, an outside value that the type of the samples does not
-    /// have.
+    /// The extension is no format, an axis is too long for the format, or the type of the samples does not have the value outside.
     pub fn check(&self, path: &Path) -> Result<(), InputError> {
         self.check_as(self.format(path)?, path)
     }
 
-    /// As [`Target::check`], for a file of this format.
+    /// As [`Target::check`], for a file of the given format whatever its extension.
     pub(super) fn check_as(&self, format: VolumeFile, path: &Path) -> Result<(), InputError> {
         let most = format.most_along_axis();
         if let Some(long) = self.grid.size.iter().find(|n| **n > most) {
@@ -81,10 +81,11 @@ impl Target {
     }
 }
 
-/// The grid of uniform spacing, mm, over the insonified region of a geometry: lateral, depth (Y of the probe), elevation.
+/// The grid with a voxel spacing of `spacing` mm over the insonified region of a geometry. Its axes are lateral, depth (Y of the probe) and
+/// elevation.
 ///
 /// # Errors
-/// One line without the file's name: a spacing that is not a length, or that makes too many voxels.
+/// One line without the file's name: the spacing is no length above 0, or makes too many voxels.
 pub fn lattice(geometry: &Geometry, spacing: f64) -> Result<Grid, String> {
     if !(spacing.is_finite() && spacing > 0.0) {
         return Err(format!("{spacing} mm: must be a finite length above 0"));
@@ -119,14 +120,14 @@ pub struct Volume {
 }
 
 impl Volume {
-    /// A volume without frames.
+    /// A volume whose frames are all still missing.
     pub fn new(geometry: Geometry, stored: StoredType) -> Volume {
         let [samples, lines] = geometry.frame_size();
         let size = [samples, lines, geometry.slices()];
         Volume { geometry, stored, size, frames: vec![Vec::new(); size[2]] }
     }
 
-    /// Adds a frame. One with a wrong slice or size is ignored.
+    /// Stores a frame as the slice that it states. A frame with a wrong slice or size is ignored.
     pub fn take(&mut self, frame: Frame) {
         let bytes = self.size[0] * self.size[1] * self.stored.bytes();
         if let Some(place) = self.frames.get_mut(frame.slice).filter(|_| frame.bytes.len() == bytes) {
@@ -138,17 +139,17 @@ impl Volume {
         &self.geometry
     }
 
-    /// The type of its samples.
+    /// The type of the stored samples.
     pub fn stored(&self) -> StoredType {
         self.stored
     }
 
-    /// The bytes of each slice, in geometric order; none of a missing frame, which is zero.
+    /// The bytes of each slice, in geometric order. A missing frame has no bytes; its samples count as 0.
     pub fn frames(&self) -> &[Vec<u8>] {
         &self.frames
     }
 
-    /// True if every frame is there.
+    /// True if no frame is missing.
     pub fn is_whole(&self) -> bool {
         self.frames.iter().all(|frame| !frame.is_empty())
     }
@@ -242,8 +243,8 @@ impl Volume {
         [at.sample, at.line, at.slice]
     }
 
-    /// Writes the volume on a lattice. `target.sample`: the type of the original file, which is used for the values. `each` is called
-    /// after every slice.
+    /// Writes the volume, resampled on the grid of `target`. `target.sample` is the type of the original file, in whose values it is written.
+    /// `each` is called after every slice.
     ///
     /// # Errors
     /// As [`Target::check`], and a full disk. No file is left then.
@@ -251,13 +252,16 @@ impl Volume {
         write_voxels(target, path, |voxel| self.value(target, voxel), each)
     }
 
-    /// Writes the voxels alone.
+    /// Writes only the voxels, without a header.
+    ///
+    /// # Errors
+    /// Those of writing.
     pub(super) fn write_samples(&self, target: &Target, file: &mut impl Write) -> io::Result<()> {
         write_slices(target, file, |voxel| self.value(target, voxel), || ())
     }
 
-    /// Writes 1 for voxels inside the insonified region and 0 for those outside, on the same lattice; as a segmentation if the file's name
-    /// asks for one.
+    /// Writes a mask on the grid of `target`: 1 in voxels inside the insonified region, 0 outside. It is a segmentation if the file's name ends
+    /// so.
     ///
     /// # Errors
     /// As [`Volume::write`].
@@ -273,8 +277,8 @@ impl Volume {
 }
 
 impl Volume {
-    /// Writes a segmentation on the lattice of `target`: 1, "tissue", for voxels with a stored value of `threshold` and above. `each` is
-    /// called after every slice.
+    /// Writes a segmentation on the grid of `target`: label 1, "tissue", in voxels with a stored value of at least `threshold`, otherwise 0.
+    /// `each` is called after every slice.
     ///
     /// # Errors
     /// As [`Volume::write`].
@@ -291,7 +295,7 @@ impl Volume {
     }
 }
 
-/// Writes labels as a function of space, mm, on a grid along the axes of the world.
+/// Writes a segmentation on a grid along the axes of the world. `label` gives the label at a position, mm.
 ///
 /// # Errors
 /// As [`Volume::write`].
@@ -304,12 +308,13 @@ pub(super) fn write_labels(
     segmentation::write(path, grid, &World::of(grid), segments, |voxel| label(place_of(grid, voxel)), || ())
 }
 
-/// The value of no echo in a source's own units: the low end of the range that is shown, such as -60 of decibels.
+/// The sample value, in a source's own units, that stands for no echo: the low end of the displayed range, such as -60 dB.
 pub fn no_echo(source: &dyn Source) -> f64 {
     source.range()[0] - source.sample_type().shift()
 }
 
-/// Writes a function of space, mm, on a grid; None is zero. `each` is called after every slice.
+/// Writes a volume on a grid along the axes of the world. `value` gives the sample at a position, mm; None is written as 0. `each` is called
+/// after every slice.
 ///
 /// # Errors
 /// As [`Volume::write`].

@@ -17,7 +17,7 @@ const MAX_REORDERED_BYTES: u64 = 1 << 31;
 /// Most digits of the number of a file.
 const MAX_DIGITS: usize = 20;
 
-/// All bytes of a file that a header names, which must lie in the folder of the header or below it.
+/// Locates the samples in a data file that a header names: the whole file. It must lie in the folder of the header or below it.
 ///
 /// # Errors
 /// What is wrong with the name or with the file.
@@ -32,7 +32,7 @@ pub(super) fn beside(header: &Path, name: &str) -> Result<Pixels, String> {
     }
 }
 
-/// True if a file of exactly this name is there: what looks like a pattern or a list may be a name.
+/// True if a file of exactly this name exists beside the header: a name may look like a pattern or a list.
 pub(super) fn is_there(header: &Path, name: &str) -> bool {
     below(header, name).is_ok_and(|path| path.is_file())
 }
@@ -52,22 +52,22 @@ fn below(header: &Path, name: &str) -> Result<PathBuf, String> {
     Ok(if stated.exists() { stated } else { folder.join(slashed) })
 }
 
-/// Names of files by a pattern as printf has it, such as `slice%03d.raw`, and the whole numbers behind it.
+/// A printf pattern of file names, such as `slice%03d.raw`, and the whole numbers that follow it in a header.
 pub(super) struct Pattern {
     before: String,
     after: String,
     /// Least number of characters, and of digits.
     width: usize,
     digits: usize,
-    /// What stands behind the pattern, at most `most` whole numbers.
+    /// The whole numbers after the pattern.
     pub numbers: Vec<i64>,
 }
 
 impl Pattern {
-    /// Takes a text apart. `most`: numbers that may stand behind the pattern; before them the name may have spaces.
+    /// Parses a pattern and at most `most` whole numbers after it. The pattern may contain spaces.
     ///
     /// # Errors
-    /// A text that is no pattern with one number, in words.
+    /// What is wrong with a text that is no pattern with exactly one number.
     pub(super) fn parse(text: &str, most: usize) -> Result<Pattern, String> {
         let mut format = text.trim();
         let mut numbers = Vec::new();
@@ -107,10 +107,10 @@ impl Pattern {
         format!("{}{text:>width$}{}", self.before, self.after, width = self.width)
     }
 
-    /// The names from the first number to the last.
+    /// The file names for the numbers `first`, `first + step` ... up to `last`.
     ///
     /// # Errors
-    /// A step of 0 or away from the last number, or too many files, in words.
+    /// In words: the step is 0 or leads away from `last`, or there are too many files.
     pub(super) fn names(&self, first: i64, last: i64, step: i64) -> Result<Vec<String>, String> {
         let span = i128::from(last) - i128::from(first);
         if step == 0 || span.signum() * i128::from(step.signum()) < 0 {
@@ -136,7 +136,7 @@ fn conversion(form: &str) -> Option<(usize, usize)> {
     (width <= MAX_DIGITS && digits <= MAX_DIGITS && !form.starts_with(['+', '-'])).then_some((width, digits))
 }
 
-/// The files of a list.
+/// Locates the samples in each file of a list, as [`beside`].
 ///
 /// # Errors
 /// No file, too many of them, or what is wrong with a name or with a file.
@@ -148,11 +148,11 @@ pub(super) fn all(header: &Path, names: &[String]) -> Result<Vec<Pixels>, String
     }
 }
 
-/// Takes the samples of a recording from files that have as many each. `place` finds those of a file, given their number of bytes, and returns how many bytes
-/// follow them.
+/// Makes `layout` read its samples from several files with the same share of them each. `place` locates the samples in a file, given their
+/// number of bytes, and returns how many bytes of the file follow them.
 ///
 /// # Errors
-/// Samples that the files cannot share evenly, and what `place` and [`joined`] refuse.
+/// The samples cannot be divided evenly among the files, or `place` or [`joined`] fails.
 pub(super) fn divide(
     header: &Path,
     field: &str,
@@ -257,18 +257,18 @@ impl Read for PartStream {
     }
 }
 
-/// Axes in another order than that of frames.
+/// How the axes of a file are stored, if not in the order of frames.
 pub(super) struct StoredOrder {
-    /// Sizes of the stored axes, fastest first.
+    /// Number of samples along each stored axis, fastest first.
     pub sizes: Vec<usize>,
-    /// The stored axes in the order of frames, fastest first: each once.
+    /// Indices of the stored axes in the order that frames need, fastest first.
     pub order: Vec<usize>,
 }
 
-/// Puts the samples of a layout in the order of frames, when they are read.
+/// Makes `layout` bring its samples into the order of frames when they are read.
 ///
 /// # Errors
-/// More than 2 GiB of samples.
+/// There are more than 2 GiB of samples.
 pub(super) fn reorder(layout: &mut Layout, header: &Path, field: &str, stored: StoredOrder) -> Result<(), InputError> {
     let bytes = layout.frame_bytes().saturating_mul(layout.frames as u64);
     if bytes > MAX_REORDERED_BYTES {

@@ -8,7 +8,7 @@ use std::path::Path;
 /// Longest path, characters.
 const MAX_PATH_CHARACTERS: usize = 300;
 
-/// At most four decimals, without trailing zeros; large and tiny numbers with an exponent.
+/// A number for users: at most four decimals, without trailing zeros; large and tiny numbers with an exponent.
 pub(super) fn number(value: f64) -> String {
     if value != 0.0 && !(1e-3..1e7).contains(&value.abs()) {
         return format!("{value:.4e}");
@@ -17,13 +17,13 @@ pub(super) fn number(value: f64) -> String {
     text.trim_end_matches('0').trim_end_matches('.').to_string()
 }
 
-/// Pairs of title and value.
+/// The rows of a description for users: pairs of title and value.
 pub(super) trait Rows {
     fn add(&mut self, title: &str, value: impl Into<String>);
-    /// What a frame of this size is.
+    /// Adds the row "frame": lines and samples of a frame of a sweep, otherwise its width and height in pixels.
     fn add_frame(&mut self, is_sweep: bool, size: [usize; 2]);
     fn add_geometry(&mut self, geometry: &Geometry);
-    /// `how`: what follows the values.
+    /// Adds the row "value range". `how` is appended to the values: how they were found.
     fn add_range(&mut self, range: [f64; 2], how: &str);
 }
 
@@ -139,7 +139,7 @@ pub(super) fn times(times: &BTreeMap<usize, f64>) -> Option<(String, String)> {
     Some(("time stamps".into(), format!("{} .. {} s, {} of them", number(*first), number(*last), times.len())))
 }
 
-/// A remark that is a warning, too: what a user must know before they trust a picture.
+/// Logs a warning about a file, and returns it as a row for users: it says what a user must know before they trust a picture.
 pub(super) fn warned(file: &Path, title: &str, text: String) -> (String, String) {
     tracing::warn!(file = %path(file), "{text}");
     (title.into(), text)

@@ -9,24 +9,24 @@ use std::path::Path;
 /// Largest volume whose frames are put together anew in memory, bytes.
 const MAX_TURNED_BYTES: u64 = 1 << 31;
 
-/// How the Cartesian volumes of a file are drawn.
+/// How the stored Cartesian volumes of a file become the volumes that are drawn.
 pub(super) struct Drawn {
-    /// The lattice that is drawn.
+    /// The grid of a drawn volume.
     pub grid: Grid,
-    /// Where its voxels are.
+    /// Map from the drawn voxels to the world.
     pub world: World,
-    /// From stored axes to drawn ones.
+    /// Which stored axes are drawn as lateral, depth and elevation.
     pub order: AxisOrder,
-    /// Voxels along the stored axes.
+    /// Number of voxels along the stored axes.
     pub stored: [usize; 3],
 }
 
 impl Drawn {
-    /// The order that the file states or that was asked for, with one axis reversed if it would show a mirrored volume. `bytes`: of a stored
-    /// sample. What is changed is added to `remarks`.
+    /// Applies the axis order of the file, or the one for `depth` if that is given, and reverses one axis if the volume would look mirrored.
+    /// `bytes`: size of a stored sample. A reversal is added to `remarks`.
     ///
     /// # Errors
-    /// A lattice that is impossible, or whose frames would take more than 2 GiB to be put together anew.
+    /// The grid is impossible, or frames have to be put together from more than 2 GiB of voxels.
     pub fn new(
         path: &Path,
         file: &Cartesian,
@@ -64,19 +64,21 @@ impl Drawn {
         Ok(Drawn { grid, world, order, stored: file.size })
     }
 
-    /// True if frames are drawn as they are stored.
+    /// True if volumes are drawn in their stored order.
     pub fn is_stored(&self) -> bool {
         self.order == AxisOrder::STORED
     }
 
-    /// A stored frame with its pixels in drawn order, and its slice.
+    /// A stored frame with its pixels in drawn order, and the drawn slice that it is. `number`: its index in the stored volume; `width`: bytes
+    /// of a sample.
     pub fn frame(&self, bytes: &[u8], number: usize, width: usize) -> (Vec<u8>, usize) {
         let [columns, rows, slices] = self.stored;
         let slice = if self.order.reversed[2] { slices - 1 - number } else { number };
         (self.order.reorder(bytes, [columns, rows, 1], width), slice)
     }
 
-    /// Rows for users: the order if it is not the stored one, and the directions of the drawn axes if they are not those of the world.
+    /// Rows for users: the order of axes unless it is the stored one, and the directions of the drawn axes and the position unless they are
+    /// those of the world.
     pub fn description(&self) -> Vec<(String, String)> {
         let mut rows = Vec::new();
         if !self.is_stored() {

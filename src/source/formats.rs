@@ -13,20 +13,20 @@ use std::path::Path;
 pub use super::dicom::ENDINGS as DICOM;
 pub use super::pictures::ENDINGS as PICTURES;
 
-/// Bytes that are looked at.
+/// Number of bytes at the start of a file by which its format is recognised.
 pub(super) const START: u64 = 1024;
 /// The mark of a file that is packed as a whole.
 const GZIP: [u8; 2] = [0x1f, 0x8b];
 /// The ending of a file that is packed as a whole.
 const PACKED: &str = "gz";
 
-/// A format of recordings.
+/// A file format of recordings that can be read.
 pub struct Format {
-    /// Name of the format in helps and messages.
+    /// Name of the format in help texts and messages.
     pub name: &'static str,
-    /// Endings that its files usually have, in lower case. Empty if the files have no ending of their own.
+    /// File name endings of the format, in lower case without the dot. Empty if its files have none of their own.
     pub endings: &'static [&'static str],
-    /// Endings of the files that hold the samples beside a header.
+    /// Endings of files that hold only the samples, beside a header file; empty if the format has no such files.
     pub data: &'static [&'static str],
     /// True if a file begins with these bytes: its first 1024, or all that it has.
     is_one: fn(&[u8]) -> bool,
@@ -35,20 +35,20 @@ pub struct Format {
     keys: fn() -> Vec<Row>,
 }
 
-/// How a file of a format becomes a source.
+/// The way in which files of a format are read.
 pub(super) enum Reads {
-    /// As voxels or frames of whole volumes. Such a file may be packed by gzip.
+    /// A reader of layouts: whole volumes, whose frames can be read at random. The file may be packed by gzip.
     Layout(fn(&InputFile) -> Result<Layout, InputError>),
-    /// As voxels or frames of whole volumes, with the options' statements about the voxels.
+    /// As `Layout`, and the reader needs the user's options, too.
     Stated(fn(&InputFile, &OpenOptions) -> Result<Layout, InputError>),
-    /// Frames as they arrived.
+    /// A `.frames` file: frames in the order in which they arrived.
     Frames,
-    /// A stream of frames in a file.
+    /// A stream of frames, as from standard input, that was saved in a file.
     Stream,
     Uff,
 }
 
-/// Every format that is read.
+/// Every format of recordings that can be read.
 pub static FORMATS: [Format; 8] = [
     // First: 128 bytes of anything come before its mark.
     Format {
@@ -144,7 +144,7 @@ fn uff_keys() -> Vec<Row> {
     Vec::new()
 }
 
-/// The readable formats, for helps and messages.
+/// A sentence fragment with the readable formats and their endings, for help texts and messages.
 pub fn described() -> String {
     let of = |packed: bool| {
         let named = FORMATS.iter().filter(|format| !format.endings.is_empty() && format.may_be_packed() == packed);
@@ -153,19 +153,19 @@ pub fn described() -> String {
     format!("{}, each also as .{PACKED}, {}", of(true), of(false))
 }
 
-/// The names of the formats whose files have endings, in one line. A format that is named by its ending has the dot of it.
+/// The names of the formats that have file name endings, separated by commas. If the name is the ending, it has its dot.
 pub fn names() -> String {
     let named = FORMATS.iter().filter(|format| !format.endings.is_empty());
     let dot = |format: &Format| if format.endings.contains(&format.name) { "." } else { "" };
     named.map(|format| format!("{}{}", dot(format), format.name)).collect::<Vec<_>>().join(", ")
 }
 
-/// True if a recording may have this ending, in lower case and without its dot. Packed files have the ending `gz`.
+/// True if files of a recording may have this ending, given in lower case without the dot. `gz` is one, as files may be packed.
 pub fn is_ending(ending: &str) -> bool {
     ending == PACKED || FORMATS.iter().any(|format| format.endings.contains(&ending))
 }
 
-/// How a file is read, by its first bytes; none if they do not say, or it is packed.
+/// How to read a file, recognised by its first bytes. None if they are of no known format, or the file is packed.
 pub(super) fn reads(path: &Path) -> Option<&'static Reads> {
     let mut start = Vec::new();
     // A file that cannot be read is reported by the reader. Opening a pipe may block for ever.
@@ -179,10 +179,11 @@ fn of_start(start: &[u8]) -> Option<&'static Reads> {
     FORMATS.iter().find(|format| (format.is_one)(start)).map(|format| &format.reads)
 }
 
-/// Reads the layout of a file with the reader for its content, or else for the extension of its name; or of a stack of pictures.
+/// Reads the layout of a recording with the reader that the first bytes select, or for MetaImage the ending. The path may also be a folder of
+/// DICOM files or a stack of pictures.
 ///
 /// # Errors
-/// A file that cannot be read, is of another kind, or is damaged. A voxel spacing for anything but pictures.
+/// The file cannot be read, is of another kind, or is damaged; or a voxel spacing is given for something else than pictures.
 pub(super) fn read_layout(path: &Path, options: &OpenOptions) -> Result<Layout, InputError> {
     if path.is_dir() && dicom::is_series(path) {
         return dicom::read_series(path, options);
@@ -218,7 +219,8 @@ fn unknown(start: &[u8]) -> String {
     format!("is {kind}; {}, and folders of DICOM files or numbered pictures, are read", described())
 }
 
-/// Why a file that begins like this is no recording, where that is certain: there are enough bytes, and it is not packed.
+/// The reason why a file that begins with these bytes is no recording. None if it may be one: it is of a known format, is packed, or there are
+/// too few bytes.
 pub(super) fn no_format(start: &[u8]) -> Option<String> {
     let is_certain = start.len() as u64 >= START && !start.starts_with(&GZIP) && of_start(start).is_none();
     is_certain.then(|| unknown(start))

@@ -13,7 +13,10 @@ const MAX_SLICES: usize = 1 << 16;
 /// Largest frame, bytes.
 const MAX_FRAME_BYTES: u64 = 1 << 30;
 
-/// Refuses volumes that take more memory than they may.
+/// Checks that a volume is within the memory limit.
+///
+/// # Errors
+/// One line that names the file, the size and the limit.
 pub(super) fn check_memory(path: &Path, geometry: &Geometry, stored: StoredType) -> Result<(), InputError> {
     memory_fault(geometry, stored).map_or(Ok(()), |fault| Err(InputError::new(path, "volume", fault)))
 }
@@ -26,7 +29,7 @@ fn memory_fault(geometry: &Geometry, stored: StoredType) -> Option<String> {
     memory::check(bytes).err().map(|fault| format!("of {x} x {y} x {z} samples {fault}"))
 }
 
-/// What all frames of a file or of a live source have in common.
+/// The properties that all frames of a file or of a live source have in common.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Header {
@@ -35,23 +38,23 @@ pub struct Header {
     /// Geometry of a volume that is swept backwards; equal to `forward` if the motor stops for each frame.
     pub backward: Geometry,
     pub stored: StoredType,
-    /// Stored values that are shown as 0 and 1; finite, the second above the first.
+    /// Stored values that are displayed as 0 and 1; both finite, the second larger than the first.
     pub range: [f64; 2],
     /// True if frames may have poses.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub posed: bool,
-    /// The frames are of the phantom, not of a patient. A recording says so in its frames.
+    /// The frames are of the phantom, not of a patient. A `.frames` file stores this with its frames.
     #[serde(skip)]
     pub synthetic: bool,
 }
 
-/// Text that marks pictures of the phantom, and recordings of it whose format has a comment.
+/// Text on pictures of the phantom, and in recordings of it whose format has a comment.
 pub const DEMO_DATA: &str = "Demo data (phantom)";
 
-/// Size of a pose as it is stored, bytes: the upper three rows of a 4 x 4 matrix, row by row, f64.
+/// Size of a pose in files, bytes: the upper three rows of a 4 x 4 matrix, row by row, f64.
 pub(super) const POSE_BYTES: usize = 96;
 
-/// A stored pose. None if it is not finite or not rigid.
+/// Decodes a stored pose. None if it is not finite or not rigid.
 pub(super) fn read_pose(bytes: &[u8; POSE_BYTES]) -> Option<DAffine3> {
     let mut rows = [0.0; 12];
     for (value, word) in rows.iter_mut().zip(bytes.as_chunks::<8>().0) {
@@ -62,7 +65,7 @@ pub(super) fn read_pose(bytes: &[u8; POSE_BYTES]) -> Option<DAffine3> {
     is_rigid(&pose).then_some(pose)
 }
 
-/// The bytes of a pose; NaN for none.
+/// Encodes a pose for a file; None becomes NaN.
 pub(super) fn stored_pose(pose: Option<&DAffine3>) -> [u8; POSE_BYTES] {
     let matrix = DMat4::from(pose.copied().unwrap_or(DAffine3::NAN)).transpose().to_cols_array();
     let mut bytes = [0; POSE_BYTES];
@@ -80,16 +83,16 @@ impl Header {
         samples.checked_mul(self.stored.bytes() as u64).filter(|n| *n > 0 && *n <= MAX_FRAME_BYTES)
     }
 
-    /// Sizes of a line and of a frame, bytes; 0 where [`Header::frame_bytes`] is None.
+    /// Size of a scan line and of a frame, bytes; both 0 if [`Header::frame_bytes`] is None.
     pub(crate) fn line_and_frame(&self) -> (usize, usize) {
         let frame = self.frame_bytes().unwrap_or(0) as usize;
         (frame / self.forward.frame_size()[1].max(1), frame)
     }
 
-    /// Checks that frames with this header are possible.
+    /// Checks that there can be frames with this header.
     ///
     /// # Errors
-    /// The field, and what is wrong with it.
+    /// The name of the faulty field, and what is wrong with it.
     pub(super) fn check(&self) -> Result<(), (&'static str, String)> {
         for geometry in [&self.forward, &self.backward] {
             // Checked first: the other checks visit each slice.
@@ -123,9 +126,9 @@ impl Header {
     }
 }
 
-/// A source of frames that is read on demand, in order of acquisition. For sources with their own clock see [`Live`](super::live::Live).
+/// A source of frames that are read on demand, in order of acquisition. For sources with their own clock see [`Live`](super::live::Live).
 pub trait Source: Send {
-    /// Geometry of a volume. The direction of its sweep determines the motor's advance.
+    /// Geometry of the volume with this index, including the motor's travel during its frames.
     fn geometry(&self, volume: usize) -> Geometry;
     /// Type of the samples in [`Frame::bytes`].
     fn stored_type(&self) -> StoredType;
@@ -133,22 +136,22 @@ pub trait Source: Send {
     fn sample_type(&self) -> SampleType {
         self.stored_type().into()
     }
-    /// Stored values that are shown as 0 and 1.
+    /// Stored values that are displayed as 0 and 1.
     fn range(&self) -> [f64; 2];
     /// Number of complete volumes.
     fn volumes(&self) -> usize;
     fn frames_per_volume(&self) -> usize;
-    /// Moves forwards or back to the first frame of a volume.
+    /// Moves forwards or back, so that the next frame is the first of this volume.
     ///
     /// # Errors
-    /// A volume that does not exist, or data that cannot be read.
+    /// The volume does not exist, or the data cannot be read.
     fn skip_to_volume(&mut self, volume: usize) -> Result<(), InputError>;
     /// The next frame; None after the last.
     ///
     /// # Errors
     /// Data that cannot be read.
     fn next_frame(&mut self) -> Result<Option<Frame>, InputError>;
-    /// Reads ahead what the first frame needs, if that is more than the frame: it may take long.
+    /// Does in advance any long computation or reading that the first frame needs, such as compounding a volume.
     ///
     /// # Errors
     /// Data that cannot be read.
@@ -159,31 +162,31 @@ pub trait Source: Send {
     fn goes_back(&self) -> bool {
         travels_back(&self.geometry(0))
     }
-    /// What all frames have in common.
+    /// The properties that all frames have in common.
     fn header(&self) -> Header {
         header_of(self)
     }
-    /// Every file that is read; none for a source that is computed.
+    /// All files that are read; empty for a source that is computed.
     fn files(&self) -> Vec<PathBuf> {
         Vec::new()
     }
-    /// Where the voxels of Cartesian volumes are in the world; None where the source does not say, and for sweeps. Of volumes that move
-    /// the place of the first that has one.
+    /// Map from the voxels of Cartesian volumes to the world. None for sweeps, and if the source does not state it. If volumes have different
+    /// poses, that of the first that has one.
     fn world(&self) -> Option<World> {
         None
     }
-    /// Where the voxels of one Cartesian volume are: [`Source::world`], unless volumes have places of their own.
+    /// Map from the voxels of the Cartesian volume with this index to the world: [`Source::world`], unless volumes have poses of their own.
     fn world_of(&self, _volume: usize) -> Option<World> {
         self.world()
     }
-    /// The pose of all frames that have none of their own; None where the axes of the volume are those of the world, and where each frame
-    /// states whether it has one.
+    /// The pose of all frames that have none of their own. None if the axes of the volume are those of the world, and if each frame states
+    /// whether it has a pose.
     fn pose(&self) -> Option<DAffine3> {
         let Geometry::Cartesian(grid) = self.geometry(0) else { return None };
         let world = self.world().filter(|world| *world != World::of(&grid))?;
         Some(world.pose(&grid))
     }
-    /// The probe file that the geometry is from; None if the source states it itself.
+    /// Path of the probe file that the geometry comes from; None if the source states the geometry itself.
     fn probe_file(&self) -> Option<&Path> {
         None
     }
@@ -191,13 +194,16 @@ pub trait Source: Send {
     fn is_synthetic(&self) -> bool {
         false
     }
-    /// When the last frame that was returned had arrived, s on the recorder's clock; None if that was not recorded.
+    /// Time of arrival of the last frame that was returned, s on the recorder's clock; None if it was not recorded.
     fn arrival(&self) -> Option<f64> {
         None
     }
 }
 
-/// That a file of `count` volumes has this one.
+/// Checks that a file of `count` volumes has one with the index `volume`.
+///
+/// # Errors
+/// One line that names the file and both numbers.
 pub(super) fn check_volume(path: &Path, volume: usize, count: usize) -> Result<(), InputError> {
     if volume < count {
         return Ok(());
@@ -206,7 +212,7 @@ pub(super) fn check_volume(path: &Path, volume: usize, count: usize) -> Result<(
     Err(InputError::new(path, "volume", fault))
 }
 
-/// Bytes of all files of a source.
+/// Total size of all files of a source, bytes.
 pub(super) fn file_bytes(source: &dyn Source) -> u64 {
     let files: BTreeSet<PathBuf> = source.files().into_iter().collect();
     files.iter().filter_map(|file| file.metadata().ok()).filter(|about| about.is_file()).map(|about| about.len()).sum()

@@ -3,19 +3,25 @@
 use std::io::{self, Cursor, Read};
 use std::path::PathBuf;
 
-/// Samples that are not one range of one file.
+/// Samples of a recording that do not lie in one range of one file, such as those of several files.
 pub(super) trait Gathered: std::fmt::Debug + Send + Sync {
-    /// The stream `skip` bytes after its beginning.
+    /// Opens the samples as one stream, from `skip` bytes after their beginning.
+    ///
+    /// # Errors
+    /// Those of opening and reading the files.
     fn open(&self, skip: u64) -> io::Result<Box<dyn Read + Send>>;
-    /// The files that hold them.
+    /// The files that hold the samples.
     fn files(&self) -> Vec<PathBuf>;
 }
 
-/// Pictures or frames with the same number of bytes of samples each, which are decoded one by one.
+/// A sequence of pictures or frames of equal size that are decoded one by one.
 pub(super) trait Decoded: Clone + std::fmt::Debug + Send + Sync + 'static {
-    /// Bytes of the samples of one.
+    /// Bytes of the decoded samples of one picture or frame.
     fn each(&self) -> usize;
-    /// The samples of one; none behind the last.
+    /// The decoded samples of the picture or frame with this index; empty behind the last.
+    ///
+    /// # Errors
+    /// Those of reading and decoding.
     fn decode(&self, number: usize) -> io::Result<Vec<u8>>;
     fn files(&self) -> &[PathBuf];
 }

@@ -16,12 +16,12 @@ const MAX_NAMES: usize = 256;
 pub enum Aspect {
     /// Sizes, spacings and positions.
     Geometry,
-    /// What the numbers mean.
+    /// The meaning of the sample values.
     Value,
     Time,
-    /// Where the axes point.
+    /// The directions of the axes.
     Orientation,
-    /// Where and how the samples are stored.
+    /// The location and the encoding of the samples.
     Storage,
     /// Anything else.
     About,
@@ -46,25 +46,25 @@ impl Aspect {
     }
 }
 
-/// How a reader treats a key. A neutral value is one that changes nothing. Values that are numbers are compared as numbers.
+/// How a reader treats a key of a file. A neutral value is one that has no effect. Values that are numbers are compared as numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Use {
-    /// The key is read. If another key takes precedence and the value matters, there is a warning.
+    /// The key is read. There is a warning if another key takes precedence and the key describes geometry, values, times or orientation.
     Used,
-    /// The key is read, unless another key of the same meaning takes precedence.
+    /// The key is read, unless another key of the same meaning takes precedence, which needs no warning.
     Optional,
-    /// The key is not read. A value that is not neutral gives a warning.
+    /// The key is not read. A value other than these neutral ones gives a warning.
     Warned(&'static [&'static str]),
-    /// A file whose value is not neutral is refused.
+    /// The key is not read. A file with a value other than these neutral ones is refused.
     Refused(&'static [&'static str]),
     /// The key is not read and has no effect on pictures.
     Listed,
 }
 
-/// A key of a format.
+/// A key of a file format and how its reader treats it.
 #[derive(Clone, Copy, Debug)]
 pub struct Key {
-    /// As the format spells it. `N` stands for any number, `*` for anything.
+    /// Name of the key in the format. `N` stands for any number, `*` for any text.
     pub name: &'static str,
     pub aspect: Aspect,
     pub done: Use,
@@ -76,14 +76,14 @@ impl Key {
     }
 }
 
-/// A key as docs/formats.md lists it.
+/// A row of a table of keys in docs/formats.md.
 pub struct Row {
     pub name: String,
     pub aspect: Aspect,
     pub done: Use,
 }
 
-/// The rows of tables of keys.
+/// One row for each key of the tables.
 pub(super) fn rows(tables: &[&[Key]]) -> Vec<Row> {
     let row = |key: &Key| Row { name: key.name.into(), aspect: key.aspect, done: key.done };
     tables.iter().flat_map(|table| table.iter().map(row)).collect()
@@ -99,7 +99,7 @@ fn is_neutral(value: &str, neutral: &[&str]) -> bool {
     words.all(|word| neutral.iter().any(|other| same(word, other)))
 }
 
-/// The names of the keys that a file states and its reader did not use. Those that differ in numbers alone are one, such as
+/// Names of the keys that a file states and its reader did not use. Names that differ only in numbers are counted as one, such as
 /// `Seq_FrameN_FrameNumber`.
 #[derive(Clone, Debug, Default)]
 pub struct Unused {
@@ -110,12 +110,12 @@ pub struct Unused {
 }
 
 impl Unused {
-    /// Notes the name of a key. Never its value, which may be a patient's.
+    /// Adds the name of a key, with `N` for its numbers. Never pass a value, which may be a patient's.
     pub(super) fn note(&mut self, name: &str) {
         self.noted(without_numbers(&escaped(name, MAX_NAME)), name);
     }
 
-    /// Notes the name of a key whose numbers distinguish it from others.
+    /// Adds the name of a key with its numbers, where they distinguish keys.
     pub(super) fn note_as_it_is(&mut self, name: &str) {
         self.noted(escaped(name, MAX_NAME), name);
     }
@@ -129,7 +129,7 @@ impl Unused {
         }
     }
 
-    /// One line for each name.
+    /// The names, one line each, with their number if it is above 1.
     #[must_use]
     pub fn lines(&self) -> Vec<String> {
         let line = |(pattern, (name, count)): (&String, &(String, usize))| match count {
@@ -154,7 +154,7 @@ fn without_numbers(name: &str) -> String {
     pattern
 }
 
-/// The keys of a text header with their values, and which of them were asked for.
+/// The keys of a text header with their values, and which of them a reader has queried.
 pub(super) struct Stated {
     keys: &'static [Key],
     values: HashMap<&'static str, String>,
@@ -163,12 +163,12 @@ pub(super) struct Stated {
 }
 
 impl Stated {
-    /// `keys`: of the format.
+    /// Starts without values. `keys`: those that the format has.
     pub(super) fn new(keys: &'static [Key]) -> Stated {
         Stated { keys, values: HashMap::new(), asked: RefCell::default(), unused: Unused::default() }
     }
 
-    /// Keeps the value of a key of the format; the names of others are noted.
+    /// Stores the value of a key that the format has; of other keys only the name is noted.
     ///
     /// # Errors
     /// The name of a key that is given twice.
@@ -183,7 +183,7 @@ impl Stated {
         }
     }
 
-    /// Notes the name of a key that is of no use here.
+    /// Adds the name of a key to the unused ones.
     pub(super) fn note(&mut self, name: &str) {
         self.unused.note(name);
     }
@@ -192,22 +192,22 @@ impl Stated {
         self.values.contains_key(name)
     }
 
-    /// True if a key is stated with this value.
+    /// True if the header has this key with exactly this value.
     pub(super) fn is(&self, name: &str, value: &str) -> bool {
         self.values.get(name).is_some_and(|other| other == value)
     }
 
-    /// The value of a key, which then counts as used.
+    /// The value of a key, which from then on counts as used; None if the header does not have it.
     pub(super) fn get(&self, name: &str) -> Option<&str> {
         let (key, value) = self.values.get_key_value(name)?;
         self.asked.borrow_mut().insert(key);
         Some(value)
     }
 
-    /// What was not used, once everything was read; what a user must know of it is a warning.
+    /// The keys that were not used; call it when everything was read. What a user must know of them is added to `remarks` as warnings.
     ///
     /// # Errors
-    /// Name and fault of a key that is refused.
+    /// Name and fault of a key for which the file has to be refused.
     pub(super) fn finish(
         mut self,
         path: &Path,
@@ -223,10 +223,10 @@ impl Stated {
     }
 }
 
-/// Warns of a key that is stated and was not used, or refuses it, if its value matters.
+/// Treats a key that the file states and no reader used as [`Key::done`] says: adds a warning to `remarks`, refuses the file, or does nothing.
 ///
 /// # Errors
-/// Name and fault of a key that is refused.
+/// Name and fault of a key for which the file has to be refused.
 pub(super) fn not_used(
     path: &Path,
     key: &Key,

@@ -42,7 +42,7 @@ const READ_WHOLE: [Tag; 8] =
 /// Elements of group 0002 that exist if the voxels are wavelet-compressed.
 const WAVELET: [Tag; 3] = [(2, 0x1000), (2, 0x1100), (2, 0x1200)];
 
-/// The items, as far as public readers know them.
+/// The items of a Kretz file whose meaning public readers know, and how they are treated.
 pub(super) static KEYS: [Key; 15] = [
     Key::new("C000,0001 (samples)", Aspect::Geometry, Use::Used),
     Key::new("C000,0002 (lines)", Aspect::Geometry, Use::Used),

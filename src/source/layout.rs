@@ -15,72 +15,75 @@ const MAX_EXTENT: u64 = 65_536;
 /// Largest frame, bytes.
 const MAX_FRAME_BYTES: u64 = 1 << 30;
 
-/// The layout of a recorded file, and the geometry that is stored in it.
+/// Where the samples of a recorded file are and how they are stored, with the geometry that the file states.
 pub(super) struct Layout {
     pub format: &'static str,
     pub pixel: PixelFormat,
-    /// Samples and lines, or width and height; the first index is the fastest.
+    /// Samples a line and lines, or width and height of a picture; the first index is the fastest.
     pub frame_size: [usize; 2],
     pub frames: usize,
     pub pixels: Pixels,
     pub line_order: LineOrder,
     pub geometry: StoredGeometry,
-    /// The frames of a sweep come from the last slice to the first.
+    /// True if the frames of a sweep are stored from the last slice to the first.
     pub backward: bool,
-    /// Number of volumes of a sweep, one after another.
+    /// Number of volumes of a sweep, stored one after another.
     pub volumes: usize,
-    /// The file states where its samples lie. If not, a `probe.toml` of the folder applies.
+    /// True if the file states the positions of its samples. Otherwise a `probe.toml` of the folder applies.
     pub states_geometry: bool,
-    /// Transforms of tracked frames.
+    /// Transforms of tracked frames, by the name of the transform and the index of the frame.
     pub poses: Poses,
-    /// Time stamps by frame, s.
+    /// Time stamp of each frame, s, by its index in the file; no entry if it has none.
     pub times: BTreeMap<usize, f64>,
-    /// The file says that its samples are of the phantom.
+    /// True if the file says that its samples are of the phantom.
     pub synthetic: bool,
-    /// Remarks for users: title and text. Never a patient field.
+    /// Remarks for users: pairs of title and text. They never contain a field about the patient.
     pub remarks: Vec<(String, String)>,
-    /// Keys that the file states and that were not used.
+    /// Names of keys that the file states and that were not used.
     pub unused: Unused,
 }
 
-/// How the rows of a frame relate to scan lines.
+/// Whether the rows of a frame are scan lines, and in which order.
 pub(super) enum LineOrder {
     InOrder,
-    /// The last line comes first.
+    /// Rows are scan lines, and the last line comes first.
     Reversed,
-    /// They are not scan lines: the frames are pictures. Holds the value in the file that says so.
+    /// Rows are not scan lines: the frames are pictures. The text is the value in the file that says so.
     Pictures(String),
 }
 
-/// The geometry that is stored in a file.
+/// The geometry that a file states.
 pub(super) enum StoredGeometry {
     /// One polar volume.
     Sweep(Box<Probe>),
     /// Cartesian volumes.
     Cartesian(Cartesian),
-    /// None, although the file needs one.
+    /// The file states none although it needs one; the error says so.
     Missing(InputError),
 }
 
-/// Cartesian volumes of a file: slices one after another, volumes one after another.
+/// The Cartesian volumes of a file, stored slice after slice and volume after volume.
 pub(super) struct Cartesian {
-    /// Voxels of a volume along the stored axes, fastest first.
+    /// Number of voxels of a volume along the stored axes, fastest first.
     pub size: [usize; 3],
     /// Number of volumes.
     pub volumes: usize,
-    /// Where the voxels are after `order`.
+    /// Map from the voxels to the world, after their axes were put in `order`.
     pub world: World,
-    /// The order in which the file says that its axes are to be drawn.
+    /// The order in which the file says its stored axes are to be drawn.
     pub order: AxisOrder,
 }
 
 impl Layout {
-    /// Size of a frame in the file, bytes.
+    /// Size of a frame in the file before compression, bytes.
     pub fn frame_bytes(&self) -> u64 {
         self.frame_size[0] as u64 * self.frame_size[1] as u64 * self.pixel.bytes() as u64
     }
 
-    /// Refuses sizes that are impossible for a file of this length, so that a false header never causes a large allocation.
+    /// Checks that a file of this length can hold the frames, so that a false header never causes a large allocation.
+    ///
+    /// # Errors
+    /// One line with the field `size_field` or "data": a frame is too large, or the file too short.
     pub fn check(&self, file: &Path, size_field: &str) -> Result<(), InputError> {
         let fault = |field: &str, fault: String| Err(InputError::new(file, field, fault));
         if self.frame_bytes() > MAX_FRAME_BYTES {
@@ -100,7 +103,10 @@ impl Layout {
     }
 }
 
-/// Checks a number of samples, lines or frames.
+/// Checks that a number of samples, lines or frames is within its range. `which`: words before it in messages.
+///
+/// # Errors
+/// One line: it is 0 or too large.
 pub(super) fn extent(file: &Path, field: &str, which: &str, value: u64) -> Result<usize, InputError> {
     match value {
         0 => Err(InputError::new(file, field, format!("{which}is 0, must be at least 1"))),

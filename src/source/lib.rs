@@ -67,26 +67,27 @@ use formats::Reads;
 use keys::Unused;
 use std::path::Path;
 
-/// Options of a file that a user opens.
+/// Options that a user gives for opening a recording.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct OpenOptions<'a> {
-    /// The probe file. None: the one that belongs to the recording.
+    /// Path of the probe file. None: the probe file that belongs to the recording, if there is one.
     pub probe: Option<&'a Path>,
-    /// The stored axis of a Cartesian volume that is drawn as depth; None: that of the file's orientation, or y.
+    /// The stored axis of a Cartesian volume that is drawn as depth. None: the one that the file states, otherwise y.
     pub depth_axis: Option<DepthAxis>,
-    /// Distance between the voxels of a stack of pictures: columns, rows, pictures, mm.
+    /// Distance between the voxels of a stack of pictures, mm: from column to column, row to row, picture to picture. None: that of the files.
     pub voxel_spacing: Option<[f64; 3]>,
-    /// A configuration of the PLUS toolkit (XML): tracked pictures become a freehand volume.
+    /// Path of a configuration of the PLUS toolkit (XML), by which tracked pictures become a freehand volume.
     pub plus_config: Option<&'a Path>,
-    /// Constant transforms of tracked pictures, which come before those of the configuration.
+    /// Constant transforms for tracked pictures. They take precedence over those of the PLUS configuration.
     pub calibration: &'a [Calibration],
-    /// The coordinate frame of the tracking that the volume is placed in. None: that of the configuration, or Reference, Tracker or World.
+    /// Name of the coordinate frame in which tracked pictures become a volume. None: that of the PLUS configuration, otherwise Reference,
+    /// Tracker or World.
     pub reference: Option<&'a str>,
-    /// Options of pictures with poses, which become a freehand volume.
+    /// Options for pictures with poses, which become a freehand volume.
     pub freehand: freehand::FreehandArguments,
 }
 
-/// As [`open_with`], with the stored order of axes. `probe`: the probe file to use.
+/// Opens a recording with default options: see [`open_with`]. `probe`: path of the probe file.
 ///
 /// # Errors
 /// As [`open_with`].
@@ -99,7 +100,7 @@ pub fn is_dicom(path: &Path) -> bool {
     dicom::is_dicom(path)
 }
 
-/// Opens a `.frames` file, a stream of frames in a file, or any other recording; the content decides which. `-` is standard input.
+/// Opens a recording of any format, which its content decides, among them `.frames` files and saved streams of frames. `-` is standard input.
 ///
 /// # Errors
 /// As [`recorder::Reader::open`] and [`Recording::open_with`].
@@ -125,10 +126,10 @@ fn open_file(path: &Path, options: OpenOptions) -> Result<Box<dyn Source>, Input
     })
 }
 
-/// A description of such a file for users. It has no name or number of a patient.
+/// Describes a recording for users, without the name or number of a patient.
 ///
 /// # Errors
-/// As [`open_with`]; a `.frames` file is read completely, and may fail while that is done.
+/// As [`open_with`]. A `.frames` file is read completely, which may fail, too.
 pub fn description(path: &Path, options: OpenOptions) -> Result<Description, InputError> {
     if standard_input::is_meant(path) {
         return file_description(&standard_input::file()?, options).map_err(standard_input::renamed);
@@ -136,12 +137,12 @@ pub fn description(path: &Path, options: OpenOptions) -> Result<Description, Inp
     file_description(path, options)
 }
 
-/// A description of a file for users.
+/// A description of a recording for users.
 #[derive(Clone, Debug)]
 pub struct Description {
-    /// Pairs of title and value. Never a patient's name or number.
+    /// Pairs of title and value. They never contain a patient's name or number.
     pub rows: Vec<(String, String)>,
-    /// Keys that the file states and that were not used.
+    /// Names of keys that the file states and that were not used.
     pub unused: Unused,
 }
 

@@ -5,16 +5,16 @@ use super::freehand::CompoundingOptions;
 use glam::DAffine3;
 use std::time::{Duration, Instant};
 
-/// The kind of a source, for messages.
+/// The kind of a live source, for messages.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SourceKind {
     /// The built-in phantom.
     Demo,
-    /// A file.
+    /// A recorded file.
     Recording,
-    /// Standard input.
+    /// A stream on standard input.
     Pipe,
-    /// A probe, or a server with one.
+    /// A probe with a motor, or a server that passes on the images of a probe.
     #[default]
     Probe,
 }
@@ -22,65 +22,67 @@ pub enum SourceKind {
 /// An event of a live source.
 #[derive(Clone, Debug)]
 pub enum Event {
-    /// Header of the frames that follow. It comes before the first frame and whenever it changes. No frame of an earlier volume follows it.
+    /// The properties of the frames that follow. It comes before the first frame and whenever they change; no frame of an earlier volume follows
+    /// it.
     Begin(Box<Header>),
     /// A complete frame.
     Frame(Frame),
-    /// Scan lines of a frame, from line `first` on, in `frame.bytes`. The lines of a frame arrive in order; the last one completes it.
+    /// Some scan lines of a frame, from line `first` on, in `frame.bytes`. The lines of a frame arrive in order; its last line completes it.
     Lines { frame: Frame, first: usize },
-    /// Data were left out, with the reason. The source continues.
+    /// Data were left out for the given reason. The source continues.
     Fault(String),
-    /// Nothing arrived within the time-out of the call.
+    /// Nothing arrived within the time that the caller wanted to wait.
     Idle,
-    /// The source has ended, with the reason if that was unexpected.
+    /// The source has ended; the reason if that was not expected.
     End(Option<String>),
 }
 
 /// A source whose frames arrive on its own clock. Implement it to stream from a device of your own.
 ///
-/// Contract: [`Event::Begin`] comes before the first frame. Volume numbers never decrease. After [`Event::End`] the source is
-/// not asked again. Any input gives frames or faults, never a panic, and a source takes no more memory than it documents.
+/// Contract: [`Event::Begin`] comes before the first frame. Volume numbers never decrease. After [`Event::End`], `next` is not called again. Any
+/// input gives frames or faults, never a panic, and a source takes no more memory than it documents.
 pub trait Live: Send {
-    /// The next event. Waits for it for about `patience` at most, then returns [`Event::Idle`].
+    /// The next event. It waits for about `patience` at most and then returns [`Event::Idle`].
     fn next(&mut self, patience: Duration) -> Event;
 
-    /// True if the source loses nothing when it is not asked for a while, as a file or a pipe. Otherwise complete volumes are lost
-    /// instead when the caller is slow.
+    /// True if the source, such as a file or a pipe, loses nothing when `next` is not called for a while. False if complete volumes are then
+    /// lost.
     fn can_wait(&self) -> bool;
 
-    /// True if it is a recording that is read as fast as it is taken: what comes while the picture is frozen belongs to the loop.
+    /// True if the source is a recording that is read as fast as the caller takes frames. Frames that are read while the picture is frozen then
+    /// belong to the cine loop.
     fn is_recording(&self) -> bool {
         false
     }
 
-    /// How pictures with poses become a volume ([`Posed`](super::posed::Posed)); None: they do not.
+    /// Options by which pictures with poses are compounded into a volume ([`Posed`](super::posed::Posed)); None: they are not compounded.
     fn compounding(&self) -> Option<CompoundingOptions> {
         None
     }
 
-    /// Pictures of a freehand sweep so far that are in no volume, or not wholly.
+    /// Number of pictures of a freehand sweep so far that are not, or not wholly, in the volume.
     fn left_out(&self) -> u64 {
         0
     }
 
-    /// Why nothing can arrive at the moment, on one line, such as a connection that was refused. None while the source is connected.
+    /// The reason on one line why nothing can arrive at present, such as a refused connection. None while the source is connected.
     fn disconnected(&self) -> Option<String> {
         None
     }
 }
 
-/// When the frames of a file arrive.
+/// When the frames of a file are delivered.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Playback {
     /// As soon as they are requested.
     Fast,
-    /// At this number of volumes a second, with evenly spaced frames.
+    /// At this number of volumes a second; the frames of a volume are evenly spaced in time.
     Volumes(f64),
-    /// At the recorded times of arrival, otherwise by the time stamps. Frames without either follow at once.
+    /// At the recorded times of arrival, otherwise at the times of the time stamps. Frames with neither follow at once.
     Recorded,
 }
 
-/// A recording or the phantom as a live source. It buffers at most one frame.
+/// Plays a recording or the phantom as a live source. It buffers at most one frame.
 pub struct PlaybackSource {
     source: Box<dyn Source>,
     playback: Playback,
@@ -106,7 +108,7 @@ pub struct PlaybackSource {
 }
 
 impl PlaybackSource {
-    /// Plays `source` `rounds` times. The volume numbers go on from round to round.
+    /// Plays `source` `rounds` times. Volume numbers continue from round to round.
     pub fn new(source: Box<dyn Source>, playback: Playback, rounds: u32) -> PlaybackSource {
         PlaybackSource {
             source,

@@ -22,7 +22,7 @@ type Remarks = Vec<(String, String)>;
 /// Most frames of all volumes.
 const MAX_FRAMES: u64 = 1 << 20;
 
-/// Endings of its files: header and samples in one, or in two.
+/// File name endings: `mha` for header and samples in one file, `mhd` for a header with its samples in another file.
 pub(super) const ENDINGS: [&str; 2] = ["mha", "mhd"];
 
 /// The number types that are read, by their names.
@@ -372,7 +372,8 @@ fn deflated(pixels: &Pixels) -> Result<Encoding, InputError> {
 const MAX_HEADER_BYTES: u64 = 32 << 20;
 const MAX_HEADER_LINES: usize = 500_000;
 
-/// The fields, with those of MetaIO that are not read. The values of others are skipped, so that no patient's name gets into a message.
+/// The fields of a header that are read, and those of MetaIO that are not. The values of all others are skipped, so that no patient's name gets
+/// into a message.
 pub(super) static KEYS: [Key; 49] = [
     Key::new("ObjectType", Aspect::Storage, Use::Used),
     Key::new("NDims", Aspect::Geometry, Use::Used),

@@ -21,7 +21,7 @@ const MAX_FRAMES: u64 = 1 << 20;
 /// From RAS to LPS.
 const TO_LPS: DVec3 = DVec3::new(-1.0, -1.0, 1.0);
 
-/// The fields of the header. Those of text may hold a patient's name: none of their values is shown.
+/// The fields of a NIfTI header and how they are treated. Text fields may hold a patient's name: none of their values is shown.
 pub(super) static KEYS: [Key; 39] = [
     Key::new("sizeof_hdr", Aspect::Storage, Use::Used),
     Key::new("magic", Aspect::Storage, Use::Used),
@@ -109,7 +109,7 @@ fn version(start: &[u8]) -> Option<(u8, bool)> {
     None
 }
 
-/// True if a file begins like this.
+/// True if a file that begins with these bytes is NIfTI.
 pub(super) fn is_one(start: &[u8]) -> bool {
     version(start).is_some()
 }

@@ -17,21 +17,21 @@ use std::sync::Arc;
 
 const GZIP: [u8; 2] = [0x1f, 0x8b];
 
-/// How samples are compressed.
+/// How the samples of a file are compressed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Encoding {
     Raw,
     Zlib,
     Gzip,
     Bzip2,
-    /// A stack of pictures, each with its own.
+    /// A stack of pictures, each compressed as its own format says.
     Pictures,
-    /// Frames of DICOM files.
+    /// Frames of DICOM files, compressed as given.
     Dicom(Coding),
 }
 
 impl Encoding {
-    /// Name of the compression for users.
+    /// Name of the compression for users; "none" without one.
     pub fn name(self) -> &'static str {
         match self {
             Encoding::Raw | Encoding::Dicom(Coding::Native) => "none",
@@ -46,11 +46,11 @@ impl Encoding {
         }
     }
 
-    /// Largest ratio that it can reach. Deflate: 258 bytes from two bits, so 1032 (zlib, "technical details"). Bzip2: a block of 900 kB
-    /// holds runs of 259 bytes in 5, 46 MB from about 40 bytes. A PNG has deflate, whose bits may be pixels of 3 bytes. RLE makes 128 bytes
-    /// of 2. JPEG: one bit for a block of 64 pixels; with shared colours 6 for 256 pixels of 3 bytes;
-    /// lossless, one bit for a number of 2 bytes. JPEG 2000 has no limit, as a few bytes state that a whole picture is 0: what real data do not reach
-    /// is refused.
+    /// Largest ratio of decompressed to compressed bytes that is accepted. Deflate: 258 bytes from two bits, so 1032 (zlib, "technical
+    /// details"). Bzip2: a block of 900 kB holds runs of 259 bytes in 5, 46 MB from about 40 bytes. PNG: that of deflate, whose bits may be
+    /// pixels of 3 bytes. RLE: 128 bytes from 2. JPEG: one bit for a block of 64 pixels; with shared colours 6 bits for 256 pixels of 3 bytes.
+    /// Lossless JPEG: one bit for a number of 2 bytes. JPEG 2000 has no limit, as a few bytes can state that a whole picture is 0; a ratio is
+    /// refused that real data do not reach.
     pub fn most(self) -> u64 {
         match self {
             Encoding::Raw | Encoding::Dicom(Coding::Native) => 1,
@@ -64,7 +64,7 @@ impl Encoding {
     }
 }
 
-/// A regular file that is read from its start, through gzip if it is packed.
+/// A regular file that is read from its start, and unpacked if it is packed by gzip.
 pub(super) struct InputFile<'a> {
     pub path: &'a Path,
     packed: bool,
@@ -75,10 +75,10 @@ pub(super) struct InputFile<'a> {
 }
 
 impl<'a> InputFile<'a> {
-    /// Finds out whether a file is packed.
+    /// Opens a file, and finds out by its first bytes whether it is packed.
     ///
     /// # Errors
-    /// A file that cannot be read, or is not a regular file.
+    /// The file cannot be read, or is not a regular file.
     pub fn new(path: &'a Path) -> Result<InputFile<'a>, InputError> {
         let unreadable = |e| InputError::unreadable(path, &e);
         let metadata = fs::metadata(path).map_err(unreadable)?;
@@ -91,25 +91,28 @@ impl<'a> InputFile<'a> {
         Ok(InputFile { path, packed: start == GZIP, bytes: metadata.len(), part: None })
     }
 
-    /// A part of this file as one of its own. It must lie in the file.
+    /// A part of this file as a file of its own: `length` bytes from `offset`. It must lie within the file.
     pub fn window(&self, offset: u64, length: u64) -> InputFile<'a> {
         InputFile { part: Some((offset, length)), ..*self }
     }
 
-    /// True if the whole file is packed.
+    /// True if the whole file is packed by gzip.
     pub(crate) fn is_packed(&self) -> bool {
         self.packed
     }
 
-    /// The bytes from the start, unpacked.
+    /// Opens the unpacked bytes from the start of the file.
+    ///
+    /// # Errors
+    /// Those of opening the file.
     pub fn open(&self) -> io::Result<PixelStream> {
         self.pixels(0).open(0)
     }
 
-    /// The first bytes, unpacked; fewer if there are fewer.
+    /// The first `bytes` unpacked bytes, or all if there are fewer.
     ///
     /// # Errors
-    /// A file that cannot be read.
+    /// The file cannot be read.
     pub fn start(&self, bytes: u64) -> Result<Vec<u8>, InputError> {
         let mut start = Vec::new();
         let read = self.open().and_then(|file| file.take(bytes).read_to_end(&mut start));
@@ -120,7 +123,7 @@ impl<'a> InputFile<'a> {
         }
     }
 
-    /// Most bytes that the file can hold unpacked.
+    /// Upper limit of the number of bytes that the file can have unpacked.
     pub(crate) fn most_bytes(&self) -> u64 {
         match (self.part, self.packed) {
             (Some((_, length)), _) => length,
@@ -129,7 +132,7 @@ impl<'a> InputFile<'a> {
         }
     }
 
-    /// Samples in this file `offset` bytes after its start, unpacked, up to its end.
+    /// The location of samples in this file, from `offset` unpacked bytes after its start to its end.
     pub fn pixels(&self, offset: u64) -> Pixels {
         let path = self.path.to_path_buf();
         let (begin, there) = self.part.unwrap_or((0, self.bytes));
@@ -142,34 +145,34 @@ impl<'a> InputFile<'a> {
     }
 }
 
-/// The location of the samples: file and range of bytes.
+/// The location of the samples of a recording: a file and a range of its bytes, or [`Gathered`].
 #[derive(Clone, Debug)]
 pub(super) struct Pixels {
     pub path: PathBuf,
-    /// Offset of the first byte.
+    /// Offset in the file of the first byte that is read.
     pub offset: u64,
-    /// Length in the file, bytes, compressed or not.
+    /// Number of bytes in the file, compressed or not.
     pub length: u64,
     pub encoding: Encoding,
-    /// Bytes of the decompressed stream that come before the samples.
+    /// Number of decompressed bytes that come before the samples; 0 if they are not compressed.
     pub inside: u64,
-    /// Samples of several files or in another order, in place of a file.
+    /// If given, the samples are these and not a range of one file.
     pub gathered: Option<Arc<dyn Gathered>>,
 }
 
-/// The samples as a stream.
+/// The samples of a recording as a stream, decompressed.
 pub(super) enum PixelStream {
     Raw(BufReader<CountedFile>),
     Packed(Box<dyn Read + Send>),
 }
 
 impl Pixels {
-    /// Samples that are not one range of one file. `path`: as the user named it; `length`: in the files, bytes.
+    /// The location of samples that are not one range of one file. `path`: as the user named it; `length`: bytes in all files.
     pub fn gathered(path: &Path, encoding: Encoding, length: u64, from: impl Gathered + 'static) -> Pixels {
         Pixels { path: path.into(), offset: 0, length, encoding, inside: 0, gathered: Some(Arc::new(from)) }
     }
 
-    /// The files that hold the samples: those of a stack, of DICOM, of a list, or one.
+    /// All files that the samples are read from.
     pub(super) fn files(&self) -> Vec<PathBuf> {
         [self.path.clone()].into_iter().chain(self.gathered.iter().flat_map(|gathered| gathered.files())).collect()
     }
@@ -179,7 +182,10 @@ impl Pixels {
         self.encoding != Encoding::Raw
     }
 
-    /// Opens the stream `skip` bytes after its beginning. A compressed stream is decompressed up to there.
+    /// Opens the stream `skip` bytes after the first sample. A compressed stream is decompressed up to there.
+    ///
+    /// # Errors
+    /// Those of reading the file.
     pub fn open(&self, skip: u64) -> io::Result<PixelStream> {
         if let Some(gathered) = &self.gathered {
             return Ok(PixelStream::Packed(gathered.open(skip)?));
@@ -213,8 +219,11 @@ impl PixelStream {
         }
     }
 
-    /// Appends `bytes` bytes to `out`, or as many as there are. The buffer grows with the data that arrive and not with the requested
-    /// number, which may come from a false header.
+    /// Appends the next `bytes` bytes to `out`, fewer at the end of the stream. The buffer grows with the data that arrive and not with `bytes`,
+    /// which may come from a false header.
+    ///
+    /// # Errors
+    /// Those of reading the file.
     pub fn fill(&mut self, bytes: u64, out: &mut Vec<u8>) -> io::Result<()> {
         match self {
             PixelStream::Raw(file) => file.take(bytes).read_to_end(out)?,
@@ -223,7 +232,10 @@ impl PixelStream {
         Ok(())
     }
 
-    /// Reads a compressed stream to its end, where its checksum is verified. Returns the number of decompressed bytes that were not read before.
+    /// Reads a compressed stream to its end, where its checksum is verified. Returns how many decompressed bytes it had left.
+    ///
+    /// # Errors
+    /// Those of reading the file, and a wrong checksum.
     pub fn finish(&mut self) -> io::Result<u64> {
         match self {
             PixelStream::Raw(_) => Ok(0),

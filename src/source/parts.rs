@@ -36,7 +36,7 @@ impl FrameParts {
     }
 }
 
-/// A source of complete frames: groups of lines ([`Event::Lines`]) of the underlying source are kept until their frame is complete.
+/// A live source of complete frames only: groups of lines ([`Event::Lines`]) of the wrapped source are collected until their frame is complete.
 pub struct WholeFrames {
     source: Box<dyn Live>,
     /// Of a line and of a frame, bytes.

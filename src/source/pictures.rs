@@ -9,34 +9,36 @@ use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Endings of pictures, which in a folder are a recording.
+/// File name endings of pictures; a folder of pictures is a recording.
 pub const ENDINGS: [&str; 7] = ["png", "jpg", "jpeg", "bmp", "pgm", "ppm", "pnm"];
 
-/// The pictures of a stack, in their order.
+/// The picture files of a stack, in their order.
 #[derive(Clone, Debug)]
 pub(super) struct Pictures {
     pub files: Arc<[PathBuf]>,
-    /// True if a picture has colour. All pictures are then read with three channels.
+    /// True if at least one picture is in colour. All pictures are then read with three channels.
     pub is_colour: bool,
-    /// Samples of one of them, bytes.
+    /// Bytes of the samples of one picture.
     pub each: usize,
 }
 
-/// What the header of a picture says.
+/// What the header of a picture file states.
 pub(super) struct About {
     pub size: [u32; 2],
-    /// 16 bits a channel, not 8.
+    /// True for 16 bits a channel, false for 8.
     pub deep: bool,
     pub is_colour: bool,
     /// Length of the file, bytes.
     pub length: u64,
-    /// True if the picture states that it is to be turned or mirrored (EXIF).
+    /// True if the picture says that it has to be rotated or mirrored for display (EXIF).
     pub is_turned: bool,
 }
 
 impl About {
+    /// Reads the header of a picture file.
+    ///
     /// # Errors
-    /// One line: a file that cannot be read, or is no picture that is read.
+    /// One line: the file cannot be read, or is no picture of a format that is read.
     pub fn of(picture: &Path) -> Result<About, String> {
         let length = std::fs::metadata(picture).map_err(|e| format!("cannot be read: {e}"))?.len();
         let mut decoder = reader(picture)?.into_decoder().map_err(unreadable)?;
@@ -56,7 +58,7 @@ const START: u64 = 64 << 10;
 /// Chunks of a PNG that are read.
 const READ: [&[u8]; 5] = [b"IHDR", b"PLTE", b"tRNS", b"sBIT", b"IDAT"];
 
-/// The names of what stands beside the pixels in a PNG or JPEG and is not read, such as the density of pixels.
+/// The names of what a PNG or JPEG file holds beside its pixels and is not read, such as the density of pixels.
 pub(super) fn beside_pixels(picture: &Path) -> Vec<String> {
     let mut start = Vec::new();
     // What cannot be read was reported before.

@@ -48,20 +48,20 @@ const MAX_WAITING_BYTES: usize = 256 << 20;
 /// Most queued frames.
 const MAX_WAITING_FRAMES: usize = 4;
 
-/// A stream of frames as a live source.
+/// A stream of frames, such as from standard input, as a live source.
 ///
-/// Memory: up to four queued frames of at most 256 MiB in total (or a single one), and the one that is being read, of at most 1 GiB; of version 3
-/// twice. Before the first complete frame, no more than twice the bytes that arrived.
+/// Memory: up to four queued frames of at most 256 MiB in total (or a single one), and the one that is being read, of at most 1 GiB; twice of
+/// version 3. Before the first complete frame, no more than twice the bytes that arrived.
 pub struct Piped {
     queue: Arc<Queue>,
     compounding: CompoundingOptions,
 }
 
 impl Piped {
-    /// Starts to read. `probe`: the probe file to use, in preference to the probe in the stream.
+    /// Starts to read the stream on a thread. `probe`: path of the probe file to use instead of the probe in the stream.
     ///
     /// # Errors
-    /// A probe file that is not valid, a thread that cannot be started. Errors of the stream are reported as [`Event::End`].
+    /// The probe file is not valid, or the thread cannot be started. Errors of the stream are reported as [`Event::End`].
     pub fn new(reader: impl Read + Send + 'static, probe: Option<&Path>) -> Result<Piped, InputError> {
         let probe = probe.map(ProbeFile::read).transpose()?;
         let queue = Arc::new(Queue::new());
@@ -75,7 +75,7 @@ impl Piped {
         Ok(Piped { queue, compounding })
     }
 
-    /// Sets the options for pictures that have poses.
+    /// Sets the options for compounding pictures that have poses.
     pub fn compounded(mut self, compounding: CompoundingOptions) -> Piped {
         self.compounding = compounding;
         self
@@ -149,12 +149,12 @@ struct Lattice {
     origin: [f64; 3],
 }
 
-/// The first line of a stream: the properties of its frames.
+/// The header of a stream, its first line: the properties of its frames.
 pub(super) struct StreamHeader {
     pub header: Header,
     pub sample: SampleType,
     pub stamped: bool,
-    /// Frames have markers, numbers and checksums.
+    /// True if each frame has a marker, a number and a checksum (version 3).
     pub checked: bool,
     lines: usize,
     /// Equal to `lines` if frames are passed on as a whole.
@@ -162,10 +162,10 @@ pub(super) struct StreamHeader {
     pub volumes: Volumes,
 }
 
-/// What a frame consists of.
+/// The time stamp, pose and samples of a frame in a stream.
 pub(super) struct Parts<'a> {
     pub time: Option<f64>,
-    /// None: it states none; Some(None): what it states is no pose.
+    /// None: the frame states that it has no pose, or frames have none; Some(None): what it states is not a valid pose.
     pub pose: Option<Option<DAffine3>>,
     pub samples: &'a [u8],
 }
@@ -175,8 +175,10 @@ fn fault<T>(key: &str, fault: impl AsRef<str>) -> Result<T, InputError> {
 }
 
 impl StreamHeader {
+    /// Parses the first line of a stream. `probe`: the probe file to use instead of the probe in the stream.
+    ///
     /// # Errors
-    /// A line that is not a header, or frames that are too large, without a geometry, or without a range. Nothing is allocated for them.
+    /// The line is not a header, or its frames are too large, without a geometry, or without a range of values. Nothing is allocated for them.
     pub fn parse(line: &[u8], probe: Option<ProbeFile>) -> Result<StreamHeader, InputError> {
         let no_json = |e: serde_json::Error| InputError::new(Path::new(NAME), "header", e.to_string());
         let value: serde_json::Value = serde_json::from_slice(line).map_err(|e| {
@@ -255,10 +257,10 @@ impl StreamHeader {
         stamp + if self.header.posed { POSE_BYTES } else { 0 }
     }
 
-    /// Time stamp, pose and samples of a frame, from the bytes of all of these.
+    /// Splits the bytes of a frame into time stamp, pose and samples.
     ///
     /// # Errors
-    /// A time stamp that cannot be.
+    /// The time stamp is impossible.
     pub fn parts<'a>(&self, bytes: &'a [u8], stamps: &mut Stamps) -> Result<Parts<'a>, InputError> {
         let (mut time, mut pose, mut samples) = (None, None, bytes);
         if let Some((stamp, rest)) = samples.split_first_chunk().filter(|_| self.stamped) {
@@ -274,7 +276,7 @@ impl StreamHeader {
         Ok(Parts { time, pose, samples })
     }
 
-    /// The frame at an index of the stream, from 0, without samples.
+    /// The frame at an index of the stream, from 0, with its place in a volume but without samples.
     pub fn frame(&self, index: u64, time: Option<f64>) -> Frame {
         let each = self.volumes.frames as u64;
         let (volume, number) = (index / each, (index % each) as usize);
@@ -376,10 +378,10 @@ fn stream_error(field: &str, fault: impl AsRef<str>) -> InputError {
     InputError::new(Path::new(NAME), field, fault)
 }
 
-/// The first line of a stream, without its end.
+/// Reads the first line of a stream, without its line end.
 ///
 /// # Errors
-/// No end of line within the longest header, or a stream that cannot be read.
+/// There is no line end within the longest allowed header, or the stream cannot be read.
 pub(super) fn first_line(input: &mut impl BufRead) -> Result<Vec<u8>, InputError> {
     let mut line = Vec::new();
     let read = Read::take(input, MAX_HEADER_BYTES).read_until(b'\n', &mut line);

@@ -16,7 +16,7 @@ use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-/// Frames of a stream in a file.
+/// A stream of frames that was saved in a file.
 pub(super) struct PipedFile {
     path: PathBuf,
     probe_file: Option<PathBuf>,
@@ -33,15 +33,15 @@ pub(super) struct PipedFile {
 }
 
 impl PipedFile {
-    /// True if a file begins as such a stream.
+    /// True if a file that begins with these bytes is such a stream.
     pub fn is_one(start: &[u8]) -> bool {
         start.starts_with(b"{")
     }
 
-    /// Reads the first line. `probe`: the probe file to use, in preference to the probe in the stream.
+    /// Opens a file and reads its first line. `probe`: path of the probe file to use instead of the probe in the stream.
     ///
     /// # Errors
-    /// A file that cannot be read, a first line that is not a header, no whole volume.
+    /// The file cannot be read, its first line is not a header, or it has not one complete volume.
     pub fn open(path: &Path, probe: Option<&Path>) -> Result<PipedFile, InputError> {
         let unreadable = |e: std::io::Error| InputError::unreadable(path, &e);
         let file = CountedFile::open(path).map_err(unreadable)?;

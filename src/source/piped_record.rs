@@ -5,9 +5,9 @@ use crc::{CRC_32_ISO_HDLC, Crc, Table};
 
 /// What each frame begins with: no text, and damaged where line ends are changed.
 const MARKER: [u8; 8] = *b"\x89ECHOFR\n";
-/// Bytes of a frame before its stamp: marker and number.
+/// Number of bytes of a frame that precede its time stamp: marker and number.
 pub(super) const BEFORE: usize = MARKER.len() + size_of::<u64>();
-/// Bytes of a frame beside its stamp, its pose and its samples: marker, number and checksum.
+/// Number of bytes of a frame besides its time stamp, pose and samples: marker, number and checksum.
 pub(super) const OVERHEAD: usize = BEFORE + size_of::<u32>();
 /// How far a time stamp may be before that of the last frame, and behind it, s: a clock may be set, and a probe may pause.
 const MOST_BACK: f64 = 60.0;
@@ -17,30 +17,32 @@ const LATEST: f64 = 1e10;
 
 static CRC: Crc<u32, Table<16>> = Crc::<u32, Table<16>>::new(&CRC_32_ISO_HDLC);
 
-/// The number of a frame, and its stamp, pose and samples. None if these bytes are no whole frame.
+/// Checks the bytes of one frame. Returns its number, and the bytes of time stamp, pose and samples. None if the marker or the checksum is
+/// wrong.
 pub(super) fn content(record: &[u8]) -> Option<(u64, &[u8])> {
     let (body, sum) = record.strip_prefix(&MARKER)?.split_last_chunk()?;
     let (number, content) = body.split_first_chunk()?;
     (CRC.checksum(body).to_le_bytes() == *sum).then_some((u64::from_le_bytes(*number), content))
 }
 
-/// Where the next frame may begin in bytes that do not begin with one: at the next marker, or where one may be cut off. At least 1.
+/// Offset, at least 1, at which the next frame may begin in bytes that do not begin with one: that of the next marker, else of what may be the
+/// beginning of a marker at the end.
 pub(super) fn next_start(bytes: &[u8]) -> usize {
     let found = bytes.windows(MARKER.len()).skip(1).position(|window| window == MARKER);
     found.map_or_else(|| bytes.len().saturating_sub(MARKER.len() - 1).max(1), |at| at + 1)
 }
 
-/// The time stamps of a stream so far.
+/// Checks the time stamps of a stream against each other.
 #[derive(Default)]
 pub(super) struct Stamps {
     last: Option<f64>,
 }
 
 impl Stamps {
-    /// The time stamp of the next frame; NaN means none.
+    /// Checks the time stamp of the next frame, s. None if it is NaN, which means that the frame has none.
     ///
     /// # Errors
-    /// A time that cannot be: what it is and what is allowed.
+    /// The stamp is impossible after the previous one: what it is and what is allowed.
     pub(super) fn take(&mut self, stamp: f64) -> Result<Option<f64>, String> {
         if stamp.is_nan() {
             return Ok(None);

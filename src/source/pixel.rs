@@ -3,7 +3,7 @@
 use super::samples::{Replaced, store};
 use crate::{SampleType, StoredType};
 
-/// A number type of a file.
+/// A number type in which files store samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Number {
     U8,
@@ -19,7 +19,7 @@ pub(super) enum Number {
 }
 
 impl Number {
-    /// Size, bytes.
+    /// Size of one number, bytes.
     pub fn bytes(self) -> usize {
         match self {
             Number::U8 | Number::I8 => 1,
@@ -82,19 +82,19 @@ impl Number {
 /// Weights of red, green and blue in luminance (ITU-R BT.601).
 pub(super) const LUMINANCE: [f64; 3] = [0.299, 0.587, 0.114];
 
-/// How the pixels of a file are written.
+/// How a file stores its pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct PixelFormat {
     pub number: Number,
-    /// 1 (grey), 3 (red, green, blue) or 4 (and one that is not read).
+    /// Numbers of a pixel: 1 (grey), 3 (red, green, blue) or 4 (the same and one that is not read).
     pub channels: usize,
     pub big_endian: bool,
-    /// Slope and intercept of the values.
+    /// Slope and intercept by which a stored number becomes a value; None: it is the value.
     pub scale: Option<[f64; 2]>,
 }
 
 impl PixelFormat {
-    /// Grey pixels in little-endian order.
+    /// The format of pixels of one little-endian grey number.
     pub fn grey(number: Number) -> PixelFormat {
         PixelFormat { number, channels: 1, big_endian: false, scale: None }
     }
@@ -104,12 +104,12 @@ impl PixelFormat {
         self.number.bytes() * self.channels
     }
 
-    /// The type of the samples that pixels become.
+    /// The type of the samples that pixels are converted to.
     pub fn sample(&self) -> SampleType {
         if self.scale.is_some() { SampleType::F32 } else { self.number.sample() }
     }
 
-    /// What happens to the pixels, for users; None if they are read as they are.
+    /// A text for users on how pixels are converted; None if they are read unchanged.
     pub fn remark(&self) -> Option<String> {
         let name = self.number.name();
         let kept = match self.sample() {

@@ -13,7 +13,7 @@ use std::path::Path;
 /// Pairs of title and text.
 type Remarks = Vec<(String, String)>;
 
-/// What is read of the frames of a sequence, in MetaImage and in NRRD.
+/// The keys of the frames of a PLUS sequence, in MetaImage and in NRRD, and how they are treated.
 pub(super) static FRAME_KEYS: [Key; 8] = [
     Key::new("Seq_FrameN_Timestamp", Aspect::Time, Use::Used),
     Key::new("Seq_FrameN_ElementSpacing", Aspect::Geometry, Use::Used),
@@ -25,10 +25,10 @@ pub(super) static FRAME_KEYS: [Key; 8] = [
     Key::new("Seq_FrameN_FrameNumber", Aspect::About, Use::Listed),
 ];
 
-/// What the fields `Seq_FrameNNNN_...` say, by NNNN.
+/// What the fields `Seq_FrameNNNN_...` of a PLUS sequence state about its frames, by their index NNNN.
 #[derive(Default)]
 pub(super) struct PlusFrames {
-    /// Time stamps, s.
+    /// Time stamps, s, by frame; no entry if it has none.
     pub times: BTreeMap<usize, f64>,
     poses: Poses,
     /// Transforms whose status is not OK: the status may stand before its transform.
@@ -37,16 +37,16 @@ pub(super) struct PlusFrames {
     not_ok: BTreeSet<usize>,
     /// Sizes of pixels, mm.
     spacings: BTreeMap<usize, [f64; 3]>,
-    /// There is such a field: the frames are in time.
+    /// True if there is any such field, so that the frames are a series in time.
     pub is_sequence: bool,
 }
 
 impl PlusFrames {
-    /// `0012_Timestamp`, `0012_ImageStatus`, `0012_ElementSpacing`, `0012_ProbeToTrackerTransform` and its `...Status`, what follows
-    /// `Seq_Frame`. False for other fields, which are not used.
+    /// Reads a field. `key`: its name after `Seq_Frame`, for example `0012_Timestamp`, `0012_ImageStatus`, `0012_ElementSpacing`,
+    /// `0012_ProbeToTrackerTransform` and its `...Status`. Returns false for other fields, which are not used.
     ///
     /// # Errors
-    /// A time stamp that is no number, or a spacing that is none.
+    /// A time stamp that is no number, or a spacing that is no length.
     pub(super) fn field(&mut self, path: &Path, key: &str, value: &str) -> Result<bool, InputError> {
         self.is_sequence = true;
         let Some((number, field)) = key.split_once('_') else { return Ok(false) };
@@ -85,7 +85,8 @@ impl PlusFrames {
         true
     }
 
-    /// The poses whose status is OK. `slices`: of each volume; only pictures are placed by poses.
+    /// Takes the valid poses. `slices`: number of slices of a volume; with more than 1 no pose is used, because only pictures are placed by
+    /// poses.
     pub(super) fn poses(&mut self, path: &Path, slices: usize, remarks: &mut Remarks) -> Poses {
         let mut poses = std::mem::take(&mut self.poses);
         self.invalid.iter().for_each(|(name, frame)| poses.remove(name, *frame));
@@ -102,13 +103,14 @@ impl PlusFrames {
         poses
     }
 
-    /// Time stamps by frame in the file, s. `slices`: of each volume, which have the time of their volume.
+    /// Time stamp of each frame of the file, s, by index. `slices`: number of slices of a volume, which all have the time of their volume;
+    /// `frames`: number of frames.
     pub(super) fn times(&self, slices: usize, frames: usize) -> BTreeMap<usize, f64> {
         spread(&self.times, slices, frames)
     }
 
-    /// The sizes of pixels that count if frames state them, mm; `stated`: those of the header, which say less (PLUS lets the depth of a
-    /// transducer change while it records).
+    /// The pixel size that frames state, mm, which takes precedence over `stated`, that of the header, because PLUS allows the depth of a
+    /// transducer to change while it records. None if frames state none. Differences are added to `remarks`.
     pub(super) fn spacing(&self, path: &Path, stated: [f64; 3], remarks: &mut Remarks) -> Option<[f64; 3]> {
         let first = *self.spacings.values().next()?;
         // The third of pictures may be left out.
@@ -142,18 +144,18 @@ fn spacing(text: &str) -> Option<[f64; 3]> {
     }
 }
 
-/// Times of volumes as those of their slices.
+/// Gives all slices of a volume the time of the volume: times by volume in, times by frame out.
 pub(super) fn spread(times: &BTreeMap<usize, f64>, slices: usize, frames: usize) -> BTreeMap<usize, f64> {
     let volumes = frames / slices.max(1);
     times.range(..volumes).flat_map(|(volume, time)| (0..slices).map(move |n| (volume * slices + n, *time))).collect()
 }
 
-/// What a file says of its pictures, by the names of its fields.
+/// What a file of PLUS states about its pictures, with the names of the fields for messages.
 pub(super) struct PlusWords<'a> {
     pub path: &'a Path,
-    /// Field and value of the orientation, such as MF.
+    /// Name of the field of the orientation, and its value, such as MF; None if it is absent.
     pub orientation: (&'static str, Option<&'a str>),
-    /// Field and value of the kind of frames, such as BRIGHTNESS.
+    /// Name of the field of the kind of frames, and its value, such as BRIGHTNESS; None if it is absent.
     pub kind: (&'static str, Option<&'a str>),
 }
 
@@ -163,11 +165,11 @@ impl PlusWords<'_> {
         self.orientation.1.is_some_and(|word| word.starts_with('F'))
     }
 
-    /// PLUS names the axes of a frame by their direction on the transducer, the fastest one first. F is away from it, so FM is scan lines
-    /// in order and FU is scan lines from last to first. M or U as the first letter means rows of pictures.
+    /// Whether rows are scan lines. PLUS names the axes of a frame, the fastest first, by their direction on the transducer. F is away from it,
+    /// so FM means scan lines in order and FU scan lines from last to first. A first letter of M, U, A or D means rows of pictures.
     ///
     /// # Errors
-    /// Other words.
+    /// Another word.
     pub(super) fn line_order(&self) -> Result<LineOrder, InputError> {
         let (field, word) = self.orientation;
         match word {
@@ -181,10 +183,11 @@ impl PlusWords<'_> {
         }
     }
 
-    /// The volumes of a file of pictures, or why its scan lines need a probe. `size` and `volumes`: as stored.
+    /// The geometry of a file of pictures; [`StoredGeometry::Missing`] if its frames are scan lines, which need a probe. `size` and `volumes`:
+    /// as stored.
     ///
     /// # Errors
-    /// Frames that are not detected.
+    /// The frames hold undetected signals.
     pub(super) fn pictures(
         &self,
         size: [usize; 3],

@@ -9,23 +9,25 @@ use std::path::Path;
 const MAX_BYTES: u64 = 4 << 20;
 const MAX_NODES: u32 = 200_000;
 
-/// What is read of a configuration.
+/// What is read of a configuration file of the PLUS toolkit.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct PlusConfig {
-    /// The transforms of `CoordinateDefinitions`.
+    /// The constant transforms of `CoordinateDefinitions`.
     pub fixed: Vec<Calibration>,
-    /// The frames of `VolumeReconstructor`: of pictures and of the volume.
+    /// Name of the pictures' coordinate frame in `VolumeReconstructor`; `reference` is that of the volume. None if not stated.
     pub image: Option<String>,
     pub reference: Option<String>,
-    /// Clip of the volume reconstructor: first column, first row, columns, rows.
+    /// The part of each picture that the volume reconstructor uses: first column, first row, columns, rows. None: the whole picture.
     pub clip: Option<[usize; 4]>,
-    /// Spacing of voxels of the volume reconstructor, mm; the finest of the three axes.
+    /// Voxel spacing of the volume reconstructor, mm: the smallest of its three axes. None if not stated.
     pub spacing: Option<f64>,
 }
 
 impl PlusConfig {
+    /// Reads a configuration file.
+    ///
     /// # Errors
-    /// A file that cannot be read or is no XML, a transform whose name or matrix is wrong.
+    /// The file cannot be read or is no XML, or a transform has a wrong name or matrix.
     pub fn read(path: &Path) -> Result<PlusConfig, InputError> {
         let text = files::read_text(path, MAX_BYTES, "configuration").map_err(|e| InputError::new(path, "file", e))?;
         PlusConfig::parse(path, &text)

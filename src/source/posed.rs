@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 /// What is left out is reported at most so often.
 const REPORT_INTERVAL: Duration = Duration::from_secs(1);
 
-/// True if the frames are single pictures with poses.
+/// True if the frames are single pictures that have poses.
 pub(crate) fn is_posed(header: &Header) -> bool {
     header.posed && matches!(&header.forward, Geometry::Cartesian(grid) if grid.size[2] == 1)
 }
@@ -29,7 +29,7 @@ fn placed(grid: &Grid, pose: &DAffine3) -> Pose {
     Pose { to_space: *pose * own, size: [grid.size[0], grid.size[1]] }
 }
 
-/// Compounds posed pictures as they arrive. Events of other frames pass unchanged.
+/// Compounds pictures with poses into volumes as they arrive. Events of other frames pass unchanged.
 ///
 /// Memory: that of a [`Sweep`], and a copy of its samples while a volume is emitted.
 pub struct Posed {
@@ -98,8 +98,8 @@ impl Posed {
         Posed { options, sweep: None, time: None, volumes: 0, begun: None, left_out: LeftOut::default(), lost: 0 }
     }
 
-    /// Processes an event. Returns the event itself, or volumes of the pictures so far: the first event of any kind after the interval
-    /// emits a volume.
+    /// Processes an event of the source. Returns the event itself, or the events of a volume that is due: the first event of any kind after the
+    /// schedule's interval emits one.
     pub fn take(&mut self, event: Event) -> Vec<Event> {
         let mut events = Vec::new();
         match event {
@@ -130,7 +130,7 @@ impl Posed {
         events
     }
 
-    /// Number of pictures so far that are in no volume, or only partly.
+    /// Number of pictures so far that are not, or not wholly, in a volume.
     pub fn lost(&self) -> u64 {
         self.lost + self.sweep.as_ref().map_or(0, |(_, sweep)| sweep.left_out())
     }
@@ -168,7 +168,7 @@ impl Posed {
     }
 }
 
-/// Posed pictures of a file.
+/// The pictures of a file whose frames state their poses.
 pub(super) struct PosedPictures {
     pictures: Box<dyn Source>,
     grid: Grid,
@@ -189,21 +189,21 @@ impl PlacedPictures for PosedPictures {
     }
 }
 
-/// A freehand volume of posed pictures.
+/// A freehand volume from pictures that state their poses.
 pub(super) type PosedVolume = FreehandFile<PosedPictures>;
 
-/// What the frames of a file are.
+/// The frames of an opened file: as stored, or compounded into a freehand volume.
 pub(super) enum Opened {
     Volume(Box<PosedVolume>),
     Frames(Box<dyn Source>),
 }
 
 impl Opened {
-    /// Posed pictures as one freehand volume; other frames unchanged. Pictures of one place are no sweep but a series in time, and stay what
-    /// they are. All pictures are read once for their poses.
+    /// Makes one freehand volume of pictures with poses; other frames stay unchanged. Pictures that all have the same pose are a series in time
+    /// and stay unchanged, too. All pictures are read once for their poses.
     ///
     /// # Errors
-    /// A file that cannot be read, no picture with a pose, arguments for a freehand volume where there is none.
+    /// The file cannot be read, no picture has a pose, or arguments for a freehand volume are given where there is none.
     pub fn new(path: &Path, mut frames: Box<dyn Source>, said: FreehandArguments) -> Result<Opened, InputError> {
         let header = frames.header();
         let grid = match &header.forward {
@@ -238,7 +238,7 @@ impl Opened {
         }
     }
 
-    /// A description for users. `of_frames`: that of the frames.
+    /// A description for users. `of_frames`: the description of the stored frames.
     pub fn description(&self, of_frames: Vec<(String, String)>) -> Vec<(String, String)> {
         let Opened::Volume(volume) = self else { return of_frames };
         let format = of_frames.iter().find(|(title, _)| title == "format").map_or("frames", |(_, format)| format);

@@ -51,7 +51,7 @@ const MAX_HEADER_BYTES: u32 = 16 << 20;
 
 static CRC: Crc<u32, Table<16>> = Crc::<u32, Table<16>>::new(&CRC_32_ISO_HDLC);
 
-/// Writes a `.frames` file. Without [`Writer::finish`] it has no index, but can still be read.
+/// Writes a `.frames` file. Without [`Writer::finish`] the file has no index, but can still be read.
 pub struct Writer {
     path: PathBuf,
     file: File,
@@ -66,10 +66,10 @@ pub struct Writer {
 }
 
 impl Writer {
-    /// Creates a file. An existing one is not overwritten.
+    /// Creates a file, and never overwrites one.
     ///
     /// # Errors
-    /// A header that is not valid, a file that exists or cannot be created.
+    /// The header is not valid, or the file exists or cannot be created.
     pub fn create(path: &Path, header: Header) -> Result<Writer, InputError> {
         header.check().map_err(|(field, fault)| InputError::new(path, field, fault))?;
         let text = serde_json::to_vec(&header).map_err(|e| InputError::new(path, "header", e.to_string()))?;
@@ -100,11 +100,11 @@ impl Writer {
         }
     }
 
-    /// Appends a frame that arrived at `arrived` s, on the recorder's clock. When this returns, the operating system has the frame, and
-    /// earlier volumes are on the disk.
+    /// Appends a frame that arrived at `arrived` s on the recorder's clock. When this returns, the operating system has the frame, and earlier
+    /// volumes are on the disk.
     ///
     /// # Errors
-    /// A frame whose size or slice does not fit the header, a full disk. Earlier frames are kept, and the next one may succeed.
+    /// The size or the slice of the frame does not fit the header, or the disk is full. Earlier frames are kept, and the next call may succeed.
     pub fn frame(&mut self, frame: &Frame, arrived: f64) -> Result<(), InputError> {
         let fault = |field: &str, fault: String| Err(InputError::new(&self.path, field, fault));
         let expected = self.header.frame_bytes().unwrap_or(0);
@@ -147,21 +147,21 @@ impl Writer {
         }
     }
 
-    /// Removes the incomplete file.
+    /// Deletes the file.
     pub fn discard(self) {
         // If it cannot be removed, nothing else can be done.
         let _ = std::fs::remove_file(&self.path);
     }
 
-    /// Number of frames so far.
+    /// Number of frames written so far.
     pub fn frames(&self) -> usize {
         self.index.len()
     }
 
-    /// Writes the index and synchronises the file to the disk.
+    /// Writes the index and flushes the file to the disk.
     ///
     /// # Errors
-    /// A full disk. The file then has no index.
+    /// The disk is full. The file then has no index.
     pub fn finish(mut self) -> Result<(), InputError> {
         let offset = self.at;
         self.frame.clear();
@@ -201,7 +201,7 @@ const MAX_ENTRIES: u64 = 1 << 24;
 /// After so many bytes without a valid frame, the search ends.
 const MAX_GAP: u64 = 1 << 30;
 
-/// Reads a `.frames` file.
+/// Reads a `.frames` file frame by frame.
 pub struct Reader {
     path: PathBuf,
     file: CountedFile,
@@ -218,7 +218,7 @@ pub struct Reader {
 }
 
 impl Reader {
-    /// True if a file begins as a `.frames` file.
+    /// True if a file that begins with these bytes is a `.frames` file.
     pub fn is_one(start: &[u8]) -> bool {
         start.starts_with(MAGIC)
     }
@@ -287,7 +287,7 @@ impl Reader {
         Ok(replay)
     }
 
-    /// What all frames have in common.
+    /// The properties that all frames have in common.
     pub fn header(&self) -> &Header {
         &self.header
     }
@@ -302,7 +302,7 @@ impl Reader {
         self.damaged
     }
 
-    /// Bytes at the end that are not a complete frame.
+    /// Number of bytes at the end of the file that are not a complete frame.
     pub fn lost(&self) -> u64 {
         self.lost
     }
@@ -312,7 +312,7 @@ impl Reader {
         self.rebuilt
     }
 
-    /// When the last frame that was returned had arrived, s on the recorder's clock.
+    /// Time of arrival of the last frame that was returned, s on the recorder's clock.
     pub fn arrived(&self) -> f64 {
         self.arrived
     }

@@ -20,7 +20,7 @@ use std::collections::BTreeMap;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// A recorded file that is read frame by frame.
+/// A recorded file whose frames are read one by one.
 pub struct Recording {
     path: PathBuf,
     layout: Layout,
@@ -50,7 +50,7 @@ enum Placement {
 }
 
 impl Recording {
-    /// As [`Recording::open_with`], with the stored order of axes.
+    /// Opens a recording with default options: see [`Recording::open_with`]. `probe`: path of the probe file.
     ///
     /// # Errors
     /// As [`Recording::open_with`].
@@ -126,18 +126,18 @@ impl Recording {
         Ok(recording)
     }
 
-    /// The file format: "MetaImage", "PLUS sequence", "MetaImage pre-scan sweep", "Kretz volume", "NRRD", "NIfTI" or
-    /// "stack of pictures".
+    /// Name of the file format, for users, such as "MetaImage", "PLUS sequence", "Kretz volume" or "stack of pictures".
     pub fn format(&self) -> &'static str {
         self.layout.format
     }
 
-    /// The transforms of tracked frames, by their index in the file.
+    /// The transforms of tracked frames, by the name of the transform and the index of the frame in the file.
     pub(super) fn poses(&self) -> &Poses {
         &self.layout.poses
     }
 
-    /// Says that tracked pictures stay single ones, and what makes a volume of them: otherwise a picture of the first passes for the sweep.
+    /// Logs, if pictures are tracked, that they are shown as single pictures, and which options make a volume of them. Without the warning the
+    /// first picture could be taken for the sweep.
     pub(super) fn warn_of_tracking(&self) {
         let is_single = self.frames_per_volume() == 1 && self.volumes() > 1;
         if let Some((_, how)) = self.poses().remark().filter(|_| is_single) {
@@ -146,7 +146,7 @@ impl Recording {
         }
     }
 
-    /// Number of all frames, including those after the last complete volume.
+    /// Number of all frames in the file, including those after the last complete volume.
     pub fn frames_in_file(&self) -> usize {
         self.layout.frames
     }
@@ -242,7 +242,7 @@ impl Recording {
         rows
     }
 
-    /// Keys that the file states and that were not used.
+    /// Names of keys that the file states and that were not used.
     pub fn unused(&self) -> &Unused {
         &self.layout.unused
     }

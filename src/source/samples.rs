@@ -2,12 +2,12 @@
 
 use crate::probe::{SampleType, StoredType};
 
-/// Number of samples that were replaced by 0.
+/// Numbers of samples that were replaced by 0, by the reason.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Replaced {
-    /// NaN or infinite.
+    /// Number of samples that were NaN or infinite.
     pub not_finite: u64,
-    /// Denormal f32. Many GPUs flush them to 0, so they are always flushed.
+    /// Number of samples that were denormal f32. Many GPUs treat these as 0, so that they are always replaced.
     pub denormal: u64,
 }
 
@@ -18,7 +18,7 @@ impl std::ops::AddAssign for Replaced {
     }
 }
 
-/// Converts the bytes of a file to stored samples, in place. Bytes after the last complete sample are not changed.
+/// Converts the samples of a file to stored samples, in place. Bytes after the last complete sample are not changed.
 pub(super) fn store(sample: SampleType, big_endian: bool, bytes: &mut [u8]) -> Replaced {
     let mut replaced = Replaced::default();
     match sample {
@@ -51,7 +51,7 @@ pub(super) fn store(sample: SampleType, big_endian: bool, bytes: &mut [u8]) -> R
     replaced
 }
 
-/// Extends `range` to the smallest and largest stored sample.
+/// Extends `range` (smallest, largest) so that it contains all stored samples in `bytes`.
 pub(super) fn widen(range: &mut [f64; 2], stored: StoredType, bytes: &[u8]) {
     fn span<const N: usize, T: PartialOrd + Copy>(
         bytes: &[u8],
@@ -73,7 +73,7 @@ pub(super) fn widen(range: &mut [f64; 2], stored: StoredType, bytes: &[u8]) {
     }
 }
 
-/// A range that is not empty. Constant data get a range of 1 above their value, or of as much as f32 can distinguish.
+/// The range, made wider if it is empty: that of constant data becomes 1 wide, or as wide as f32 can distinguish.
 pub(super) fn not_empty([low, high]: [f64; 2]) -> [f64; 2] {
     match low < high {
         true => [low, high],

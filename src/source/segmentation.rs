@@ -17,7 +17,7 @@ use std::path::Path;
 /// The end of a file's name.
 const ENDING: &str = ".seg.nrrd";
 
-/// A label of a volume, its name, and the colour that it is shown in: red, green, blue, 0..=1.
+/// A segment of a label volume: its label, its name, and its colour (red, green, blue, 0..=1).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Segment {
     pub label: u8,
@@ -30,24 +30,25 @@ pub fn is_one(path: &Path) -> bool {
     stem(path).is_some()
 }
 
-/// The name of a segmentation's file without its ending.
+/// The name of a segmentation's file without the ending `.seg.nrrd`; None if it has another ending.
 pub fn stem(path: &Path) -> Option<String> {
     volume_file::stem(path, ENDING)
 }
 
-/// The segments that the header of such a file states, in their order; none of another NRRD. The labels of the voxels are its samples.
+/// The segments that the header of a segmentation states, in their order; none for another NRRD file. The samples of the file are the labels of
+/// its voxels.
 ///
 /// # Errors
-/// A file that cannot be read, or states a label that is no number of 8 bits.
+/// The file cannot be read, or states a label that is no number of 8 bits.
 pub fn segments(path: &Path) -> Result<Vec<Segment>, InputError> {
     let segment = |(label, name, colour): (u8, String, [f64; 3])| Segment { label, name: name.into(), colour };
     Ok(nrrd::segments(path)?.into_iter().map(segment).collect())
 }
 
-/// Writes the label of each voxel of a lattice. Label 0 is no segment. `each` is called after every slice.
+/// Writes a segmentation on a grid. `label` gives the label of a voxel index; 0 is in no segment. `each` is called after every slice.
 ///
 /// # Errors
-/// A full disk, a folder that cannot be written.
+/// The disk is full, or the folder cannot be written.
 pub fn write(
     path: &Path,
     grid: &Grid,

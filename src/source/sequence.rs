@@ -8,13 +8,13 @@ use crate::probe::{Geometry, ProbeFile, Volumes};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-/// Most frames of one file. Their time stamps are in its header, of which readers accept 1 MiB.
+/// Largest number of frames of a file. Their time stamps are in its header, of which readers accept 1 MiB.
 pub(super) const MAX_FRAMES: usize = 20_000;
 const MAX_HEADER_BYTES: usize = 1 << 20;
-/// The field for remarks of a MetaImage.
+/// Name of the MetaImage field for remarks.
 pub(super) const COMMENT: &str = "Comment";
 
-/// A selection of the volumes of a source that a sequence can represent.
+/// The volumes of a source that are written as a PLUS sequence.
 pub struct Sequence {
     kept: Vec<CompleteVolume>,
     left_out: usize,
@@ -24,7 +24,7 @@ pub struct Sequence {
     probe: String,
 }
 
-/// The path of the probe file of a sequence.
+/// The path of the probe file that belongs to a sequence.
 pub fn probe_file_path(path: &Path) -> PathBuf {
     let mut name = path.file_stem().unwrap_or_default().to_os_string();
     name.push(".probe.toml");
@@ -32,10 +32,10 @@ pub fn probe_file_path(path: &Path) -> PathBuf {
 }
 
 impl Sequence {
-    /// Reads a source once to find its complete volumes, whose number goes into the header. `path`: the source, for messages.
+    /// Reads a source once to find its complete volumes, whose number goes into the header. `path`: that of the source, for messages.
     ///
     /// # Errors
-    /// A source that is not a sweep or has no complete volume, too many frames, a probe that no probe file can describe.
+    /// The source is not a sweep or has no complete volume, there are too many frames, or no probe file can describe the probe.
     pub fn of(source: &mut dyn Source, path: &Path) -> Result<Sequence, InputError> {
         let fault = |field: &str, fault: String| InputError::new(path, field, fault);
         let (kept, left_out) = choose(source, path)?;
@@ -65,25 +65,25 @@ impl Sequence {
         Ok(Sequence { kept, left_out, frames, header, probe: text })
     }
 
-    /// Number of volumes.
+    /// Number of volumes that are written.
     pub fn volumes(&self) -> usize {
         self.kept.len()
     }
 
-    /// Number of frames.
+    /// Number of frames that are written.
     pub fn frames(&self) -> usize {
         self.kept.len() * self.frames
     }
 
-    /// Number of volumes that are left out: with missing frames, or with the direction of the previous one although directions alternate.
+    /// Number of volumes that are not written: frames are missing, or two in a row have the same direction although directions alternate.
     pub fn left_out(&self) -> usize {
         self.left_out
     }
 
-    /// Writes the frames of the same source, in order of acquisition. `each` is called after every volume.
+    /// Writes the frames of the source that was given to [`Sequence::of`], in order of acquisition. `each` is called after every volume.
     ///
     /// # Errors
-    /// A source that cannot be read any more, an extension other than .mha, a full disk. No file is left then.
+    /// The source can no longer be read, the extension is not .mha, or the disk is full. No file is left then.
     pub fn write(&self, source: &mut dyn Source, path: &Path, each: impl Fn()) -> Result<(), InputError> {
         write_both(path, &self.header, &self.probe, |file| {
             for volume in &self.kept {
@@ -153,12 +153,12 @@ fn volume(source: &mut dyn Source, place: usize) -> Result<Option<CompleteVolume
     Ok(kept)
 }
 
-/// The line that says that a sequence is of the phantom; empty if it is not.
+/// The header line that says that a sequence is of the phantom; empty if it is not.
 pub(super) fn comment(is_synthetic: bool) -> String {
     if is_synthetic { format!("{COMMENT} = {DEMO_DATA}\n") } else { String::new() }
 }
 
-/// The header of a PLUS sequence. `more`: additional lines. `times`: time stamps by frame, s.
+/// The header of a PLUS sequence. `more`: additional lines. `times`: index and time stamp, s, of each frame.
 pub(super) fn header(
     [samples, lines, frames]: [usize; 3],
     sample: SampleType,
@@ -182,7 +182,10 @@ fn unwritable(path: &Path) -> impl Fn(io::Error) -> InputError {
     move |e| InputError::unwritable(path, &e)
 }
 
-/// Writes the sequence and its probe file: both or neither.
+/// Writes a sequence and its probe file: either both are written or neither. `samples` writes the samples after the header.
+///
+/// # Errors
+/// One line that names the file: its extension is wrong, or it cannot be written.
 pub(super) fn write_both(
     path: &Path,
     header: &str,

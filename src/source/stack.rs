@@ -23,7 +23,7 @@ const MAX_PROBE_BYTES: u64 = 1 << 20;
 const NO_SPACING: &str =
     "pictures do not say how large they are: give --voxel-spacing X,Y,Z (mm), or --probe for scan lines";
 
-/// True if a path stands for several pictures: it is a folder, or a pattern that is no file itself.
+/// True if a path stands for several pictures: it is a folder, or a pattern of names and no existing file.
 pub(super) fn is_meant(path: &Path) -> bool {
     path.is_dir() || (pattern(path).is_some() && !path.exists())
 }
@@ -33,10 +33,10 @@ fn pattern(path: &Path) -> Option<String> {
     path.file_name().and_then(|name| name.to_str()).filter(|name| name.contains(['*', '?'])).map(str::to_string)
 }
 
-/// Reads the sizes of all pictures, and none of their pixels.
+/// Reads the layout of a stack of pictures: the headers of all pictures, and none of their pixels.
 ///
 /// # Errors
-/// No pictures, names that are not numbered evenly, pictures of several sizes or depths, a picture that cannot be read.
+/// There are no pictures, their names are not numbered evenly, they differ in size or depth, or one cannot be read.
 pub(super) fn read(path: &Path, options: &OpenOptions) -> Result<Layout, InputError> {
     let fault = |field: &str, fault: String| InputError::new(path, field, fault);
     let (folder, names) = list(path)?;

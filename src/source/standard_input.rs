@@ -22,20 +22,20 @@ fn kept() -> MutexGuard<'static, Option<Spool>> {
     KEPT.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// True if a path stands for standard input.
+/// True if a path stands for standard input: `-`.
 pub(super) fn is_meant(path: &Path) -> bool {
     path.as_os_str() == "-"
 }
 
-/// Removes the temporary file. Sources that are still open fail afterwards.
+/// Deletes the temporary file with the content of standard input. Sources that still read it fail afterwards.
 pub fn forget() {
     kept().take();
 }
 
-/// The file with the bytes of standard input, which is read to its end the first time if it begins as a recording does.
+/// Path of a temporary file with the content of standard input. The first call reads it to its end, provided that it begins as a recording does.
 ///
 /// # Errors
-/// Standard input is a terminal, cannot be read, begins as no recording does, or does not fit on the disk.
+/// Standard input is a terminal, cannot be read, does not begin as a recording, or does not fit on the disk.
 pub(super) fn file() -> Result<PathBuf, InputError> {
     let mut kept = kept();
     if let Some(spool) = &*kept {
@@ -61,12 +61,12 @@ pub(super) fn file() -> Result<PathBuf, InputError> {
     Ok(path)
 }
 
-/// An error of the file of [`file`] as one of standard input.
+/// The same error with standard input named in place of the temporary file of [`file`].
 pub(super) fn renamed(error: InputError) -> InputError {
     error.renamed(NAME)
 }
 
-/// A source that reads what was kept.
+/// A source that reads the temporary file of [`file`]; its errors name standard input.
 pub(super) struct FromInput(pub Box<dyn Source>);
 
 impl Source for FromInput {

@@ -16,12 +16,12 @@ use std::path::{Path, PathBuf};
 const IMAGE: &str = "Image";
 const REFERENCES: [&str; 3] = ["Reference", "Tracker", "World"];
 
-/// True if a user says how pictures are tracked.
+/// True if the options say how tracked pictures become a volume.
 pub(super) fn is_asked_for(options: &OpenOptions) -> bool {
     options.plus_config.is_some() || !options.calibration.is_empty() || options.reference.is_some()
 }
 
-/// Pictures with the places that a chain of transforms gives them.
+/// Tracked pictures with the poses that a chain of transforms gives them.
 pub(super) struct Tracked {
     pictures: Recording,
     config: Option<PathBuf>,
@@ -35,10 +35,10 @@ pub(super) struct Tracked {
 pub(super) type TrackedVolume = FreehandFile<Tracked>;
 
 impl TrackedVolume {
-    /// Places all pictures of a recording. No picture is read yet.
+    /// Computes the poses of all pictures of a recording. No picture is read yet.
     ///
     /// # Errors
-    /// A recording without poses, a configuration that cannot be read, no chain of transforms, no picture with a pose.
+    /// The recording has no poses, the configuration cannot be read, there is no chain of transforms, or no picture has a pose.
     pub fn new(path: &Path, pictures: Recording, options: &OpenOptions) -> Result<TrackedVolume, InputError> {
         let fault = |field: &str, fault: String| InputError::new(path, field, fault);
         let flag = match (options.plus_config, options.calibration) {
@@ -96,7 +96,7 @@ impl TrackedVolume {
         self.describe(pictures.format(), placed, to)
     }
 
-    /// Keys that the file states and that were not used.
+    /// Names of keys that the file states and that were not used.
     pub fn unused(&self) -> &Unused {
         self.placed().pictures.unused()
     }

@@ -7,12 +7,12 @@ use glam::{DMat4, DVec4};
 use std::collections::{BTreeMap, VecDeque};
 use std::str::FromStr;
 
-/// Where to find a calibration, for messages.
+/// Advice for users in messages: how to give the calibration of tracked pictures.
 pub(super) const HOW: &str = "give the calibration: --plus-config FILE.xml, or --calibration ImageToProbe=16 numbers";
 /// Most names of transforms in a file.
 const MAX_NAMES: usize = 256;
 
-/// The names of the two coordinate frames of a transform.
+/// The name of a transform: the coordinate frames that it maps from and to, such as `ImageToProbe`.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct TransformName {
     pub from: String,
@@ -57,10 +57,10 @@ impl FromStr for Calibration {
     }
 }
 
-/// A matrix of 16 numbers, or 12 without the last row, row by row.
+/// Parses a matrix of 16 numbers, or of 12 without the last row, row by row.
 ///
 /// # Errors
-/// One line: another number of them, one that is not finite, a last row that is not 0 0 0 1, a matrix that has no inverse.
+/// One line: another number of them, one that is not finite, a last row that is not 0 0 0 1, or a matrix that has no inverse.
 pub(super) fn matrix(text: &str) -> Result<DMat4, String> {
     let words: Vec<&str> =
         text.split(|c: char| c.is_whitespace() || c == ',').filter(|word| !word.is_empty()).collect();
@@ -87,40 +87,40 @@ pub(super) fn matrix(text: &str) -> Result<DMat4, String> {
     Ok(matrix)
 }
 
-/// The transforms that differ from picture to picture: by name, and by the index of the picture. What is not valid is not there.
+/// The transforms that differ from picture to picture, by name and by the index of the picture. Invalid ones have no entry.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Poses {
     pub by_name: BTreeMap<TransformName, BTreeMap<usize, DMat4>>,
 }
 
 impl Poses {
-    /// Adds the transform of this name for a picture. Beyond the largest number of names it is left out.
+    /// Adds the transform of this name for a picture. It is ignored if there are too many names already.
     pub fn add(&mut self, name: TransformName, picture: usize, matrix: DMat4) {
         if self.by_name.len() < MAX_NAMES || self.by_name.contains_key(&name) {
             self.by_name.entry(name).or_default().insert(picture, matrix);
         }
     }
 
-    /// Removes a transform whose status is not OK.
+    /// Removes a picture's transform, because its status is not OK.
     pub fn remove(&mut self, name: &TransformName, picture: usize) {
         if let Some(pictures) = self.by_name.get_mut(name) {
             pictures.remove(&picture);
         }
     }
 
-    /// How the pictures are tracked and how they become a volume, for users. None if they are not tracked.
+    /// A row for users: by which transforms the pictures are tracked, and how to make a volume of them. None if they are not tracked.
     pub fn remark(&self) -> Option<(String, String)> {
         let is_there = !self.by_name.is_empty();
         is_there.then(|| ("tracking".into(), format!("{}; for a freehand volume {HOW}", self.names())))
     }
 
-    /// The names, for users.
+    /// The names of the transforms, separated by commas.
     pub fn names(&self) -> String {
         self.by_name.keys().map(TransformName::to_string).collect::<Vec<_>>().join(", ")
     }
 }
 
-/// A chain of transforms from one frame to another.
+/// A chain of transforms from one coordinate frame to another.
 pub(super) struct Chain<'a> {
     links: Vec<(Link<'a>, bool)>,
 }
@@ -133,7 +133,8 @@ enum Link<'a> {
 }
 
 impl<'a> Chain<'a> {
-    /// The shortest chain. A pose takes the place of a constant transform of the same name. None if there is no chain.
+    /// The shortest chain of `poses` and constant transforms (`fixed`) from one coordinate frame to another. A pose takes precedence over a
+    /// constant transform of the same name. None if there is no chain.
     pub fn find(poses: &'a Poses, fixed: &'a [Calibration], from: &str, to: &str) -> Option<Chain<'a>> {
         let mut edges: Vec<(&TransformName, Link)> =
             poses.by_name.iter().map(|(name, matrices)| (name, Link::Pose(matrices))).collect();
@@ -165,7 +166,7 @@ impl<'a> Chain<'a> {
         Some(Chain { links })
     }
 
-    /// The transform of a picture; None if one of its poses is not valid.
+    /// The map along the whole chain for the picture with this index; None if one of its poses is missing.
     pub fn of(&self, picture: usize) -> Option<DMat4> {
         let mut all = DMat4::IDENTITY;
         for (link, backwards) in &self.links {

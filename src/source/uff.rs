@@ -18,7 +18,7 @@ use hdf5_reader::group::Group;
 use hdf5_reader::{DEFAULT_CHUNK_CACHE_SLOTS, Dataset, Hdf5File, OpenOptions, SliceInfo, SliceInfoElem};
 use std::path::{Path, PathBuf};
 
-/// What is read of a group of beamformed data, and of what else stands in it what could change a picture.
+/// The keys of a group of beamformed data, and how they are treated, among them those that could change a picture and are not read.
 pub(super) static KEYS: [Key; 12] = [
     Key::new("data", Aspect::Storage, Use::Used),
     Key::new("scan", Aspect::Geometry, Use::Used),
@@ -52,7 +52,7 @@ const SHOWN: [f64; 2] = [-60.0, 0.0];
 /// What is stored for an amplitude of 0 and everything below, dB.
 const FLOOR: f64 = -200.0;
 
-/// Beamformed data as volumes.
+/// The beamformed data of a UFF file as a source of volumes.
 ///
 /// Memory: a frame, twice; a chunk, three times while it is unpacked (at most 1 GiB each); and a cache of chunks (64 MiB, or what a pass over
 /// the frames needs, at most 2 GiB).
@@ -115,11 +115,11 @@ enum Scale {
 }
 
 impl Beamformed {
-    /// Opens a file and reads its numbers once, for the largest.
+    /// Opens a file, and reads all of its samples once to find the largest.
     ///
     /// # Errors
-    /// A file that cannot be read, holds no beamformed data, or holds data that are not of one scan of a kind that is read; data of more bytes
-    /// than the file can hold; chunks that are too large.
+    /// The file cannot be read, holds no beamformed data, or data that are not of one scan of a kind that is read; it states more bytes than it
+    /// can hold; or its chunks are too large.
     pub fn open(path: &Path) -> Result<Beamformed, InputError> {
         Beamformed::open_within(path, CACHE)
     }
@@ -206,7 +206,7 @@ impl Beamformed {
         rows
     }
 
-    /// Names of the objects beside the data that are not used.
+    /// Names of the objects in the file, besides the data, that are not used.
     pub fn unused(&self) -> &Unused {
         &self.unused
     }

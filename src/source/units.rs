@@ -38,12 +38,12 @@ const NAMED_TIMES: [(&[&str], f64); 3] =
 const PREFIXES: [(&str, f64); 7] =
     [("", 1.0), ("kilo", 1e3), ("deci", 0.1), ("centi", 1e-2), ("milli", 1e-3), ("micro", 1e-6), ("nano", 1e-9)];
 
-/// How many mm a unit is; None if it is no known unit of length.
+/// Number of mm in a unit; None if it is no known unit of length.
 pub(super) fn millimetres(unit: &str) -> Option<f64> {
     find(unit, &LENGTHS, &NAMED_LENGTHS)
 }
 
-/// How many seconds a unit is; None if it is no known unit of time.
+/// Number of seconds in a unit; None if it is no known unit of time.
 pub(super) fn seconds(unit: &str) -> Option<f64> {
     find(unit, &TIMES, &NAMED_TIMES)
 }

@@ -24,7 +24,7 @@ struct Bin {
     high: f32,
 }
 
-/// Collects the samples of a file, frame by frame.
+/// Determines the range of the samples of a file, frame by frame, without outliers.
 pub(super) struct ValueRange {
     stored: StoredType,
     full: [f64; 2],
@@ -32,19 +32,20 @@ pub(super) struct ValueRange {
     bins: Vec<Bin>,
 }
 
-/// The result: two rising values.
+/// The range of the samples of a file, and how many lie outside of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Measured {
     pub range: [f64; 2],
-    /// Number of samples outside of `range`, and of all samples. Both 0 if samples are not f32.
+    /// Number of samples outside of `range`; `of` is the number of all samples. Both are 0 if samples are not f32.
     pub beyond: u64,
     pub of: u64,
-    /// Smallest and largest sample.
+    /// Smallest and largest sample, outliers included.
     pub full: [f64; 2],
 }
 
 impl Measured {
-    /// What a user must know if samples are clamped to the range: it, their share, and the setting that decides instead.
+    /// A warning for users that outliers are clamped: the range, their share, and the setting that sets another range. None if there are no
+    /// outliers.
     pub(super) fn remark(&self) -> Option<String> {
         let ([low, high], [smallest, largest]) = (self.range.map(number), self.full.map(number));
         let share = 100.0 * self.beyond as f64 / self.of.max(1) as f64;
@@ -64,7 +65,7 @@ impl ValueRange {
         ValueRange { stored, full: [f64::INFINITY, f64::NEG_INFINITY], bins: vec![empty; bins] }
     }
 
-    /// Takes the stored samples of a frame; f32 are finite.
+    /// Adds the stored samples of a frame; those of f32 must be finite.
     pub(super) fn take(&mut self, bytes: &[u8]) {
         if self.stored != StoredType::F32 {
             widen(&mut self.full, self.stored, bytes);

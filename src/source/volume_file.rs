@@ -19,7 +19,7 @@ pub enum VolumeFile {
     Nrrd,
     /// NIfTI-1 with header and samples in one file (.nii), or the same packed by gzip (.nii.gz).
     Nifti { packed: bool },
-    /// DICOM (.dcm): an Enhanced US Volume, or a secondary capture of slices of 8 bits.
+    /// DICOM (.dcm): an Enhanced US Volume, or with `capture` a secondary capture of slices of 8 bits.
     Dicom { capture: bool },
 }
 
@@ -27,10 +27,10 @@ pub enum VolumeFile {
 const NIFTI_OFFSET: usize = 352;
 
 impl VolumeFile {
-    /// The format for the extension of a file name.
+    /// The format that the extension of a file name stands for.
     ///
     /// # Errors
-    /// Another extension.
+    /// The extension belongs to no format.
     pub fn of(path: &Path) -> Result<VolumeFile, InputError> {
         let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
         let formats = [
@@ -56,7 +56,7 @@ impl VolumeFile {
         }
     }
 
-    /// Most voxels along an axis.
+    /// Largest number of voxels along an axis that the format can hold.
     pub(super) fn most_along_axis(self) -> usize {
         match self {
             VolumeFile::Nifti { .. } => i16::MAX as usize,
@@ -65,10 +65,10 @@ impl VolumeFile {
         }
     }
 
-    /// Checks that the format holds so many samples of this type.
+    /// Checks that the format can hold a volume of `size` voxels with samples of this type.
     ///
     /// # Errors
-    /// One line: samples or a length that DICOM does not hold.
+    /// One line: DICOM cannot hold samples of this type, or so many bytes.
     pub(super) fn check(self, size: [usize; 3], sample: SampleType) -> Result<(), String> {
         let VolumeFile::Dicom { capture } = self else { return Ok(()) };
         let bytes = size.iter().fold(sample.bytes() as u64, |all, n| all.saturating_mul(*n as u64));
@@ -87,7 +87,10 @@ impl VolumeFile {
         Ok(())
     }
 
-    /// Begins a file: its header.
+    /// Creates a file and writes its header. `world`: map from the voxels to the world.
+    ///
+    /// # Errors
+    /// Those of writing.
     pub(super) fn create(
         self,
         path: &Path,
@@ -121,17 +124,17 @@ impl VolumeFile {
     }
 }
 
-/// The end of the name of a sequence of volumes.
+/// File name ending of a sequence of volumes.
 pub(super) const SEQUENCE: &str = ".seq.nrrd";
 
-/// The name of a file without an ending in any case; None if it has another one.
+/// The file name without `ending`, which may be in upper or lower case. None if the name has another ending.
 pub(super) fn stem(path: &Path, ending: &str) -> Option<String> {
     let name = path.file_name()?.to_string_lossy();
     let at = name.len().checked_sub(ending.len())?;
     name.get(at..)?.eq_ignore_ascii_case(ending).then(|| name[..at].into())
 }
 
-/// Three numbers, without negative zeros.
+/// Three numbers as text, separated by `between`; negative zeros become 0.
 pub(super) fn three(v: DVec3, between: &str) -> String {
     v.to_array().map(|n| (n + 0.0).to_string()).join(between)
 }
@@ -153,7 +156,8 @@ fn nrrd(size: [usize; 3], world: &World, sample: SampleType) -> String {
     format!("{}encoding: raw\n\n", nrrd_start(size, world, sample, None))
 }
 
-/// An NRRD header without its encoding and its end. `volumes`: their number, the slowest axis, which is a list.
+/// The beginning of an NRRD header, up to its encoding. `volumes`: number of volumes of a sequence, which are the slowest axis; None for a
+/// single volume.
 pub(super) fn nrrd_start(size: [usize; 3], world: &World, sample: SampleType, volumes: Option<usize>) -> String {
     let kind = match sample {
         SampleType::U8 => "uint8",
@@ -169,7 +173,7 @@ pub(super) fn nrrd_start(size: [usize; 3], world: &World, sample: SampleType, vo
     )
 }
 
-/// The fields of an NRRD header that say where the voxels are.
+/// The fields of an NRRD header that state the axes and the origin of the voxels in the world. `volumes`: as for [`nrrd_start`].
 pub(super) fn nrrd_axes([x, y, z]: [usize; 3], world: &World, volumes: Option<usize>) -> String {
     let [size, direction, kind] = match volumes {
         Some(count) => [format!(" {count}"), " none".into(), " list".into()],
@@ -232,7 +236,10 @@ pub(super) enum VolumeWriter {
 }
 
 impl VolumeWriter {
-    /// Puts the complete file in its place.
+    /// Renames the complete file to its target.
+    ///
+    /// # Errors
+    /// Those of writing.
     pub fn finish(self) -> io::Result<()> {
         let mut file = match self {
             VolumeWriter::Plain(file) => file,

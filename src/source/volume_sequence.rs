@@ -16,7 +16,7 @@ pub fn is_one(path: &Path) -> bool {
     stem(path, SEQUENCE).is_some()
 }
 
-/// The complete volumes among a range of volumes of a source.
+/// The complete volumes of a source that are written to a sequence file.
 pub struct VolumeSequence {
     kept: Vec<Whole>,
     left_out: usize,
@@ -35,11 +35,11 @@ struct Whole {
 }
 
 impl VolumeSequence {
-    /// Reads these volumes of a source once, to find which are complete and when they were acquired: that goes before the samples. `path`:
-    /// the source, for messages.
+    /// Reads these volumes of a source once, to find which are complete and when they were acquired, because the header of the file states that.
+    /// `path`: that of the source, for messages.
     ///
     /// # Errors
-    /// A source that cannot be read, no complete volume, volumes that lie elsewhere than the first.
+    /// The source cannot be read, no volume is complete, or volumes have different geometries or poses.
     pub fn of(source: &mut dyn Source, volumes: Range<usize>, path: &Path) -> Result<VolumeSequence, InputError> {
         let fault = |fault: String| InputError::new(path, "volumes", fault);
         let mut kept: Vec<Whole> = Vec::new();
@@ -70,30 +70,30 @@ impl VolumeSequence {
         Ok(VolumeSequence { kept, left_out, times })
     }
 
-    /// Number of volumes.
+    /// Number of complete volumes.
     pub fn volumes(&self) -> usize {
         self.kept.len()
     }
 
-    /// Index of the first volume in the source.
+    /// Index in the source of the first complete volume.
     pub fn first(&self) -> usize {
         self.kept.first().map_or(0, |volume| volume.place)
     }
 
-    /// Number of volumes that are left out, with frames missing.
+    /// Number of volumes that are left out because frames are missing.
     pub fn left_out(&self) -> usize {
         self.left_out
     }
 
-    /// Checks that the file states times.
+    /// Checks that the file will state the times of the volumes.
     ///
     /// # Errors
-    /// The reason why it states none.
+    /// The reason why it will not.
     pub fn times(&self) -> Result<(), &'static str> {
         self.times
     }
 
-    /// Checks that a file can hold volumes on this lattice, before any work is done.
+    /// Checks, before any work is done, that the file can hold volumes on the grid of `target`.
     ///
     /// # Errors
     /// As [`Target::check`].
@@ -104,10 +104,11 @@ impl VolumeSequence {
         }
     }
 
-    /// Writes the volumes of the same source, each on the same lattice. `each` is called after every volume.
+    /// Writes the volumes of the source that was given to [`VolumeSequence::of`], all resampled on the grid of `target`. `each` is called after
+    /// every volume.
     ///
     /// # Errors
-    /// As [`VolumeSequence::check`]; a source that cannot be read any more, a full disk. No file is left then.
+    /// As [`VolumeSequence::check`]; the source can no longer be read, or the disk is full. No file is left then.
     pub fn write(
         &self,
         source: &mut dyn Source,

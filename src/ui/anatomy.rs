@@ -9,7 +9,7 @@ use glam::DVec3;
 /// Places along a ray at which it is looked for data.
 const STEPS: u32 = 64;
 
-/// The parts of a picture that show recorded data.
+/// Tells which positions of a picture show recorded data and which only background.
 pub(super) struct Anatomy<'a> {
     scene: &'a Scene,
     tiling: Option<Tiling>,
@@ -24,7 +24,7 @@ impl<'a> Anatomy<'a> {
         Anatomy { scene, tiling, bounds: (low.max(scene.low), high.min(scene.high)) }
     }
 
-    /// True if a plane or a ray through this position, pixels of the picture, meets recorded data. Cuts and thresholds are ignored.
+    /// True if the plane or the ray at this position (pixels of the picture) meets recorded data. Cuts and thresholds are ignored.
     pub(super) fn is_at(&self, at: [f64; 2]) -> bool {
         let is_in = |tile: &&Tile| {
             (0..2).all(|a| (0.0..f64::from(tile.size[a])).contains(&(at[a] - f64::from(tile.corner[a]))))

@@ -7,14 +7,14 @@ use std::collections::VecDeque;
 use std::ops::RangeInclusive;
 use std::time::{Duration, Instant};
 
-/// The selectable speeds, as multiples of the acquisition's.
+/// The speeds that can be selected, as multiples of the speed of the acquisition.
 pub(super) const SPEEDS: [f64; 7] = [0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0];
 /// Time from a volume to the next where their time stamps do not say it, s.
 const UNKNOWN_INTERVAL: f64 = 0.2;
 /// Intervals that time stamps can state, s. Longer ones are pauses of the acquisition.
 const INTERVALS: RangeInclusive<f64> = 1e-3..=5.0;
 
-/// The playback of a loop.
+/// Decides which volume of the cine loop is shown next while it is played, and when.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct CinePlayer {
     /// When the next volume is due; none while the loop does not play.
@@ -22,14 +22,14 @@ pub(super) struct CinePlayer {
     is_backwards: bool,
 }
 
-/// The volumes of a loop, and how they are played.
+/// The volumes of the cine loop, and the settings of its playback.
 #[derive(Clone, Copy)]
 pub(super) struct Loop<'a> {
     pub(super) cine: &'a Cine,
     pub(super) volumes: &'a VecDeque<CineVolume>,
 }
 
-/// The speed that is so many steps along [`SPEEDS`] from another one.
+/// The speed that is `by` steps along [`SPEEDS`] from `speed`, within their range.
 pub(super) fn stepped(speed: f64, by: i32) -> f64 {
     let last = SPEEDS.len() as i32 - 1;
     let at = match by >= 0 {
@@ -39,7 +39,8 @@ pub(super) fn stepped(speed: f64, by: i32) -> f64 {
     SPEEDS[at.saturating_add(by).clamp(0, last) as usize]
 }
 
-/// Sets the first (`end` false) or the last volume of the loop, by its number. A mark that would leave no volume removes the other mark.
+/// The playback settings with the volume of this number as the first (`end` false) or the last one that is played. If no volume would then be
+/// left, the mark at the other end is removed.
 pub(super) fn marked(cine: Cine, volume: u32, end: bool) -> Cine {
     match end {
         false => Cine { first: Some(volume), last: cine.last.filter(|last| *last >= volume), ..cine },
@@ -48,7 +49,8 @@ pub(super) fn marked(cine: Cine, volume: u32, end: bool) -> Cine {
 }
 
 impl Loop<'_> {
-    /// Indices of the volumes between the marks, or of all volumes if none is left between them, as the loop drops its oldest ones.
+    /// Indices of the volumes between the first and the last one that are marked; of all volumes if none is left between the marks, because the
+    /// loop drops its oldest volumes.
     pub(super) fn range(&self) -> RangeInclusive<usize> {
         let Loop { cine, volumes } = self;
         let all = 0..=volumes.len().saturating_sub(1);
@@ -69,18 +71,18 @@ impl Loop<'_> {
         known.map(|intervals| intervals.len() as f64 / intervals.iter().sum::<f64>())
     }
 
-    /// Volumes a second at the present speed.
+    /// Volumes shown a second at the selected speed.
     pub(super) fn played_rate(&self) -> f64 {
         self.rate().unwrap_or(1.0 / UNKNOWN_INTERVAL) * self.cine.speed
     }
 }
 
-/// The state of a loop for the panel.
+/// What the panels show about the cine loop.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct CineState {
-    /// Number of volumes.
+    /// Number of volumes in the cine loop.
     pub(super) count: usize,
-    /// Index of the volume that is shown.
+    /// Index of the volume that is shown; None if it is not in the cine loop.
     pub(super) shown: Option<usize>,
     /// Indices of the volumes that are played.
     pub(super) range: RangeInclusive<usize>,
@@ -88,11 +90,11 @@ pub(super) struct CineState {
     pub(super) is_playing: bool,
     pub(super) speed: f64,
     pub(super) goes_back_and_forth: bool,
-    /// Time of the shown volume after the first of the loop, s.
+    /// Time stamp of the shown volume minus that of the first of the loop, s; None if not known.
     pub(super) seconds: Option<f64>,
-    /// Time of the last volume after the first, s.
+    /// Time stamp of the last volume of the loop minus that of the first, s; None if not known.
     pub(super) length: Option<f64>,
-    /// Acquisition rate of the part that is played, volumes a second.
+    /// Rate at which the played volumes were acquired, volumes a second; None if not known.
     pub(super) rate: Option<f64>,
 }
 
@@ -101,7 +103,7 @@ impl CinePlayer {
         self.next.is_some()
     }
 
-    /// When the next volume is due.
+    /// Time at which the next volume is to be shown; None while the loop is not played.
     pub(super) fn due(&self) -> Option<Instant> {
         self.next
     }
@@ -110,7 +112,7 @@ impl CinePlayer {
         self.next = None;
     }
 
-    /// Starts at `now`, or stops.
+    /// Starts to play at `now`, or stops if the loop is being played. A loop of one volume does not start.
     pub(super) fn toggle(&mut self, of: Loop, now: Instant) {
         self.next = match self.next {
             None if of.range().count() > 1 => Some(now),
@@ -118,7 +120,7 @@ impl CinePlayer {
         };
     }
 
-    /// The next volume to show, if one is due.
+    /// Index of the volume to show now; None if none is due. `shown`: index of the one that is shown.
     pub(super) fn advance(&mut self, of: Loop, shown: Option<usize>, now: Instant) -> Option<usize> {
         let due = self.next.filter(|due| now >= *due)?;
         let range = of.range();

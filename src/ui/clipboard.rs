@@ -2,7 +2,7 @@
 
 use arboard::Clipboard as Desktop;
 
-/// The clipboard, which is connected with the first text. A copied text is available as long as this lives.
+/// The desktop's clipboard. The connection is made with the first text; a copied text is available as long as this value exists.
 #[derive(Default)]
 pub(super) struct Clipboard {
     desktop: Option<Desktop>,

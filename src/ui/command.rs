@@ -11,7 +11,7 @@ use crate::scene::{
 use crate::texts::keys;
 use Key::{Char, Function};
 
-/// What a user asks for by a key, a gesture or a control.
+/// What the user can request by a key, a gesture or a control.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Command {
     Mode(Mode),
@@ -24,48 +24,48 @@ pub enum Command {
     Rotate([f64; 2]),
     /// Shows a rendering from one side, upright.
     LookFrom(Viewpoint),
-    /// Turns the rendering by itself, or stops it.
+    /// Starts to rotate the rendering continuously, or stops it.
     Turntable,
     /// Rotates the picture clockwise, degrees.
     Roll(f64),
     /// Multiplies the zoom; above 1 is closer.
     Zoom(f64),
-    /// Moves what is shown, as fractions of the picture's height: right, down.
+    /// Moves what is shown to the right and down, by shares of the picture's height.
     Pan([f64; 2]),
-    /// Moves the light over a dome above the surface, as fractions of the picture's height: right, down.
+    /// Moves the light to the right and down over a dome above the surface, by shares of the picture's height.
     MoveLight([f64; 2]),
-    /// Moves a face of the region outwards, mm.
+    /// Moves a face of the region outwards by a distance, mm.
     MoveFace(Face, f64),
-    /// Moves the region: lateral, depth, elevation, mm.
+    /// Moves the region by distances along lateral, depth and elevation, mm.
     MoveRegion([f64; 3]),
-    /// Bends the start line of the region at handles, or makes it straight.
+    /// Makes the start curve of the region bend at handles, or straight again.
     ToggleStartCurve,
-    /// Moves the handle of the start line with this index: lateral, depth, mm.
+    /// Moves the handle of the start curve with this index to a position: lateral, depth, mm.
     MoveStartHandle(usize, [f64; 2]),
-    /// Adds a handle to the start line at this lateral position, mm; with `None` in the widest gap.
+    /// Adds a handle to the start curve at this lateral position, mm; with `None` in the widest gap between handles.
     AddStartHandle(Option<f64>),
-    /// Removes the handle of the start line with this index; with `None` the one that bends the line the least.
+    /// Removes the handle of the start curve with this index; with `None` the one that bends the curve the least.
     RemoveStartHandle(Option<usize>),
     /// Moves the viewer's clip plane further into the volume, mm; negative values pull it back.
     MoveClip(f64),
-    /// Selects the plane that is shown alone, stepped and moved.
+    /// Selects a plane: the one that is shown alone and that commands move.
     Plane(PlaneName),
     /// Moves the selected plane along its normal, mm.
     StepPlane(f64),
-    /// Moves the point where the three planes cross: lateral, depth, elevation, mm.
+    /// Moves the point where the three planes cross to a position: lateral, depth, elevation, mm.
     MoveCrossing([f64; 3]),
-    /// Rotates the planes, degrees: azimuth, tilt.
+    /// Rotates the planes by angles, degrees: azimuth, tilt.
     RotatePlanes([f64; 2]),
-    /// Sets a slider, by its index in [`super::sliders::SLIDERS`], to a value.
+    /// Sets the slider with this index of [`super::sliders::SLIDERS`] to a value in the unit of the setting.
     SetSlider(usize, f64),
-    /// Sets a slider to a value in its displayed unit.
+    /// Sets the slider with this index to a value in the unit that is displayed.
     SetShown(usize, f64),
-    /// Resets a slider to its value at the start.
+    /// Resets the slider with this index to its value at the start.
     ResetSlider(usize),
-    /// Moves a slider by a number of its steps.
+    /// Moves the slider with this index by a number of its steps.
     StepSlider(usize, i32),
     Transfer(TransferName),
-    /// Sets the opacities of the volume by name; `None`: those of its transfer function.
+    /// Gives the volume the opacities of the transfer function of this name; `None`: those of its own transfer function.
     Opacity(Option<TransferName>),
     ColourMap(ColourMap),
     Shadow(bool),
@@ -73,41 +73,41 @@ pub enum Command {
     Reset,
     /// Undoes the last change: of settings, planes, region or measurements.
     Undo,
-    /// Undoes all changes. Each remains a step of redo.
+    /// Undoes all changes. Redo can restore them one by one.
     UndoAll,
-    /// Redoes what was undone.
+    /// Redoes the change that was undone last.
     Redo,
     /// Moves the point where the planes cross to the middle of the region.
     Recentre,
     /// Shows or hides the reference plane of a tomography: a plane across the slices, with their lines.
     Reference(bool),
-    /// Sets a point of the current measurement: lateral, depth, elevation, mm; and whether it was picked on the rendered surface.
+    /// Sets a point of the measurement in progress: lateral, depth, elevation, mm. The flag is true if it was picked on the rendered surface.
     Point([f64; 3], bool),
-    /// Picks the point of the surface under this pixel of the picture.
+    /// Sets a point of the measurement in progress on the surface under this pixel of the picture.
     PickSurface([f64; 2]),
     /// Closes the contour or ends the volume that is being measured.
     EndMeasure,
     /// Discards the measurement in progress.
     CancelMeasure,
-    /// Moves a point: index of the measurement, index of its point, mm.
+    /// Moves a point of a measurement: index of the measurement, index of its point, new position, mm.
     MovePoint(usize, usize, [f64; 3]),
-    /// Deletes the measurement with this index, or the last one.
+    /// Deletes the measurement with this index; the last one if there is no such index.
     DeleteMeasure(usize),
     ClearMeasures,
-    /// Begins to type the text of the measurement with this index.
+    /// Starts to type the text of the measurement with this index.
     LabelMeasure(usize),
     Type(char),
     Untype,
     EndTyping,
     /// Starts the contour of a cut at this pixel of the picture.
     BeginCut([f64; 2]),
-    /// Continues the contour to this pixel.
+    /// Continues the contour of a cut to this pixel of the picture.
     CutAlong([f64; 2]),
-    /// Closes the contour and cuts along it.
+    /// Closes the contour of a cut and cuts along it.
     EndCut,
-    /// Discards the contour in progress.
+    /// Discards the contour of a cut that is being drawn.
     CancelCut,
-    /// Chooses the side of the next contour that is kept.
+    /// Chooses which side of the next contour of a cut is kept.
     KeepSide(KeptSide),
     /// Sets the radius of the brush, mm.
     BrushRadius(f64),
@@ -115,52 +115,52 @@ pub enum Command {
     ClearCuts,
     /// Sets a point of the line of a curved plane: the plane that it is drawn on, and the coordinates there, mm.
     CurvePoint(PlaneName, [f64; 2]),
-    /// Ends the line, and shows the section along it.
+    /// Ends the line of a curved plane, and shows the section along it.
     EndCurve,
-    /// Discards the line in progress.
+    /// Discards the line of a curved plane that is being drawn.
     CancelCurve,
-    /// Moves a point of the line of the curved plane, mm.
+    /// Moves the point with this index on the line of the curved plane to coordinates on its plane, mm.
     MoveCurvePoint(usize, [f64; 2]),
     /// Removes the curved plane.
     ClearCurve,
-    /// Sets a point of the current measurement on the curved plane: lateral, depth, elevation, mm.
+    /// Sets a point of the measurement in progress on the curved plane: lateral, depth, elevation, mm.
     PointOnCurve([f64; 3]),
-    /// Adds a body mark in a corner of the picture.
+    /// Adds a body mark of this part of the body in a corner of the picture.
     AddBodyMark(Body),
-    /// Changes the position, size, probe, direction or body part of the body mark with this index.
+    /// Replaces the body mark with this index: its position, size, probe, direction or part of the body.
     ChangeBodyMark(usize, BodyMark),
-    /// Selects the body mark that the controls refer to.
+    /// Selects the body mark with this index, to which the controls then refer.
     SelectBodyMark(usize),
     RemoveBodyMark(usize),
-    /// Sets the patient's sides at the ends of an axis.
+    /// Sets which sides of the patient lie at the ends of an axis of the volume.
     Sides(VolumeAxis, Sides),
-    /// Exchanges the letters L and R.
+    /// Exchanges the patient's left and right side.
     ExchangeLeftAndRight,
-    /// Sets the position of the probe's marker.
+    /// Sets at which edge of the picture the probe's marker is drawn.
     ProbeMarker(ProbeMarker),
-    /// Counts the voxels of the region whose echo reaches the threshold.
+    /// Measures the volume of the voxels of the region whose echo reaches the threshold.
     CountVoxels,
-    /// Copies the results as CSV.
+    /// Copies the results of measurements to the clipboard as CSV.
     CopyMeasures,
-    /// Saves the results as a CSV file.
+    /// Saves the results of measurements as a CSV file.
     SaveMeasures,
     /// Saves settings, recording and measurements as a workspace file.
     SaveWorkspace,
     /// Shows or hides the list of files to open.
     OpenFiles,
-    /// Opens the n-th entry of that list.
+    /// Opens the n-th entry of the list of files.
     OpenFile(usize),
     /// Shows the n-th of the open recordings.
     ShowRecording(usize),
-    /// Shows the recording so many positions further in the list.
+    /// Shows the recording that is this many positions further in the list of open recordings.
     StepRecording(i32),
-    /// Closes the n-th recording; `None`: the one that is shown.
+    /// Closes the n-th open recording; `usize::MAX`: the one that is shown.
     CloseRecording(usize),
-    /// Stops reading a file.
+    /// Stops reading the file that is being opened.
     CancelReading,
-    /// Shows or hides the menu of exports.
+    /// Shows or hides the menu of export formats.
     Exports,
-    /// Exports the shown volume in the n-th format of the menu.
+    /// Exports the shown volume in the n-th format of that menu.
     Export(usize),
     /// Cancels the export in progress.
     CancelExport,
@@ -168,11 +168,11 @@ pub enum Command {
     Presets,
     /// Applies the n-th preset of the list: first the built-in ones, then the user's.
     Preset(usize),
-    /// Starts to type the name of a new preset with the present look.
+    /// Starts to type the name of a new preset with the present settings.
     NamePreset,
     /// Starts to type a new name for the user's n-th preset.
     RenamePreset(usize),
-    /// Saves under the name that was typed.
+    /// Saves the preset under the name that was typed.
     EndNaming,
     /// Deletes the user's n-th preset.
     DeletePreset(usize),
@@ -184,15 +184,15 @@ pub enum Command {
     StepCine(i32),
     /// Shows the volume at this index of the cine loop (0 is the oldest), and freezes.
     SeekCine(usize),
-    /// Plays the cine loop repeatedly, or stops it.
+    /// Starts to play the cine loop repeatedly, or stops it.
     PlayCine,
-    /// Makes the shown volume the first of the cine loop; `true`: the last.
+    /// Marks the shown volume as the first that is played; `true`: as the last.
     MarkCine(bool),
-    /// Makes the volume at this index the first of the cine loop; `true`: the last.
+    /// Marks the volume at this index of the cine loop as the first that is played; `true`: as the last.
     TrimCine(usize, bool),
-    /// Removes the marks: the cine loop is all volumes again.
+    /// Removes both marks, so that all volumes of the cine loop are played.
     WholeCine,
-    /// Changes the speed of the cine loop by so many steps.
+    /// Changes the speed of the cine loop by this number of steps.
     CineSpeed(i32),
     /// Plays the cine loop back and forth, or forwards only.
     BackAndForth(bool),
@@ -208,28 +208,28 @@ pub enum Command {
     ShowControl(usize),
     /// Starts to type the value of the slider with this index.
     TypeValue(usize),
-    /// Chooses whether saved pictures have a bar below with scale, depth, mode, time and origin.
+    /// Chooses whether saved pictures have a bar of text below them with scale, depth, mode, time and origin.
     SavesBar(bool),
-    /// Shows or hides the times of the passes.
+    /// Shows or hides the display of the times of passes.
     ToggleTimes,
     /// Shows or hides sliders and buttons.
     TogglePanels,
     /// Gives the keyboard focus to the panels, or back to the picture.
     FocusPanels,
-    /// Shows this part of the inspector.
+    /// Shows this tab of the inspector.
     InspectorTab(InspectorTab),
-    /// Shows the next part of the inspector. A drawer is opened first, and closed after the last part.
+    /// Shows the next tab of the inspector. An inspector that is a drawer is opened first, and closed after the last tab.
     NextTab,
-    /// Opens or closes the inspector as a drawer, in a window that has no room for it beside the picture.
+    /// Opens or closes the inspector, in a window in which it is a drawer over the picture.
     ToggleDrawer,
-    /// Turns the pointer by keyboard on or off.
+    /// Turns moving the pointer by keys on or off.
     KeyboardPointer,
     ToggleFullScreen,
-    /// Closes what is open; if nothing is, leaves full screen, and otherwise the program.
+    /// Closes the list, question or panel that is open; if none is, leaves full screen, and otherwise the program.
     Back,
-    /// Leaves the program, after a question if a loop would be lost.
+    /// Leaves the program. If volumes or measurements would be lost, a question comes first.
     Exit,
-    /// Saves the cine loop and then leaves the program.
+    /// Saves what would be lost, and then leaves the program.
     SaveAndExit,
     /// Leaves the program without saving.
     Discard,
@@ -247,9 +247,9 @@ pub enum Tool {
     Clip,
     /// Draws the contour of a cut on a rendering.
     Cut,
-    /// Removes what is near the surface along the drag.
+    /// Removes tissue near the surface along the drag.
     Brush,
-    /// Moves the planes of sections.
+    /// Moves the planes on which sections are shown.
     Plane,
     /// Draws the line of a curved plane.
     Curve,
@@ -259,7 +259,7 @@ pub enum Tool {
     Measure(MeasureKind),
 }
 
-/// The parts of the inspector.
+/// The tabs of the inspector.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum InspectorTab {
     /// Tools and views, if the window has no room for them at its edges.
@@ -272,7 +272,7 @@ pub enum InspectorTab {
 }
 
 impl Command {
-    /// True for commands that a drag or a held key repeats.
+    /// True for commands that a drag or a held key sends repeatedly.
     pub(super) fn is_continuous(&self) -> bool {
         matches!(
             self,
@@ -294,7 +294,7 @@ impl Command {
         )
     }
 
-    /// True if this command continues what `last` began, so that both are one step of undo.
+    /// True if this command continues the change that `last` began, so that one step of undo covers both.
     pub(super) fn continues(&self, last: &Command) -> bool {
         match (self, last) {
             (Command::SetSlider(a, _), Command::SetSlider(b, _)) => a == b,
@@ -317,7 +317,7 @@ impl Command {
     }
 }
 
-/// A key and its command.
+/// A key combination, its command and its description.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Binding {
     pub key: Key,
@@ -354,7 +354,7 @@ impl Binding {
 /// A distance beyond any volume, mm.
 const BEYOND_ANY_VOLUME_MM: f64 = 1e5;
 
-/// All key bindings, in groups. Consecutive ones with the same description share a line of the help.
+/// All key bindings, in groups. Consecutive bindings with the same description share a line of the help.
 pub const KEY_BINDINGS: &[Binding] = &[
     on(Char('1'), keys::SURFACE, Command::Mode(Mode::Surface)),
     on(Char('2'), keys::VOLUME, Command::Mode(Mode::Volume)),
@@ -490,7 +490,7 @@ pub const KEY_BINDINGS: &[Binding] = &[
     on(Char('q'), keys::QUIT, Command::Exit),
 ];
 
-/// The binding of a key with these modifiers.
+/// The binding of a key pressed with these modifiers; None if there is none.
 pub(super) fn binding(key: Key, modifiers: Modifiers) -> Option<&'static Binding> {
     // Whether a sign needs shift depends on the keyboard layout.
     let is_sign = matches!(key, Char(c) if !c.is_alphanumeric());
@@ -504,7 +504,7 @@ fn command(key: Key, modifiers: Modifiers) -> Option<Command> {
     binding(key, modifiers).map(|b| b.command)
 }
 
-/// The lines of the help: keys, such as "Shift+Left, Shift+Right", and their description, in the order of [`KEY_BINDINGS`].
+/// The lines of the help: key names, such as "Shift+Left, Shift+Right", and the description, in the order of [`KEY_BINDINGS`].
 pub(super) fn help() -> impl Iterator<Item = (String, &'static str)> {
     KEY_BINDINGS.chunk_by(|a, b| a.description == b.description).filter_map(|same| {
         let keys: Vec<String> = same.iter().map(key_label).collect();
@@ -526,7 +526,7 @@ pub(super) fn key_label(binding: &Binding) -> String {
     held + &key
 }
 
-/// The keys that are held, so that a toggle does not repeat.
+/// The keys that are held down, so that a command that toggles something is not repeated.
 #[derive(Clone, Debug, Default)]
 pub(super) struct HeldKeys {
     modifiers: Modifiers,
@@ -542,7 +542,7 @@ impl HeldKeys {
         self.held.contains(&key)
     }
 
-    /// The command of an input, if it has one.
+    /// The command that an input of the keyboard gives; None if it gives none.
     pub(super) fn input(&mut self, input: &Input) -> Option<Command> {
         match *input {
             Input::Modifiers(modifiers) => self.modifiers = modifiers,

@@ -13,21 +13,21 @@ use std::time::{Duration, Instant};
 /// How long the cursor is visible after the mouse moved.
 const CURSOR_TIME: Duration = Duration::from_secs(3);
 
-/// How to show the console on a monitor.
+/// How the console is shown on a monitor without a window system.
 pub struct DirectOptions {
-    /// The monitor and its mode.
+    /// Which monitor and which of its modes is used.
     pub monitor: MonitorChoice,
     pub present_mode: PresentMode,
-    /// Whether the input devices are grabbed, so that no other program, such as the text console, gets their events.
+    /// True if no other program, such as the text console, gets events of the input devices.
     pub grab: bool,
-    /// Ends the console after this time.
+    /// The console ends after this time; None: it does not end by itself.
     pub time: Option<Duration>,
 }
 
-/// Takes a monitor and runs until the user leaves. Returns the console and its last context.
+/// Takes over a monitor and runs the console that `make` creates, until the user leaves. Returns the console and its last context.
 ///
 /// # Errors
-/// No device has such a monitor, or another program uses it; the device or the monitor is lost repeatedly.
+/// No device has such a monitor, or another program uses it; or the device or the monitor is lost repeatedly.
 pub fn run(
     device: &ContextOptions,
     options: DirectOptions,

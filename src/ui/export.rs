@@ -18,26 +18,26 @@ use std::time::{SystemTime, UNIX_EPOCH};
 /// Largest number of files that are being saved: a key that is held must not fill the disk.
 const MAX_PENDING: usize = 4;
 
-/// Data in a saved file that would otherwise be lost.
+/// What a saved file contains that would be lost otherwise.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Holds {
     Nothing,
-    /// The complete cine loop up to the volume of this number.
+    /// The complete cine loop, up to the volume of this number.
     Loop(u32),
-    /// Handiwork on the shown recording, or on one that is kept.
+    /// Measurements, annotations, body marks and cuts of a recording.
     Work {
         kept: Option<PathBuf>,
         work: Handiwork,
     },
 }
 
-/// The result of saving a file.
+/// The result of saving one file.
 pub(super) struct Saved {
     pub(super) file: Result<PathBuf, String>,
     pub(super) holds: Holds,
 }
 
-/// Saves files in the background.
+/// Saves files on threads of its own.
 pub(super) struct Exporter {
     folder: PathBuf,
     sender: Sender<Saved>,
@@ -54,7 +54,7 @@ pub(super) struct Exporter {
 }
 
 impl Exporter {
-    /// `folder`: where files are saved; it is created with the first one. `wake` is called when a file is done.
+    /// `folder`: path of the folder for files, which is created with the first file. `wake` is called when saving a file has ended.
     pub(super) fn new(folder: PathBuf, wake: Wake) -> Exporter {
         let (sender, receiver) = channel();
         Exporter {
@@ -70,14 +70,14 @@ impl Exporter {
         }
     }
 
-    /// The next file that was saved or failed since the last call.
+    /// The result of a file whose saving has ended; None if there is none that was not returned before.
     pub(super) fn poll(&mut self) -> Option<Saved> {
         let done = self.receiver.try_recv().ok()?;
         self.pending = self.pending.saturating_sub(1);
         Some(done)
     }
 
-    /// Saves a picture as PNG, which `make` makes in the background.
+    /// Saves as PNG the picture that `make` returns. `make` is called on a thread.
     ///
     /// # Errors
     /// Too many files are being saved, or no thread can be started.
@@ -88,7 +88,7 @@ impl Exporter {
         self.keep(|own| own.save("png", Holds::Nothing, move |file| make()?.save(file)))
     }
 
-    /// Saves a text under a name with this ending.
+    /// Saves a text in a file with this file name ending. `holds`: what it contains that would be lost otherwise.
     ///
     /// # Errors
     /// As for [`Exporter::picture`].
@@ -96,12 +96,12 @@ impl Exporter {
         self.keep(|own| own.save(ending, holds, move |file| files::replace(file, text.as_bytes())))
     }
 
-    /// The folder of saved files.
+    /// Path of the folder of saved files.
     pub(super) fn folder(&self) -> &Path {
         &self.folder
     }
 
-    /// Saves volumes as a recording of frames.
+    /// Saves volumes as a `.frames` recording. `holds`: what it contains that would be lost otherwise.
     ///
     /// # Errors
     /// As for [`Exporter::picture`].
@@ -109,10 +109,10 @@ impl Exporter {
         self.keep(|own| own.save("frames", holds, move |file| write_frames(file, header, &volumes)))
     }
 
-    /// Exports a volume. One export runs at a time.
+    /// Starts an export. Only one runs at a time.
     ///
     /// # Errors
-    /// Another one is in work; as for [`Exporter::picture`].
+    /// Another export is running; and those of [`Exporter::picture`].
     pub(super) fn export(&mut self, job: Job) -> Result<(), String> {
         if let Some(name) = self.exporting() {
             return Err(texts::still_exporting(name));
@@ -128,21 +128,21 @@ impl Exporter {
         Ok(())
     }
 
-    /// The name of the running export.
+    /// The name of the export that is running; None if none is.
     pub(super) fn exporting(&self) -> Option<&'static str> {
         // The thread also ends without any work, if there is no folder for it.
         let is_at_work = |export: &Export, thread: &JoinHandle<()>| !export.is_finished() && !thread.is_finished();
         self.export.as_ref().filter(|(_, export, thread)| is_at_work(export, thread)).map(|(name, ..)| *name)
     }
 
-    /// Polls the running export. True if its progress changed.
+    /// Checks the export that is running. Returns true if its progress changed.
     pub(super) fn look(&mut self) -> bool {
         let export = self.export.as_ref().filter(|_| self.exporting().is_some());
         let progress = export.and_then(|(_, export, _)| export.progress());
         std::mem::replace(&mut self.progress, progress) != progress
     }
 
-    /// Progress of the running export at the last poll, if it reports one.
+    /// Progress of the running export when it was last checked; None if it has reported none.
     pub(super) fn progress(&self) -> Option<Progress> {
         self.progress
     }

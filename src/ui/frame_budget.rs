@@ -11,7 +11,7 @@ use crate::scene::{Mode, Ray, Scene, Settings, camera};
 use crate::texts;
 use std::time::{Duration, Instant};
 
-/// Time after the last movement at which a view counts as at rest.
+/// Time without a movement after which a view counts as at rest.
 pub(super) const REST_DELAY: Duration = Duration::from_millis(250);
 /// Weight of a new time in the running mean of a rung.
 const NEW_WEIGHT: f64 = 0.4;
@@ -24,16 +24,17 @@ const PAUSE: f64 = 3.0;
 /// Pictures on a rung before a better one is tried.
 const MIN_PICTURES: u32 = 4;
 
-/// What a picture leaves out: the rungs of its two ladders, 0 for full quality.
+/// The quality of a picture: its rungs on two ladders, one for rays and one for shading. 0 is full quality.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Quality {
-    /// Rung of the rays and of everything that follows them.
+    /// Rung on the ladder of rays, which reduces the work of all stages after stage 1.
     pub rays: usize,
-    /// Rung of the shading alone, on a complete distance map.
+    /// Rung on the ladder of shading, which leaves out parts of stage 3 on a complete distance map.
     pub shading: usize,
 }
 
-/// The frame budgets of the kinds of work. Changes of tone, colours or planes beside a rendering alone are always drawn in full.
+/// Keeps a frame budget for each kind of work. Pictures that need only other tones, colours, or planes beside a rendering are always drawn in
+/// full.
 #[derive(Clone, Debug)]
 pub(super) struct Pace {
     rays: FrameBudget,
@@ -76,14 +77,14 @@ impl Live {
     }
 }
 
-/// The rung of the rays before anything is measured: full quality on a GPU with memory of its own. A GPU that shares the machine's memory, or a CPU,
-/// may take seconds for such a picture, which cannot be interrupted.
+/// The rung for rays before any picture was timed: full quality on a GPU with memory of its own. On a GPU that shares the machine's memory, and
+/// on a CPU, such a picture may take seconds and cannot be interrupted.
 pub(super) fn first_rung(has_unified_memory: bool) -> usize {
     usize::from(has_unified_memory)
 }
 
 impl Pace {
-    /// `rungs`: those of the rays; `first`: the rung of a moving view before any picture was timed.
+    /// `rungs`: the ladder of rays; `first`: the rung for a moving view before any picture was timed.
     pub(super) fn new(budget: Option<Duration>, rungs: &[Rung], first: usize) -> Pace {
         let shares: Vec<f64> = rungs.iter().map(|rung| rung.time_share).collect();
         let shading = SHADING.map(|(_, share)| share);
@@ -96,7 +97,7 @@ impl Pace {
         self.rays.budget()
     }
 
-    /// Records that the user moved something whose picture takes this work.
+    /// Notes that the user moved something whose picture needs this kind of work.
     pub(super) fn moved(&mut self, work: Work, now: Instant) {
         match work {
             Work::Rays => self.rays.view_moved(now),
@@ -105,29 +106,29 @@ impl Pace {
         }
     }
 
-    /// Records that so many volumes came from a source that does not wait for pictures.
+    /// Notes that `count` volumes arrived from a source that does not wait for pictures.
     pub(super) fn volumes_came(&mut self, count: u64, now: Instant) {
         self.live.volumes_came(count, now);
     }
 
-    /// Records that volumes are no longer shown as they come.
+    /// Notes that volumes are no longer shown as they arrive.
     pub(super) fn volumes_stopped(&mut self) {
         self.live.came = None;
     }
 
-    /// True if volumes keep coming from a source that does not wait for pictures.
+    /// True while volumes keep arriving from a source that does not wait for pictures.
     pub(super) fn is_live(&self, now: Instant) -> bool {
         self.live.is_on(now)
     }
 
-    /// Discards the measurements: the scene changed.
+    /// Discards the measured times, because the scene changed.
     pub(super) fn forget(&mut self) {
         self.live.pictures.forget();
         self.rays.forget();
         self.shading.forget();
     }
 
-    /// When a moving view comes to rest.
+    /// Time at which a moving view counts as at rest; None if it does not move.
     pub(super) fn rests_at(&self, now: Instant) -> Option<Instant> {
         let live = self.live.ends_at().filter(|end| *end > now && self.live.pictures.rung > 0);
         self.rays.rests_at(now).into_iter().chain(self.shading.rests_at(now)).chain(live).min()
@@ -142,7 +143,7 @@ impl Pace {
         }
     }
 
-    /// Records the time of a picture of this quality that needed this work.
+    /// Records how long a picture of this quality took that needed this kind of work.
     pub(super) fn picture_took(&mut self, work: Work, quality: Quality, time: Duration) {
         match work {
             Work::Rays if quality.shading == 0 => {
@@ -159,7 +160,7 @@ impl Pace {
 const SHADING: [(&str, f64); 3] =
     [(texts::FULL_QUALITY, 1.0), (texts::NO_OCCLUSION, 0.6), (texts::NO_OCCLUSION_NO_SHADOW, 0.25)];
 
-/// The settings on a rung of the shading. Rays and filters of the distance map stay as they are.
+/// The settings with the shading of a rung of its ladder. Rays and filters of the distance map stay unchanged.
 pub(super) fn shaded(mut settings: Settings, rung: usize) -> Settings {
     if rung > 0 {
         settings.light.occlusion = None;
@@ -173,8 +174,8 @@ pub(super) fn shaded(mut settings: Settings, rung: usize) -> Settings {
 /// Most cells of a light volume that is made again for every picture of a view that moves.
 const MOVING_CELLS: u32 = 1_000_000;
 
-/// The settings of a moving view whose light is recomputed for every picture: the light volume gets coarser cells, which is hardly visible with fewer
-/// rays. A view that only rotates keeps its light.
+/// The settings with coarser cells of the light volume, for a moving view whose light changes with every picture. With fewer rays this is hardly
+/// visible. A view that only rotates keeps its light volume.
 pub(super) fn coarsely_lit(mut settings: Settings) -> Settings {
     if let Some(light) = &mut settings.light.volume {
         light.cells = light.cells.min(MOVING_CELLS);
@@ -182,7 +183,7 @@ pub(super) fn coarsely_lit(mut settings: Settings) -> Settings {
     settings
 }
 
-/// The description of a quality for the display of times.
+/// A quality in words, for the display of times.
 pub(super) fn label(quality: Quality, rungs: &[Rung]) -> &str {
     match quality {
         Quality { rays: 0, shading } => SHADING[shading.min(SHADING.len() - 1)].0,
@@ -190,7 +191,8 @@ pub(super) fn label(quality: Quality, rungs: &[Rung]) -> &str {
     }
 }
 
-/// What stage 1 is to make on the lower rungs of a scene at full quality, each once: settings without what stages 2 to 4 alone depend on.
+/// The settings with which stage 1 can serve all lower rungs of a scene at full quality, each once. Settings that only stages 2 to 4 use have
+/// their defaults.
 pub(super) fn lowered(rungs: &[Rung], scene: &Scene) -> Vec<Settings> {
     let mut all: Vec<Settings> = Vec::new();
     for rung in rungs.iter().skip(1) {
@@ -205,7 +207,7 @@ pub(super) fn lowered(rungs: &[Rung], scene: &Scene) -> Vec<Settings> {
     all
 }
 
-/// Chooses the rung for a view that moves. Rung 0 is full quality; each one after it is faster.
+/// Chooses the rung of the quality ladder for a moving view from the times of pictures. Rung 0 is full quality; each one after it is faster.
 #[derive(Clone, Debug)]
 pub(super) struct FrameBudget {
     budget: Option<Duration>,
@@ -225,8 +227,8 @@ pub(super) struct FrameBudget {
 }
 
 impl FrameBudget {
-    /// `time_shares`: the time on each rung as a fraction of that on the first, decreasing. Without a budget every
-    /// picture has full quality.
+    /// `time_shares`: expected time of a picture on each rung as a share of that on rung 0, decreasing. Without a budget every picture has full
+    /// quality.
     pub(super) fn new(budget: Option<Duration>, time_shares: &[f64]) -> FrameBudget {
         let expected = if time_shares.is_empty() { vec![1.0] } else { time_shares.to_vec() };
         let measured = expected.clone();
@@ -260,7 +262,7 @@ impl FrameBudget {
         self.moved = Some(now);
     }
 
-    /// Discards the measurements: the scene changed.
+    /// Discards the measured times, because the scene changed.
     pub(super) fn forget(&mut self) {
         self.measured.clone_from(&self.expected);
         (self.pictures, self.previous) = (0, None);
@@ -271,7 +273,7 @@ impl FrameBudget {
         self.moved.is_some_and(|at| now.saturating_duration_since(at) < REST_DELAY)
     }
 
-    /// When a moving view comes to rest.
+    /// Time at which a moving view counts as at rest; None if it does not move.
     pub(super) fn rests_at(&self, now: Instant) -> Option<Instant> {
         self.moved.map(|at| at + REST_DELAY).filter(|at| *at > now)
     }
@@ -284,8 +286,8 @@ impl FrameBudget {
         }
     }
 
-    /// Records the time of a picture on a rung, and chooses the next rung. Times on another rung than that of the moving view are ignored,
-    /// except that a picture at full quality within the budget chooses full quality.
+    /// Records the time of a picture on a rung, and chooses the rung for the next pictures. Times on another rung than the chosen one are
+    /// ignored, except that a picture at full quality within the budget chooses full quality.
     pub(super) fn picture_took(&mut self, rung: usize, time: Duration) {
         let Some(budget) = self.budget.map(|b| b.as_secs_f64()) else { return };
         let time = time.as_secs_f64();
@@ -345,12 +347,12 @@ fn min_rays(settings: &Settings) -> u32 {
 /// Largest number of rungs of a measured ladder.
 const MAX_RUNGS: usize = 6;
 
-/// One rung of the ladder.
+/// A rung of the quality ladder: a change of settings that makes pictures faster.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rung {
-    /// Description for the display of times.
+    /// The change in words, for the display of times.
     pub(super) label: String,
-    /// Time of a picture as a fraction of that at full quality.
+    /// Expected time of a picture as a share of that at full quality.
     pub(super) time_share: f64,
     change: Change,
 }
@@ -365,9 +367,9 @@ enum Change {
     Measured(Vec<String>),
 }
 
-/// The built-in ladder, which only reduces the number of rays: without its filters a surface would have false holes, a longer step would lose thin
-/// tissue, and neither saves as much as half the rays. The time shares are first estimates, from the phantom's face on two cores; the frame budget
-/// corrects them by measurements.
+/// The built-in quality ladder, which only reduces the number of rays: without its filters a surface would have false holes, a longer step would
+/// lose thin tissue, and neither saves as much as half the rays. The time shares are first estimates, from the phantom's face on two cores; the
+/// frame budget corrects them by measurements.
 pub fn built_in_ladder() -> Vec<Rung> {
     let rung = |label: &str, time_share, apart| Rung { label: label.into(), time_share, change: Change::Apart(apart) };
     vec![
@@ -378,8 +380,8 @@ pub fn built_in_ladder() -> Vec<Rung> {
     ]
 }
 
-/// The ladder of an error report: the Pareto front of its measured combinations, from full quality to the fastest. Times are those of the picture, as
-/// stage 1 is the same on every rung.
+/// The quality ladder of an error report: the Pareto front of its measured combinations of settings, from full quality to the fastest. Times are
+/// those of the picture without stage 1, which is the same on every rung.
 ///
 /// # Errors
 /// One line: the report has no times.
@@ -406,18 +408,18 @@ pub fn measured_ladder(report: &Report) -> Result<Vec<Rung>, String> {
 }
 
 impl Rung {
-    /// A rung of an error report with these assignments.
+    /// A rung with these assignments of settings, as from an error report.
     #[cfg(test)]
     pub(super) fn measured(set: &str) -> Rung {
         Rung { label: set.into(), time_share: 0.01, change: Change::Measured(vec![set.into()]) }
     }
 
-    /// Description for the display of times.
+    /// The change in words, for the display of times.
     pub fn label(&self) -> &str {
         &self.label
     }
 
-    /// The settings on this rung; unchanged if a measured change does not fit them.
+    /// The settings with the change of this rung; unchanged if they do not allow it.
     pub fn apply(&self, settings: &Settings) -> Settings {
         let mut changed = settings.clone();
         match &self.change {

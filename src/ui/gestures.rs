@@ -25,7 +25,7 @@ const NOTCH_TURN: f64 = 15.0;
 const NOTCH_MM: f64 = 1.0;
 /// Fingers beyond these are ignored.
 const MAX_FINGERS: usize = 10;
-/// Rotation of a drag across the height of the picture, degrees. A rate of 115 would keep the front of a volume that fills the picture
+/// Angle by which a drag across the height of the picture rotates the view, degrees. 115 would keep the front of a volume that fills the picture
 /// under the pointer; 200 needs fewer strokes and is still slow enough to stop where intended.
 pub(super) const DEGREES_PER_HEIGHT: f64 = 200.0;
 /// A point of a measurement and the centre of the cross-lines are grabbed from so far, and a cross-line, pixels of the window.
@@ -36,7 +36,7 @@ const TRACE_STEP: f64 = 4.0;
 /// Fingers that are closer to each other only pan, pixels: their scale and angle are noise.
 const MIN_PINCH: f64 = 24.0;
 
-/// Recognises gestures.
+/// Recognises gestures of mouse and fingers on the picture.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Gestures {
     pointer: Option<[f64; 2]>,
@@ -66,7 +66,7 @@ struct Click {
 }
 
 impl Gestures {
-    /// The commands of an input, in the order of execution. Keys give none here.
+    /// The commands that an input gives as part of a gesture, in the order of execution. Keys give none.
     pub(super) fn input(
         &mut self,
         input: &Input,
@@ -93,7 +93,7 @@ impl Gestures {
         }
     }
 
-    /// The last position of the pointer.
+    /// The last position of the pointer, pixels of the window; None if it is not known.
     pub(super) fn pointer(&self) -> Option<[f64; 2]> {
         self.pointer
     }
@@ -659,7 +659,8 @@ fn probe_to(viewport: &Viewport, index: usize, at: [f64; 2]) -> Option<Command> 
     Some(Command::ChangeBodyMark(index, body_marks::with_probe_at(mark, size, pixel)))
 }
 
-/// The command that sets the position of a text started by typing: at the pointer, or else in the middle of the picture.
+/// The command that sets the position of a text that the user starts by typing: at the pointer (pixels of the window), or else in the middle of
+/// the picture.
 pub(super) fn place_of_text(viewport: &Viewport, pointer: Option<[f64; 2]>) -> Option<Command> {
     let pointer = pointer.filter(|at| !viewport.is_covered && viewport.pane_at(*at).is_some());
     let at = pointer.or_else(|| viewport.middle())?;

@@ -2,30 +2,30 @@
 
 pub use crate::kiosk::chord::{Key, Modifiers};
 
-/// One input event.
+/// An input event of mouse, fingers or keyboard.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Input {
-    /// New position of the pointer.
+    /// The pointer moved to this position, pixels of the window.
     Moved([f64; 2]),
     Button {
         button: Button,
         pressed: bool,
     },
-    /// Notches of the wheel; positive is away from the user.
+    /// The wheel turned by this number of notches; positive is away from the user.
     Scroll(f64),
-    /// A key went down (repeatedly while it is held) or up.
+    /// A key was pressed (repeatedly while it is held) or released.
     Key {
         key: Key,
         pressed: bool,
     },
-    /// The modifiers that are held from now on.
+    /// These modifiers are held from now on.
     Modifiers(Modifiers),
     Touch {
         finger: u64,
         phase: Phase,
         at: [f64; 2],
     },
-    /// The pointer left, or the window lost the focus: nothing is held any more.
+    /// The pointer left the window, or the window lost the focus: nothing counts as held any more.
     FocusLost,
 }
 
@@ -35,7 +35,7 @@ const MAX_COORDINATE: f64 = 1e6;
 const MAX_NOTCHES: f64 = 20.0;
 
 impl Input {
-    /// The event with its numbers limited to what a window and a wheel can produce; none if the position is out of range or not a number.
+    /// The same event with numbers limited to what a window and a wheel can produce. None if a position is not a number or far outside.
     pub(super) fn sanitized(self) -> Option<Input> {
         let is_near = |at: [f64; 2]| at.iter().all(|n| n.abs() <= MAX_COORDINATE);
         match self {
@@ -55,7 +55,7 @@ pub enum Button {
     Middle,
 }
 
-/// The phase of a touch.
+/// The phase of a touch by a finger.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phase {
     Down,

@@ -12,15 +12,15 @@ const ARROWS: [(Key, [f64; 2]); 4] =
 /// The area of the picture: upper left corner and size, pixels of the window.
 pub(super) type PictureArea = ([u32; 2], [u32; 2]);
 
-/// An input with the modifiers that are held.
+/// An input of the mouse, with the modifiers that count as held.
 pub(super) type Pointed = (Input, Modifiers);
 
-/// How the pointer is drawn.
+/// How the pointer that keys move is drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct PointerMark {
-    /// Position, pixels of the window.
+    /// Position of the pointer, pixels of the window.
     pub(super) at: [f64; 2],
-    /// Whether keys moved it last. After a motion of the mouse only the ring shows that the mode is on.
+    /// True if keys moved the pointer last. After a motion of the mouse only a ring shows that keys can move it.
     pub(super) has_arrow: bool,
     pub(super) is_held: bool,
 }
@@ -42,12 +42,12 @@ impl KeyboardPointer {
         self.is_on
     }
 
-    /// True while a key holds the button: a drag may pause between two keys.
+    /// True while a key holds the pointer's button down, so that a drag may pause between two keys.
     pub(super) fn is_held(&self) -> bool {
         self.is_on && self.is_held
     }
 
-    /// Turns the pointer on at its last position, or off. A held button is cancelled.
+    /// Turns the pointer on at its last position, or off; a button that is held is then cancelled. Returns the mouse inputs that stand for this.
     pub(super) fn toggle(&mut self, pointer: Option<[f64; 2]>, picture: PictureArea) -> Vec<Pointed> {
         if self.is_on {
             let given_up = if self.is_held { self.give_up(picture) } else { Vec::new() };
@@ -59,7 +59,7 @@ impl KeyboardPointer {
         vec![plain(Input::Moved(self.place(picture)))]
     }
 
-    /// Records an input of a mouse, a finger or the windowing system.
+    /// Notes an input of a mouse, a finger or the window system.
     pub(super) fn other_input(&mut self, input: &Input) {
         match *input {
             Input::Moved(at) if self.mouse != Some(at) => {
@@ -71,7 +71,7 @@ impl KeyboardPointer {
         }
     }
 
-    /// The inputs of a key that goes down; none if the pointer does not use the key. `held`: the keys that were down before.
+    /// The mouse inputs that a pressed key stands for; None if the key does not move the pointer. `held`: the keys that were held before.
     pub(super) fn key(&mut self, key: Key, held: &HeldKeys, picture: PictureArea) -> Option<Vec<Pointed>> {
         let modifiers = held.modifiers();
         if !self.is_on || modifiers.alt {
@@ -136,7 +136,7 @@ impl KeyboardPointer {
         })
     }
 
-    /// How the pointer is drawn; none while it is off.
+    /// How the pointer is drawn; None while it is off.
     pub(super) fn mark(&self, picture: PictureArea) -> Option<PointerMark> {
         let at = self.place(picture);
         self.is_on.then_some(PointerMark { at, has_arrow: self.has_arrow, is_held: self.is_held })

@@ -15,25 +15,26 @@ const MAX_LOOKED_AT: usize = 2000;
 /// Longest list of recent files, bytes.
 const MAX_BYTES: u64 = 1 << 16;
 
-/// The kind of an entry.
+/// What an entry of the list of files stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     /// A recording or a workspace.
     File,
-    /// The DICOM files of the listed folder as one recording, and their number.
+    /// The DICOM files of the listed folder, which are one recording; the number of files.
     Series(usize),
     Folder,
     FolderAbove,
 }
 
-/// The recent files, and folders of one series, that still exist, the newest first; none if the list cannot be read.
+/// The recent files, and folders that are one recording, the newest first. Those that no longer exist are left out; empty if the list cannot be
+/// read.
 pub(super) fn recent(list: &Path) -> Vec<PathBuf> {
     let text = files::read_text(list, MAX_BYTES, "list").unwrap_or_default();
     let there = text.lines().map(PathBuf::from).filter(|file| file.is_absolute() && file.exists());
     there.take(MAX_RECENT).collect()
 }
 
-/// Puts a file at the top of the list. A list that cannot be written is no fault of the view.
+/// Puts a file at the top of the stored list of recent files. An error of writing is ignored.
 pub(super) fn remember(list: &Path, file: &Path) {
     let Some(file) = std::path::absolute(file).ok().filter(|file| !file.to_string_lossy().contains('\n')) else {
         return;
@@ -49,8 +50,8 @@ pub(super) fn remember(list: &Path, file: &Path) {
     }
 }
 
-/// What can be opened in a folder, at most 200 entries: the parent folder, the DICOM files as one recording, folders, then recordings and workspaces
-/// by name.
+/// What can be opened in a folder, at most 200 entries: the parent folder, its DICOM files as one recording, folders, then recordings and
+/// workspaces by name.
 pub(super) fn entries(folder: &Path) -> Vec<(Kind, PathBuf)> {
     let is_hidden = |path: &Path| path.file_name().is_none_or(|name| name.to_string_lossy().starts_with('.'));
     let read = std::fs::read_dir(folder).into_iter().flatten().take(MAX_READ);
@@ -75,7 +76,7 @@ pub(super) fn entries(folder: &Path) -> Vec<(Kind, PathBuf)> {
     above.into_iter().chain(series).chain(folders).chain(files).take(MAX_LISTED).collect()
 }
 
-/// The path of a typed text; `~` is the user's home folder.
+/// The path that a typed text stands for; `~` is the user's home folder.
 pub(super) fn expanded(typed: &str) -> PathBuf {
     let home = std::env::var_os("HOME").map(PathBuf::from).filter(|home| home.is_absolute());
     match (typed.strip_prefix('~'), home) {
@@ -85,8 +86,8 @@ pub(super) fn expanded(typed: &str) -> PathBuf {
     }
 }
 
-/// The longest common beginning of all paths that continue a typed one, with `/` after the only folder. Hidden files are included if the dot is
-/// typed.
+/// The longest common beginning of all existing paths that begin with the typed one, with `/` if it is a folder and the only one. Hidden files
+/// are included if the dot is typed.
 pub(super) fn completion(typed: &str) -> String {
     let Some((folder, begun)) = typed.rsplit_once('/') else {
         return if typed == "~" { "/".into() } else { String::new() };

@@ -7,13 +7,13 @@ use crate::texts;
 use crate::texts::hints;
 use crate::volume_export::FORMATS;
 
-/// An entry that the search finds.
+/// An entry in the search of all commands and controls.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Entry {
     pub name: String,
-    /// What it does, or where it is.
+    /// What the command does, or where the control is.
     pub about: String,
-    /// Its key, if it has one.
+    /// Name of the key that has the same effect; empty if there is none.
     pub key: String,
     pub command: Command,
 }
@@ -36,7 +36,7 @@ const WITHOUT_KEY: [(&str, &str, Command); 14] = [
     (texts::OPACITY_OF, texts::OPACITY_OF_HINT, Command::InspectorTab(InspectorTab::Look)),
 ];
 
-/// All entries: commands, presets, export formats, controls.
+/// All entries of the search: commands, presets, export formats, controls.
 pub(crate) fn entries() -> impl Iterator<Item = Entry> {
     // A key beside another for the same is not told.
     let is_first = |n: &usize| !KEY_BINDINGS[..*n].iter().any(|other| other.command == KEY_BINDINGS[*n].command);
@@ -80,7 +80,8 @@ fn capitalised(text: &str) -> String {
     letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
 }
 
-/// The entries that contain all words of a text: first those whose name begins with the text, then those with all words in the name, then the others.
+/// The entries that contain all words of a text, in this order: those whose name begins with the text, those that have all words in their name,
+/// the others.
 pub(crate) fn found(text: &str) -> Vec<Entry> {
     let text = text.trim().to_lowercase();
     let words: Vec<&str> = text.split_whitespace().collect();

@@ -7,7 +7,7 @@ use crate::scene::{BodyMark, MeasureKind, Measurement, PlaneName, Scene};
 use glam::DVec3;
 use std::time::Duration;
 
-/// Where along a straight line (a point and a unit vector) a ray comes closest to it, mm; none if both are parallel.
+/// Position along a straight line (a point and a unit vector) at which a ray comes closest to it, mm from the point; None if both are parallel.
 pub(super) fn closest_along(line: (DVec3, DVec3), ray: (DVec3, DVec3)) -> Option<f64> {
     let (apart, slant) = (line.0 - ray.0, line.1.dot(ray.1));
     let across = 1.0 - slant * slant;
@@ -15,36 +15,36 @@ pub(super) fn closest_along(line: (DVec3, DVec3), ray: (DVec3, DVec3)) -> Option
     (across > 1e-6 && at.is_finite()).then_some(at)
 }
 
-/// The picture in the window at the time of an input.
+/// Where the picture is in the window at the time of an input, and what it shows.
 #[derive(Clone, Copy)]
 pub(super) struct Viewport<'a> {
     /// Upper left corner of the picture, pixels of the window.
     pub(super) corner: [f64; 2],
-    /// Width and height of the picture on the screen, pixels of the window: `picture.size` or an enlargement of it.
+    /// Width and height of the picture in the window, pixels of the window: its own size or an enlargement of it.
     pub(super) size: [f64; 2],
-    /// The scene of the picture; without one nothing can be dragged.
+    /// The scene of the picture. Without one nothing can be dragged.
     pub(super) scene: Option<&'a Scene>,
-    /// The number of the shown volume, if known.
+    /// Number of the volume that the picture shows; None if not known.
     pub(super) volume: Option<u32>,
-    /// The measurements drawn over the picture.
+    /// The measurements that are drawn over the picture.
     pub(super) measures: &'a [Measurement],
-    /// The body marks drawn over the picture.
+    /// The body marks that are drawn over the picture.
     pub(super) body_marks: &'a [BodyMark],
-    /// The points of the start line of the region; empty while it is straight.
+    /// The points of the region's start curve: lateral and depth, mm; empty while it is straight.
     pub(super) start_line: &'a [[f64; 2]],
-    /// Whether the points of a measurement or a line are being set.
+    /// True if the points of a measurement or of a curved plane's line are being set.
     pub(super) has_work: bool,
-    /// Whether a panel covers the pointer, so that a press does not reach the picture.
+    /// True if a panel covers the pointer, so that a press does not reach the picture.
     pub(super) is_covered: bool,
-    /// The current time, since any fixed moment, to recognise a double click.
+    /// Time of the input since any fixed moment, by which a double click is recognised.
     pub(super) now: Duration,
 }
 
-/// A pane of the picture.
+/// A part of the picture: the rendering, or a tile with a plane.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Pane {
     Rendering,
-    /// The n-th tile of the planes.
+    /// The tile of planes with this index.
     Plane(usize),
 }
 
@@ -56,14 +56,14 @@ impl<'a> Viewport<'a> {
         pixel.iter().all(|v| v.is_finite()).then_some(pixel)
     }
 
-    /// The scene, and a position in the window as pixels of the picture; it may be outside of the picture.
+    /// The scene, and the pixel of the picture at a position in the window; it may be outside of the picture. None without a scene.
     pub(super) fn pixel_at(&self, at: [f64; 2]) -> Option<(&'a Scene, [f64; 2])> {
         let scene = self.scene?;
         Some((scene, self.pixel_of(scene, at)?))
     }
 
-    /// Columns of the picture from the volume of a pair to the surface on the same rays, where a position is on the volume; 0 elsewhere.
-    /// Both halves show the same rays: what is pressed on the volume acts as if it were pressed on the surface.
+    /// For a position (pixels of the window) on the volume of a pair, the distance to the surface on the same rays, columns of the picture;
+    /// elsewhere 0. Both halves show the same rays, so that a press on the volume acts as one on the surface.
     pub(super) fn columns_to_surface(&self, at: [f64; 2]) -> f64 {
         match self.pixel_at(at) {
             Some((scene, [x, _])) if scene.is_pair() && x < Picker::of(scene).corner()[0] => {
@@ -73,7 +73,7 @@ impl<'a> Viewport<'a> {
         }
     }
 
-    /// The pane at a position in the window; none outside of the picture and in empty cells.
+    /// The pane at a position (pixels of the window); None outside of the picture and in empty tiles.
     pub(super) fn pane_at(&self, at: [f64; 2]) -> Option<Pane> {
         let (scene, pixel) = self.pixel_at(at)?;
         let is_in = |corner: [u32; 2], size: [u32; 2]| {
@@ -91,21 +91,22 @@ impl<'a> Viewport<'a> {
         (!scene.is_flat()).then_some(Pane::Rendering)
     }
 
-    /// The point in space that a tile of planes shows at a position in the window.
+    /// The point in space, mm, that a tile of planes shows at a position (pixels of the window).
     pub(super) fn point_on_plane(&self, tile: usize, at: [f64; 2]) -> Option<DVec3> {
         let (scene, pixel) = self.pixel_at(at)?;
         let tiling = scene.tiling();
         Some(tiling.point(tiling.tiles.get(tile)?, pixel))
     }
 
-    /// The index of the body mark at a position in the window, and its part. The probe is grabbed within `reach` pixels of the window.
+    /// The index of the body mark at a position (pixels of the window), and the part of it that is there; None if there is none. `reach`:
+    /// largest distance from the probe at which it is grabbed, pixels of the window.
     pub(super) fn body_mark_at(&self, at: [f64; 2], reach: f64) -> Option<(usize, body_marks::Part)> {
         let (scene, pixel) = self.pixel_at(at)?;
         body_marks::part_at(self.body_marks, scene.picture_size().map(f64::from), pixel, reach * self.scale())
     }
 
-    /// The point of a measurement that is drawn within `reach` pixels of the window of a position on a tile of planes: index of the
-    /// measurement, index of its point.
+    /// The point of a measurement that is drawn nearest to a position on a tile of planes, within `reach` (both in pixels of the window): index
+    /// of the measurement, index of its point. None if there is none.
     pub(super) fn measure_point_at(&self, tile: usize, at: [f64; 2], reach: f64) -> Option<(usize, usize)> {
         let (scene, pixel) = self.pixel_at(at)?;
         let tiling = scene.tiling();
@@ -120,8 +121,9 @@ impl<'a> Viewport<'a> {
         near.filter(|near| near.2 <= reach).min_by(|a, b| a.2.total_cmp(&b.2)).map(|near| (near.0, near.1))
     }
 
-    /// The part of the cross-lines of three planes near a position on one of their tiles: the offset from there to the common point of the planes,
-    /// and the only normal along which it moves; no normal at the centre. `reach`: of a line and of the centre, pixels of the window.
+    /// What of the lines along which three planes cross is near a position on one of their tiles (pixels of the window). Returns the vector from
+    /// there to the common point of the planes, mm, and the normal along which a drag of that line moves the point; None in its place at the
+    /// centre. `reach`: largest distances from a line and from the centre, pixels of the window.
     pub(super) fn cross_at(&self, tile: usize, at: [f64; 2], reach: [f64; 2]) -> Option<(DVec3, Option<DVec3>)> {
         let (scene, pixel) = self.pixel_at(at)?;
         let tiling = scene.tiling();
@@ -145,7 +147,7 @@ impl<'a> Viewport<'a> {
         (nearest.1 <= of_line).then_some((way, Some(nearest.0)))
     }
 
-    /// Pixels of the picture per pixel of the window.
+    /// Pixels of the picture for one pixel of the window.
     pub(super) fn scale(&self) -> f64 {
         let scale = self.scene.map_or(1.0, |scene| f64::from(scene.picture_size()[1]) / self.size[1]);
         if scale.is_finite() { scale } else { 0.0 }
@@ -162,14 +164,14 @@ impl<'a> Viewport<'a> {
         if scale > 0.0 { pixels.max(1.0) / scale } else { f64::INFINITY }
     }
 
-    /// The centre of the rendered part, pixels of the window; in a pair, of the half at this position.
+    /// The centre of the rendering, pixels of the window; in a pair, that of the half in which the position `at` is.
     pub(super) fn rendering_centre(&self, at: [f64; 2]) -> [f64; 2] {
         let (scale, mut centre) = (self.scale(), self.scene.map_or([0.0; 2], |scene| Picker::of(scene).centre()));
         centre[0] -= self.columns_to_surface(at);
         std::array::from_fn(|a| self.corner[a] + if scale > 0.0 { centre[a] / scale } else { 0.0 })
     }
 
-    /// The middle of the selected plane or, without one, of the rendering, pixels of the window.
+    /// The middle of the selected plane's tile or, if no plane is shown, of the rendering, pixels of the window. None without a scene.
     pub(super) fn middle(&self) -> Option<[f64; 2]> {
         let (scene, scale) = (self.scene?, self.scale());
         if !scene.cuts_planes() || scale <= 0.0 {
@@ -182,25 +184,27 @@ impl<'a> Viewport<'a> {
         Some(std::array::from_fn(|a| self.corner[a] + middle(a) / scale))
     }
 
-    /// The plane of a tile, if the tiles show different planes; for a curved plane the one that it is perpendicular to.
+    /// The plane that a tile shows, if the tiles show different planes; for a curved plane the one on which its line lies.
     pub(super) fn plane_name(&self, tile: usize) -> Option<PlaneName> {
         let scene = self.scene.filter(|scene| scene.shows_three())?;
         scene.plane_of_tile(tile).or(scene.curve().map(|curve| curve.plane))
     }
 
-    /// True if a tile is a curved plane.
+    /// True if a tile shows a curved plane.
     pub(super) fn is_curved(&self, tile: usize) -> bool {
         self.scene.is_some_and(|scene| scene.tiling().tiles.get(tile).is_some_and(|tile| tile.section.is_some()))
     }
 
-    /// A position on a tile of one of the three planes: the plane, and the coordinates there, mm.
+    /// The plane that a tile shows, and the coordinates on it, mm, of a position (pixels of the window). None if it shows none of the three
+    /// planes.
     pub(super) fn coordinates(&self, tile: usize, at: [f64; 2]) -> Option<(PlaneName, [f64; 2])> {
         let (scene, place) = (self.scene?, self.point_on_plane(tile, at)?);
         let name = scene.plane_of_tile(tile)?;
         Some((name, scene.point_on_plane(name, place)))
     }
 
-    /// The point of the line of the curved plane that is drawn within `reach` pixels of the window of a position on a tile.
+    /// The index of the point of the curved plane's line that is drawn nearest to a position on a tile, within `reach` (both in pixels of the
+    /// window). None if there is none.
     pub(super) fn curve_point_at(&self, tile: usize, at: [f64; 2], reach: f64) -> Option<usize> {
         let (scene, pixel) = self.pixel_at(at)?;
         let line = scene.curve_line(&scene.tiling()).filter(|line| line.tile == tile)?;

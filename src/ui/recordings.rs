@@ -7,34 +7,34 @@ use crate::source::live::SourceKind;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
-/// Largest number of open recordings.
+/// Largest number of recordings that can be open.
 pub const MAX_OPEN: usize = 16;
 
-/// The recordings of a window, shared by the consoles that follow each other.
+/// The list of the open recordings of a window, which its successive consoles share.
 pub type OpenRecordings = Arc<Mutex<Recordings>>;
 
-/// What is kept of a recording while another one is shown.
+/// The state of a recording that is kept while another one is shown.
 #[derive(Clone, Debug)]
 pub(super) struct Kept {
     pub(super) controls: Controls,
-    /// The number of the frozen volume in the recording.
+    /// Number of the volume that was frozen; None if none was.
     pub(super) frozen: Option<u32>,
 }
 
-/// The state of the window that does not depend on the recording.
+/// The state of the panels, which does not depend on the recording.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Display {
     pub(super) panels: bool,
     pub(super) times: bool,
     pub(super) bar: bool,
-    /// Whether the panels have the keyboard focus.
+    /// True if a panel has the keyboard focus.
     pub(super) has_focus: bool,
 }
 
-/// A recording of the list, for display.
+/// An open recording, as the window lists it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Named {
-    /// Unique name.
+    /// Name of the recording, different from that of every other open one.
     pub(super) name: String,
     pub(super) path: String,
     pub(super) is_shown: bool,
@@ -50,7 +50,7 @@ struct Entry {
     kept: Option<Kept>,
 }
 
-/// The recordings that are open, in the order in which they were opened.
+/// The list of open recordings, in the order in which they were opened.
 #[derive(Debug, Default)]
 pub struct Recordings {
     all: Vec<Entry>,
@@ -65,8 +65,8 @@ fn absolute(path: &Path) -> PathBuf {
 }
 
 impl Recordings {
-    /// A list of one source, and that source is on display. `kind`: a pipe cannot be opened again. `path`: the name that opens the others
-    /// again.
+    /// A list of one source, which is shown. `kind`: its kind; a pipe cannot be opened again. `path`: the path or name by which a source of
+    /// another kind is opened again.
     pub fn of(kind: SourceKind, path: &Path) -> Recordings {
         let title = match kind {
             SourceKind::Demo => Some(texts::DEMO_DATA),
@@ -77,7 +77,7 @@ impl Recordings {
         Recordings { all: vec![entry], ..Recordings::default() }
     }
 
-    /// Appends a recording unless it is listed. False if there is no room.
+    /// Appends a recording unless it is in the list. Returns false if there is no room.
     pub fn add(&mut self, path: &Path) -> bool {
         let path = absolute(path);
         let is_there = self.place(&path).is_some();
@@ -108,19 +108,19 @@ impl Recordings {
         self.place(path).or_else(|| self.place(&absolute(path)))
     }
 
-    /// The recording so many positions after (or before) another one; the list is a ring.
+    /// The recording that is `by` positions after the recording `from`; after the last one comes the first.
     pub(super) fn step(&self, from: &Path, by: i32) -> Option<&Path> {
         let at = self.index(from).unwrap_or(self.shown) as i64 + i64::from(by);
         self.path(at.rem_euclid(self.all.len().max(1) as i64) as usize)
     }
 
-    /// The name of a recording, by its path.
+    /// The name of the recording with this path.
     pub(super) fn name(&self, path: &Path) -> String {
         let own = || Entry { path: path.to_path_buf(), title: None, returns: true, kept: None }.file_name();
         self.index(path).and_then(|at| self.names().into_iter().nth(at)).unwrap_or_else(own)
     }
 
-    /// All recordings, for display.
+    /// All recordings, as the window lists them.
     pub(super) fn list(&self) -> Vec<Named> {
         let names = self.names().into_iter().zip(&self.all).enumerate();
         let named = |(n, (name, entry)): (usize, (String, &Entry))| Named {
@@ -157,8 +157,8 @@ impl Recordings {
         names.collect()
     }
 
-    /// Shows a recording of the list in place of the present one, whose state is `kept`. A source that cannot be opened again leaves the list, as
-    /// does the present one if `closes`.
+    /// Makes the recording with this path the shown one. `kept`: the state of the one that was shown. `closes`: remove that one from the list; a
+    /// source that cannot be opened again is removed in any case.
     pub(super) fn show(&mut self, path: &Path, kept: Option<Kept>, closes: bool, display: Display) {
         self.display = Some(display);
         let Some(next) = self.index(path) else { return };
@@ -174,19 +174,19 @@ impl Recordings {
         }
     }
 
-    /// What is kept of the n-th recording, if handiwork on it is in no file.
+    /// The kept state of the n-th recording if it has measurements, annotations, body marks or cuts that are in no file; otherwise None.
     pub(super) fn unsaved(&self, n: usize) -> Option<&Kept> {
         self.all.get(n)?.kept.as_ref().filter(|kept| n != self.shown && kept.controls.is_unsaved())
     }
 
-    /// Records that this handiwork on a recording is saved.
+    /// Notes that these measurements, annotations, body marks and cuts of the recording with this path are in a file.
     pub(super) fn saved(&mut self, path: &Path, work: Handiwork) {
         if let Some(kept) = self.index(path).and_then(|n| self.all[n].kept.as_mut()) {
             kept.controls.saved(work);
         }
     }
 
-    /// Removes a recording that is not shown.
+    /// Removes the n-th recording, which must not be the shown one.
     pub(super) fn remove(&mut self, n: usize) {
         if n < self.all.len() && n != self.shown {
             self.all.remove(n);
@@ -194,7 +194,7 @@ impl Recordings {
         }
     }
 
-    /// Takes the kept state of the shown recording, and the state of the window.
+    /// Takes the kept state of the shown recording, and that of the panels; None for what was not kept.
     pub(super) fn take_kept(&mut self) -> (Option<Kept>, Option<Display>) {
         let kept = self.all.get_mut(self.shown).and_then(|entry| entry.kept.take());
         (kept, self.display)

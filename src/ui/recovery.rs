@@ -13,7 +13,7 @@ const MAX_ATTEMPTS: u32 = 20;
 /// A screen that presented so often counts as recovered.
 const STABLE_FRAMES: u64 = 60;
 
-/// What was lost.
+/// What was lost and has to be created again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Lost {
     Screen,
@@ -21,18 +21,18 @@ pub(super) enum Lost {
     Device,
 }
 
-/// What recovery does next.
+/// What has to be done next for recovery.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum RecoveryStep {
     /// Nothing is lost.
     Idle,
     /// Wait until this time.
     WaitUntil(Instant),
-    /// Restore it now.
+    /// Create it again now.
     Restore(Lost),
 }
 
-/// Counts faults and schedules attempts.
+/// Counts losses of the screen or the device, and schedules attempts to create them again.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Recovery {
     next_attempt: Option<(Instant, Lost)>,
@@ -40,7 +40,7 @@ pub(super) struct Recovery {
 }
 
 impl Recovery {
-    /// Records that something is lost and schedules an attempt. False if the limit is reached.
+    /// Notes that something was lost, and schedules an attempt. Returns false if there were too many in a row.
     pub(super) fn lost(&mut self, lost: Lost, now: Instant) -> bool {
         self.faults += 1;
         let wait = if self.faults == 1 { Duration::ZERO } else { RETRY_INTERVAL };
@@ -48,7 +48,7 @@ impl Recovery {
         self.faults <= MAX_ATTEMPTS
     }
 
-    /// What to do now. A [`RecoveryStep::Restore`] is returned once: it counts as successful unless [`Recovery::lost`] follows.
+    /// What has to be done now. [`RecoveryStep::Restore`] is returned once; it counts as successful unless [`Recovery::lost`] follows.
     pub(super) fn poll(&mut self, now: Instant) -> RecoveryStep {
         match self.next_attempt {
             None => RecoveryStep::Idle,
@@ -60,7 +60,7 @@ impl Recovery {
         }
     }
 
-    /// Resets the count of faults once the current screen is stable. `count`: number of its presentations.
+    /// Sets the number of losses to 0 once the screen has presented often enough. `count`: number of presentations of the present screen.
     pub(super) fn presented(&mut self, count: u64) {
         if count > STABLE_FRAMES {
             self.faults = 0;
@@ -68,7 +68,7 @@ impl Recovery {
     }
 }
 
-/// What is lost by an error of the console, and its cause.
+/// What an error of the console means to be lost, and its cause.
 pub(super) fn lost_by(error: ConsoleError) -> (Lost, GpuError) {
     match error {
         ConsoleError::DeviceLost(fault) => (Lost::Device, fault),
@@ -76,7 +76,7 @@ pub(super) fn lost_by(error: ConsoleError) -> (Lost, GpuError) {
     }
 }
 
-/// Where a console is shown.
+/// On what a console is shown: a window or a monitor.
 pub(super) struct Output<'a> {
     pub(super) device: &'a ContextOptions,
     pub(super) target: Target,
@@ -84,7 +84,8 @@ pub(super) struct Output<'a> {
 }
 
 impl Output<'_> {
-    /// Creates the screen again, on a newly opened device if that was lost. `size` gives the size of the window, pixels, which is returned.
+    /// Creates the screen again, on a newly opened device if that was lost. `size`: gives the size of the window, pixels, which is also
+    /// returned.
     ///
     /// # Errors
     /// What is still lost, and why.

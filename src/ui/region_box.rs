@@ -12,36 +12,36 @@ use glam::DVec3;
 /// A shorter side of a section has no handle, pixels.
 const MIN_SIDE: f64 = 12.0;
 
-/// A side of the section of the region by a plane, pixels of the picture, and the face of the region that it lies on.
+/// A side of the outline in which a plane cuts the region: its ends, pixels of the picture, and the face of the region on which it lies.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Side {
     pub(super) face: Face,
     pub(super) ends: [[f64; 2]; 2],
-    /// The middle of its visible part on its tile, if that is long enough to be grabbed.
+    /// Position of its handle, in the middle of its visible part, pixels of the picture; None if it is too short to be dragged.
     pub(super) handle: Option<[f64; 2]>,
 }
 
-/// The part of the region's box at a position on a tile.
+/// The part of the region that is at a position on a tile.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Part {
     Face(Face),
     Inside,
 }
 
-/// An edge of the region in the rendering, pixels of the picture.
+/// An edge of the region's box in the rendering: its ends, pixels of the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Edge {
     pub(super) ends: [[f64; 2]; 2],
-    /// Whether both adjacent faces are turned away from the viewer.
+    /// True if both faces at the edge are turned away from the viewer.
     pub(super) is_behind: bool,
 }
 
-/// True if planes show the region's section: those beside a rendering, which are not cropped to the region.
+/// True if planes show the outline of the region: those beside a rendering do, as they are not cropped to the region.
 pub(super) fn is_on_planes(scene: &Scene) -> bool {
     scene.has_sections()
 }
 
-/// The sides of the section of the region by the plane of a tile; none if the plane misses the region.
+/// The sides of the outline in which the plane of a tile cuts the region; empty if it misses the region.
 pub(super) fn section(scene: &Scene, tiling: &Tiling, tile: &Tile) -> Vec<Side> {
     let plane = &tile.plane;
     let reach = 4.0 * (scene.high - scene.low).length() + 2.0 * (plane.at - (scene.low + scene.high) / 2.0).length();
@@ -83,27 +83,27 @@ const LEAST_FACING: f64 = 0.3;
 /// Straight pieces of a curved start line.
 const PIECES: usize = 96;
 
-/// The start line of the region on plane A, pixels of the picture.
+/// The start curve of the region as drawn on plane A, pixels of the picture.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct StartLine {
-    /// The vertices of the line, from the left to the right side of the region.
+    /// The vertices of the curve, from the left to the right side of the region, pixels of the picture.
     pub(super) line: Vec<[f64; 2]>,
     /// Lateral positions of the vertices, mm.
     lateral: Vec<f64>,
-    /// The handles; none while the line is straight.
+    /// Positions of the handles; empty while the curve is straight.
     pub(super) handles: Vec<[f64; 2]>,
 }
 
-/// The part of the start line at a position on a tile.
+/// The part of the start curve that is at a position on a tile.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum StartPart {
     Handle(usize),
-    /// The lateral position there, mm.
+    /// The curve itself, at this lateral position, mm.
     Line(f64),
 }
 
-/// The start line through points (lateral, depth, mm), straight without points, on a tile that shows plane A beside a rendering and is not rotated
-/// too far. The points may be newer than the scene of the shown picture.
+/// The drawing of the start curve through `points` (lateral, depth, mm; none for a straight one). None unless the tile shows plane A beside a
+/// rendering and the plane is not rotated too far. The points may be newer than the scene of the shown picture.
 pub(super) fn start_line(scene: &Scene, tiling: &Tiling, tile: usize, points: &[[f64; 2]]) -> Option<StartLine> {
     let is_shown = tile == START_TILE && is_on_planes(scene) && scene.renders();
     let tile = tiling.tiles.get(tile).filter(|_| is_shown)?;
@@ -126,7 +126,8 @@ pub(super) fn start_line(scene: &Scene, tiling: &Tiling, tile: usize, points: &[
     Some(StartLine { line: lateral.iter().map(|x| on_tile(*x, depth(*x))).collect(), lateral, handles })
 }
 
-/// The part of the start line through points at a position on a tile, pixels of the picture. `reach`: of the line and of a handle, pixels.
+/// The part of the start curve through `points` (lateral, depth, mm) at a position on a tile, pixels of the picture; None if there is none.
+/// `reach`: largest distances from the curve and from a handle, pixels.
 pub(super) fn start_at(
     scene: &Scene,
     tile: usize,
@@ -170,7 +171,8 @@ fn handle(tile: &Tile, [from, to]: [[f64; 2]; 2]) -> Option<[f64; 2]> {
     is_long.then(|| [0, 1].map(|axis| from[axis] + way[axis] * middle))
 }
 
-/// The part of the region's section at a position on a tile, pixels of the picture. `reach`: of a side and of its handle, pixels.
+/// The part of the region at a position on a tile, pixels of the picture; None if there is none. `reach`: largest distances from a side and from
+/// its handle, pixels.
 pub(super) fn part_at(scene: &Scene, tile: usize, at: [f64; 2], reach: [f64; 2]) -> Option<Part> {
     if !is_on_planes(scene) {
         return None;
@@ -207,7 +209,7 @@ fn share(at: [f64; 2], [from, to]: [[f64; 2]; 2]) -> f64 {
     ((off[0] * way[0] + off[1] * way[1]) / length).clamp(0.0, 1.0)
 }
 
-/// The edges of the region in the rendering, without what is behind the camera.
+/// The edges of the region's box in the rendering, without the parts behind the camera.
 pub(super) fn wireframe(scene: &Scene) -> Vec<Edge> {
     if scene.is_flat() {
         return Vec::new();
@@ -237,7 +239,8 @@ pub(super) fn wireframe(scene: &Scene) -> Vec<Edge> {
     (0..12).filter_map(edge).collect()
 }
 
-/// The handles of the region's faces in the rendering, pixels of the picture: the middle of each face whose axis is not seen end-on.
+/// Positions of the handles of the region's faces in the rendering, pixels of the picture: the middle of each face whose normal does not point
+/// at the viewer or away.
 pub(super) fn rendered_handles(scene: &Scene) -> Vec<[f64; 2]> {
     if scene.is_flat() {
         return Vec::new();
@@ -247,7 +250,7 @@ pub(super) fn rendered_handles(scene: &Scene) -> Vec<[f64; 2]> {
     handles.filter_map(|face| picker.project(face_axis(scene, face).0)).collect()
 }
 
-/// How far a face moves if its line on a plane is dragged by a vector in that plane, mm.
+/// How far a face moves outwards, mm, if its line on a plane is dragged by the vector `way` in space, mm.
 pub(super) fn along(face: Face, way: DVec3) -> f64 {
     way.dot(outwards(face))
 }

@@ -10,7 +10,7 @@ use winit::window::Window;
 #[cfg(feature = "screen-reader")]
 pub(super) use self::served::ScreenReader;
 
-/// Replaces the connection in a program without the feature.
+/// Stands for the connection with screen readers in a program that is built without it.
 #[cfg(not(feature = "screen-reader"))]
 pub(super) struct ScreenReader;
 
@@ -51,7 +51,7 @@ mod served {
     impl ScreenReader {
         pub(crate) const IS_SERVED: bool = true;
 
-        /// `window` must not have been visible yet. `wake` is called, by any thread, when there is something to [`ScreenReader::listen`] to.
+        /// `window` must not have been visible yet. `wake` is called, on any thread, when there are requests for [`ScreenReader::listen`].
         pub fn new(events: &ActiveEventLoop, window: &Window, wake: Wake) -> ScreenReader {
             let (sender, heard) = channel();
             let ear = Ear { sender, wake };
@@ -59,7 +59,7 @@ mod served {
             ScreenReader { adapter, heard, is_listening: false }
         }
 
-        /// Handles an event of the window that changes its position or focus.
+        /// Handles an event of the window that concerns its position or focus.
         pub fn event(&mut self, window: &Window, event: &WindowEvent) {
             self.adapter.process_event(window, event);
         }
@@ -78,7 +78,7 @@ mod served {
             }
         }
 
-        /// Sends the tree of the panels, if they were laid out.
+        /// Sends the accessibility tree of the panels to screen readers, if the panels were laid out since the last call.
         pub fn tell(&mut self, console: &mut Console) {
             if let Some(tree) = console.take_tree() {
                 self.adapter.update_if_active(|| tree);

@@ -4,13 +4,13 @@
 use crate::passes::unveil::StartLine;
 use crate::scene::Scene;
 
-/// A picture that was drawn.
+/// What a picture in the window shows.
 #[derive(Clone, Debug)]
 pub(super) struct ShownPicture {
-    /// The scene that was drawn: settings, size and geometry.
+    /// The scene that was drawn, with its settings, size and geometry.
     pub(super) scene: Scene,
-    /// The number of the drawn volume in the stream.
+    /// Number of the volume that was drawn, in the stream.
     pub(super) volume: u32,
-    /// Start lines on the planes beside the rendering, if rendering starts at the fluid.
+    /// The lines on the planes beside the rendering at which rendering starts, if that follows the fluid; otherwise empty.
     pub(super) start_lines: Vec<StartLine>,
 }

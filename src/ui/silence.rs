@@ -7,7 +7,7 @@ const SILENCE: Duration = Duration::from_secs(3);
 /// An update that takes so long does not count as silence of the source.
 const LONG_UPDATE: Duration = Duration::from_millis(100);
 
-/// The silence of a source.
+/// Measures for how long a source has delivered no frame.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Silence {
     /// When the last frame came, plus all the time since that the program was busy.
@@ -21,29 +21,30 @@ impl Silence {
         Silence { last: now, busy_since: None }
     }
 
-    /// Records that frames came.
+    /// Notes that frames arrived.
     pub(super) fn frames_came(&mut self, now: Instant) {
         self.last = now;
     }
 
-    /// Begins an update. Frames may have waited if the device was busy since the previous one.
+    /// Notes that an update of the console begins. If the device was busy since the previous one, that time does not count as silence.
     pub(super) fn begin_update(&mut self, now: Instant) {
         self.last += self.busy_since.take().map_or(Duration::ZERO, |since| now.saturating_duration_since(since));
     }
 
-    /// Ends an update that began at `now` and took this time; `is_busy`: the device still works.
+    /// Notes that the update that began at `now` took the time `took`, which does not count as silence if it was long. `is_busy`: the device
+    /// still works.
     pub(super) fn end_update(&mut self, now: Instant, took: Duration, is_busy: bool) {
         // What takes long here keeps no frame from coming, but from being taken.
         self.last += Some(took).filter(|took| *took >= LONG_UPDATE).unwrap_or_default();
         self.busy_since = is_busy.then_some(now);
     }
 
-    /// True if the source is silent.
+    /// True if no frame arrived for so long that a warning is due.
     pub(super) fn is_silent(&self, now: Instant) -> bool {
         now.saturating_duration_since(self.last) >= SILENCE
     }
 
-    /// When the source will count as silent if no frame comes.
+    /// Time at which a warning becomes due if no frame arrives.
     pub(super) fn due(&self) -> Instant {
         self.last + SILENCE
     }

@@ -4,7 +4,7 @@ use crate::scene::{Group, MAX_DEVIATION, Mode, Scene, Settings, Slider, Smooth, 
 use crate::texts;
 use std::sync::LazyLock;
 
-/// All groups with their names, in display order.
+/// All groups of sliders with their names, in the order in which they are shown.
 pub(super) const GROUPS: [(Group, &str); 7] = [
     (Group::Image, texts::IMAGE),
     (Group::Surface, texts::SURFACE),
@@ -21,8 +21,8 @@ pub(super) const GAIN: usize = 0;
 pub(super) const THRESHOLD: usize = 1;
 pub(super) const PLANES_ZOOM: usize = 2;
 
-/// All sliders; those of a group are in display order. Windows, thresholds and start depths change the values of the current mode; a mixed picture
-/// has them twice, for its surface and for its volume layer.
+/// All sliders; those of a group are in the order in which they are shown. Sliders of windows, thresholds and start depths change the values of
+/// the present mode; for a mixed picture there are two of each, one for its surface and one for its volume layer.
 pub static SLIDERS: LazyLock<Vec<Slider>> = LazyLock::new(|| {
     let mut all: Vec<Slider> = numbers().filter_map(|number| number.slider).collect();
     for (ahead_of, sliders) in OF_SEVERAL {
@@ -42,13 +42,13 @@ fn unit_of(slider: &Slider, scene: &Scene) -> [f64; 2] {
     if OF_ECHOES.contains(&slider.key) { scene.input.range } else { [0.0, 1.0] }
 }
 
-/// Converts a value of a slider to its displayed unit.
+/// Converts a value of the setting to the unit in which the slider shows it.
 pub(super) fn to_shown(slider: &Slider, scene: &Scene, value: f64) -> f64 {
     let [low, high] = unit_of(slider, scene);
     low + value * (high - low)
 }
 
-/// Converts a displayed value to the slider's own unit.
+/// Converts a value in the unit in which the slider shows it to that of the setting.
 pub(super) fn from_shown(slider: &Slider, scene: &Scene, shown: f64) -> f64 {
     let [low, high] = unit_of(slider, scene);
     if high > low { (shown - low) / (high - low) } else { shown }

@@ -9,28 +9,28 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::time::{Duration, Instant};
 
-/// Opens a source, or returns the reason in one line.
+/// A function that opens a source, or returns in one line why it cannot.
 pub type OpenSource = Arc<dyn Fn() -> Result<Box<dyn Live>, String> + Send + Sync>;
 
-/// A message about a source: its title, its text, and whether it is a fault.
+/// A message about a source: its title, its text, and true if it is a fault.
 pub(super) type SourceNotice = (&'static str, String, bool);
 
-/// The state of the source.
+/// Whether the source is being opened, is open, or has ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum SourceState {
     Opening,
     Open,
-    /// The source ended or could not be opened, for this reason, and will be opened again.
+    /// The source ended or could not be opened for the given reason, and will be opened again.
     Retrying(String),
-    /// The source ended for good, with the reason if that was unexpected.
+    /// The source ended for good; the reason if that was not expected.
     Ended(Option<String>),
-    /// The user cancelled opening the source.
+    /// The user cancelled the opening of the source.
     Cancelled,
 }
 
 impl SourceState {
-    /// The message about a source of this kind, if there is one. `disconnected`: why it is not connected. `is_silent`: no frame came for a while
-    /// although the program could have taken one. `has_shown`: a volume was shown.
+    /// The message about a source of this kind; None if there is none. `disconnected`: why it is not connected. `is_silent`: no frame arrived
+    /// for a while although the program could have taken one. `has_shown`: at least one volume was shown.
     pub(super) fn notice(
         &self,
         kind: SourceKind,
@@ -72,7 +72,7 @@ impl SourceState {
     }
 }
 
-/// Keeps a source open.
+/// Opens a source on a thread, and again after it has ended.
 pub(super) struct SourceSupervisor {
     open: OpenSource,
     /// Time between two attempts; `None`: there is only one.
@@ -89,7 +89,8 @@ pub(super) struct SourceSupervisor {
 }
 
 impl SourceSupervisor {
-    /// `retry`: time before the source is opened again; `None`: never. `record`: a file for all frames that arrive.
+    /// `open`: opens the source. `retry`: time after which a source that ended is opened again; `None`: it is not. `record`: path of a file to
+    /// which all frames are recorded.
     pub(super) fn new(
         open: OpenSource,
         retry: Option<Duration>,
@@ -109,7 +110,7 @@ impl SourceSupervisor {
         }
     }
 
-    /// How often the source could not be opened.
+    /// Number of times that the source could not be opened.
     pub(super) fn not_opened(&self) -> u64 {
         self.not_opened
     }
@@ -118,12 +119,12 @@ impl SourceSupervisor {
         &self.state
     }
 
-    /// When [`SourceSupervisor::poll`] has to be called without an event.
+    /// Time at which [`SourceSupervisor::poll`] has to be called even without an event; None if an event comes first.
     pub(super) fn wakes_at(&self) -> Option<Instant> {
         self.next_attempt
     }
 
-    /// The source, if it was opened since the last call.
+    /// The source, if it was opened since the last call; otherwise None.
     pub(super) fn poll(&mut self, now: Instant) -> Option<Feed> {
         if self.next_attempt.is_some_and(|at| now >= at) {
             self.next_attempt = None;
@@ -155,7 +156,7 @@ impl SourceSupervisor {
         }
     }
 
-    /// Cancels opening the source. False if it is not being opened.
+    /// Cancels the opening of the source. Returns false if it is not being opened.
     pub(super) fn cancel(&mut self) -> bool {
         let is_opening = self.opening.take().is_some();
         if is_opening {
@@ -164,7 +165,7 @@ impl SourceSupervisor {
         is_opening
     }
 
-    /// Records the end of the source, with the reason if it was unexpected.
+    /// Notes that the source ended. `why`: the reason, if that was not expected.
     pub(super) fn ended(&mut self, why: Option<String>, now: Instant) {
         match self.retry {
             Some(retry) => {

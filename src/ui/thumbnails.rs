@@ -15,7 +15,7 @@ use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Width and height, pixels.
+/// Width and height of a thumbnail, pixels.
 pub(super) const SIZE: [u32; 2] = [256, 160];
 /// Longest edge of a slice, pixels.
 const SLICE: u32 = 128;
@@ -27,22 +27,22 @@ const CELL: f64 = 1.6;
 const PATIENCE: Duration = Duration::from_secs(1);
 const POLL: Duration = Duration::from_millis(10);
 
-/// A list of pictures to make.
+/// A list of thumbnails to draw.
 pub(super) struct Job {
     pub(super) context: Arc<Context>,
     pub(super) input: Input,
-    /// One for each picture; none where there is nothing to draw.
+    /// For each thumbnail what it shows; None for one that is not drawn.
     pub(super) pictures: Vec<Option<Wanted>>,
 }
 
-/// The volume and settings of one picture.
+/// The volume that a thumbnail shows, and its settings.
 pub(super) struct Wanted {
     pub(super) geometry: Geometry,
     pub(super) frames: Vec<Arc<Frame>>,
     pub(super) settings: Settings,
 }
 
-/// The pictures, and the thread that makes them.
+/// A list of thumbnails, and the thread that draws them.
 pub(super) struct Thumbnails {
     wake: Wake,
     pictures: Vec<Option<Arc<Picture>>>,
@@ -70,7 +70,7 @@ impl Thumbnails {
         Thumbnails { wake, pictures: Vec::new(), work: None, ending: Vec::new() }
     }
 
-    /// The pictures made so far. Earlier ones stay until they are replaced.
+    /// The thumbnails drawn so far; None for one that is not. Those of an earlier job stay until they are replaced.
     pub(super) fn pictures(&self) -> &[Option<Arc<Picture>>] {
         &self.pictures
     }
@@ -79,7 +79,7 @@ impl Thumbnails {
         self.work.is_some()
     }
 
-    /// Starts to make pictures, in place of those in progress.
+    /// Starts to draw the thumbnails of a job, in place of those that are being drawn.
     pub(super) fn begin(&mut self, job: Job) {
         self.stop();
         self.pictures.resize(job.pictures.len(), None);
@@ -95,13 +95,14 @@ impl Thumbnails {
         }
     }
 
-    /// Like [`Thumbnails::begin`], but where the job has no picture, the one in `kept` stays.
+    /// Like [`Thumbnails::begin`], but the list is `kept` until its entries are replaced; one that the job does not draw stays.
     pub(super) fn begin_with(&mut self, job: Job, kept: Vec<Option<Arc<Picture>>>) {
         self.begin(job);
         self.pictures = kept;
     }
 
-    /// Takes finished pictures. `may_draw`: the view rests. True if there is a new one.
+    /// Collects thumbnails that are finished. `may_draw`: the view is at rest, so that the thread may use the device. Returns true if there is a
+    /// new one.
     pub(super) fn poll(&mut self, may_draw: bool) -> bool {
         self.ending.retain(|thread| !thread.is_finished());
         let Some(work) = &self.work else { return false };
@@ -124,13 +125,13 @@ impl Thumbnails {
         }
     }
 
-    /// Stops, and discards all pictures but the first `count`.
+    /// Stops drawing, and discards all thumbnails after the first `count`.
     pub(super) fn keep_first(&mut self, count: usize) {
         self.stop();
         self.pictures.truncate(count);
     }
 
-    /// Tells the thread to stop, without waiting for it.
+    /// Stops drawing, without waiting for the thread to end.
     pub(super) fn stop(&mut self) {
         if let Some(work) = self.work.take() {
             work.orders.must_stop.store(true, Ordering::Relaxed);
@@ -138,7 +139,7 @@ impl Thumbnails {
         }
     }
 
-    /// Stops, and discards the pictures.
+    /// Stops drawing, and discards all thumbnails.
     pub(super) fn clear(&mut self) {
         self.stop();
         self.pictures.clear();

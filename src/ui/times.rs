@@ -8,7 +8,7 @@ use std::time::Duration;
 /// Number of recent times that percentiles are taken from.
 const MAX_RECENT: usize = 256;
 
-/// The most recent times of a repeated event.
+/// The most recent durations of something that happens repeatedly, ms.
 #[derive(Clone, Debug, Default)]
 pub(super) struct RecentTimes(VecDeque<f64>);
 
@@ -20,7 +20,7 @@ impl RecentTimes {
         }
     }
 
-    /// A percentile in ms; `share`: 0..=1. None before the first time.
+    /// Quantile of the durations at `share` (0..=1), ms. None before the first one.
     pub(super) fn percentile(&self, share: f64) -> Option<f64> {
         quantile_of(self.0.iter().copied(), share)
     }
@@ -33,32 +33,33 @@ impl RecentTimes {
 /// Longest delay of a live picture that is not told, ms.
 const UNTOLD_DELAY: f64 = 1000.0;
 
-/// The content of the display of times.
+/// The times and counts that the display of times shows.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Times {
-    /// By pass, for the last second in which it ran: mean time in ms, and number of runs.
+    /// For each pass its name, its mean time in ms and its number of runs, over the last second in which it ran.
     pub(super) passes: Vec<(&'static str, f64, u32)>,
-    /// Time from the start of a picture to its end.
+    /// Times from the start of a picture to its completion.
     pub(super) pictures: RecentTimes,
-    /// Time from an input to the picture that shows its effect.
+    /// Times from an input to the picture that shows its effect.
     pub(super) input_latency: RecentTimes,
-    /// Time from the presentation of a picture to its first pixel on the monitor. Empty if the device cannot measure it.
+    /// Times from the presentation of a picture to its first pixel on the monitor. Empty if the device cannot measure them.
     pub(super) scan_out: RecentTimes,
-    /// Rates per second, for the last complete second.
+    /// Frames received a second, over the last complete second; `volumes` and `shown` are volumes shown and pictures drawn a second.
     pub(super) frames: f64,
     pub(super) volumes: f64,
     pub(super) shown: f64,
-    /// Time from the arrival of a frame to the picture that shows it, ms: 95th percentile of the last second.
+    /// 95th percentile over the last second of the time from the arrival of a frame to the picture that shows it, ms; None if there was none.
     pub(super) latency: Option<f64>,
-    /// Counts since the start.
+    /// Number of volumes dropped since the start; `lost` is the number of frames.
     pub(super) dropped: u64,
     pub(super) lost: u64,
-    /// The physical minimum time to acquire a volume, set by the speed of sound, s.
+    /// Shortest time in which a volume can be acquired at the speed of sound, s; None if not known.
     pub(super) acquisition_time: Option<f64>,
 }
 
 impl Times {
-    /// Delay of the pictures behind the frames, s, if it is worth showing. The wait of a frame for the last one of its volume is no delay.
+    /// Time by which the pictures are behind the frames, s; None if it is too short to be shown. The time that a frame waits for the last one of
+    /// its volume does not count.
     pub(super) fn delay(&self) -> Option<f64> {
         let acquired = 1e3 * self.acquisition_time.unwrap_or(0.0);
         self.latency.map(|ms| ms - acquired).filter(|ms| *ms > UNTOLD_DELAY).map(|ms| ms / 1e3)

@@ -9,7 +9,7 @@ use glam::{DVec2, DVec3};
 /// Limits of the zoom for gestures and keys. A zoom beyond them that a scene file set stays reachable.
 const ZOOM: [f64; 2] = [0.2, 20.0];
 
-/// Converts a point in space to the coordinates of the settings, whose depth counts from the probe's face.
+/// Converts a point in space, mm, to the coordinates of the settings, in which depth is counted from the probe's face.
 pub(super) fn below_face(scene: &Scene, point: DVec3) -> DVec3 {
     point - DVec3::Y * scene.probe().map_or(0.0, |probe| probe.array_radius())
 }
@@ -19,7 +19,7 @@ pub(super) fn wrap_degrees(degrees: f64) -> f64 {
     if (-180.0..=180.0).contains(&degrees) { degrees } else { (degrees + 180.0).rem_euclid(360.0) - 180.0 }
 }
 
-/// The deepest start depth that the mode draws from, as Y in space.
+/// The largest depth at which the mode starts to draw, as Y in space, mm.
 pub(super) fn start_depth(scene: &Scene) -> f64 {
     scene.start_depth()
 }
@@ -48,8 +48,8 @@ pub(super) fn upright(camera: &Camera, geometry: &Geometry) -> Camera {
     }
 }
 
-/// The camera after a rotation by azimuth and elevation, degrees. Azimuth wraps around. Elevation ends where the camera looks from
-/// above or below: beyond that everything would be upside down, and the far side is 180 degrees of azimuth away.
+/// The camera after a rotation by azimuth and elevation, degrees. Azimuth wraps around. Elevation is limited so that the camera looks at most
+/// straight from above or below: beyond that everything would be upside down, and the far side is 180 degrees of azimuth away.
 pub(super) fn rotate(now: &Scene, [azimuth, elevation]: [f64; 2]) -> Camera {
     let camera = upright(&now.settings.camera, &now.geometry);
     let level = level(&now.geometry);
@@ -57,17 +57,17 @@ pub(super) fn rotate(now: &Scene, [azimuth, elevation]: [f64; 2]) -> Camera {
     Camera { azimuth: wrap_degrees(camera.azimuth + azimuth), elevation, ..camera }
 }
 
-/// A side from which a rendering is seen, relative to its orientation at the start and not to the patient.
+/// A side from which a rendering is viewed, relative to its orientation at the start and not to the patient.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Viewpoint {
-    /// From the probe.
+    /// From the side of the probe.
     Front,
     Left,
     Right,
     Top,
 }
 
-/// The camera at a viewpoint, upright.
+/// The camera that looks from a viewpoint, upright.
 pub(super) fn look_from(now: &Scene, viewpoint: Viewpoint) -> Camera {
     let [azimuth, elevation] = match viewpoint {
         Viewpoint::Front => [0.0, 0.0],
@@ -78,18 +78,19 @@ pub(super) fn look_from(now: &Scene, viewpoint: Viewpoint) -> Camera {
     Camera { azimuth, elevation: level(&now.geometry) + elevation, roll: 0.0, ..now.settings.camera.clone() }
 }
 
-/// True if a rendering is seen from a viewpoint.
+/// True if the camera looks from this viewpoint.
 pub(super) fn is_seen_from(now: &Scene, viewpoint: Viewpoint) -> bool {
     let angles = |camera: &Camera| [camera.azimuth, camera.elevation, camera.roll];
     angles(&now.settings.camera) == angles(&look_from(now, viewpoint))
 }
 
-/// A zoom multiplied by a factor, within [`ZOOM`].
+/// The zoom multiplied by a factor, and limited to [`ZOOM`].
 pub(super) fn scale_zoom(zoom: f64, factor: f64) -> f64 {
     (zoom * factor).clamp(ZOOM[0].min(zoom), ZOOM[1].max(zoom))
 }
 
-/// The camera's target after a pan: everything at its distance moves by these fractions of the picture's height (right, down).
+/// The target of the camera after what is shown at its distance was moved to the right and down, by shares of the picture's height. Coordinates
+/// are those of the settings, mm.
 pub(super) fn pan(now: &Scene, shares: [f64; 2]) -> [f64; 3] {
     let height = f64::from(now.picture_size()[1]) * Picker::of(now).mm_per_pixel();
     let [right, down] = shares.map(|s| s.clamp(-10.0, 10.0) * height);
@@ -103,8 +104,8 @@ fn clamp_to_data(now: &Scene, was: DVec3, point: DVec3) -> [f64; 3] {
     below_face(now, point.max(low.min(was)).min(high.max(was))).to_array()
 }
 
-/// Moves the light over a dome on the viewer's side: its direction, and the position of a near light. The dome's rim is slightly above
-/// the horizon, where a surface that faces the viewer still gets some light.
+/// Moves the light to the right and down over a dome on the viewer's side, by shares of the picture's height: its direction, or the position of
+/// a near light. The rim of the dome is slightly above the horizon, where a surface that faces the viewer still gets some light.
 pub(super) fn move_light(settings: &mut Settings, shares: [f64; 2]) {
     const RIM: f64 = 0.98;
     let light = &mut settings.light;
@@ -121,8 +122,9 @@ pub(super) fn move_light(settings: &mut Settings, shares: [f64; 2]) {
     }
 }
 
-/// The clip planes after the viewer's plane moved by so many mm. The viewer's plane is the one after the first `others`. It faces the
-/// viewer; if the view was rotated since, the plane rotates about its point on the volume's central line. None if all planes are in use.
+/// The clip planes after the viewer's plane was moved by `by` mm into the volume. The viewer's plane is the one after the first `others`. It
+/// faces the viewer; if the view was rotated since, the plane rotates about its point on the volume's central line. None if all clip planes are
+/// in use.
 pub(super) fn move_clip(now: &Scene, others: usize, by: f64) -> Option<Vec<Clip>> {
     let mut planes = now.settings.clip.clone();
     let mine = if planes.len() > others { planes.pop() } else { None };
@@ -145,13 +147,13 @@ pub(super) fn move_clip(now: &Scene, others: usize, by: f64) -> Option<Vec<Clip>
     Some(planes)
 }
 
-/// The point where the planes cross after the named one moved along its normal, mm.
+/// The point where the three planes cross, in the coordinates of the settings, mm, after the named plane was moved along its normal by `by` mm.
 pub(super) fn step_plane(now: &Scene, name: PlaneName, by: f64) -> [f64; 3] {
     let plane = now.plane(name);
     clamp_to_data(now, plane.at, plane.at + plane.normal * by.clamp(-1e6, 1e6))
 }
 
-/// A crossing point of the planes, in the coordinates of the settings, limited to the insonified box.
+/// The point where the planes cross, in the coordinates of the settings, mm, limited to the box around the insonified region.
 pub(super) fn clamp_crossing(now: &Scene, point: [f64; 3]) -> [f64; 3] {
     let offset = now.low - below_face(now, now.low);
     let point = DVec3::from(point) + offset;
@@ -159,9 +161,9 @@ pub(super) fn clamp_crossing(now: &Scene, point: [f64; 3]) -> [f64; 3] {
     below_face(now, point.clamp(low, high)).to_array()
 }
 
-/// Adjusts zoom and target of settings with another region or view, so that the picture keeps its scale and position. The camera fits
-/// the box of the region into the picture: without this a face would run away from the pointer that drags it, and a volume would grow
-/// and shrink while it rotates.
+/// The settings, which have another region or view than the scene, with zoom and target adjusted so that the picture keeps its scale and
+/// position. The camera fits the box of the region into the picture: without this a face would run away from the pointer that drags it, and a
+/// volume would grow and shrink while it rotates. None if they cannot be drawn.
 pub(super) fn keep_scale(now: &Scene, mut settings: Settings) -> Option<Settings> {
     let middle = Settings { camera: Camera { target: None, ..settings.camera.clone() }, ..settings.clone() };
     let fitted = Scene::new(now.geometry.clone(), now.input, middle).ok()?;
@@ -188,12 +190,12 @@ pub(super) fn keep_scale(now: &Scene, mut settings: Settings) -> Option<Settings
 /// Least thickness of the region after a face moved, mm.
 const MIN_THICKNESS: f64 = 2.0;
 
-/// A face of the region.
+/// A face of the region's box.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Face {
-    /// 0 lateral, 1 depth, 2 elevation.
+    /// Axis of its normal: 0 lateral, 1 depth, 2 elevation.
     pub axis: usize,
-    /// Whether it is the face at the higher end of the axis.
+    /// True for the face at the higher end of the axis.
     pub high: bool,
 }
 
@@ -206,19 +208,19 @@ pub(super) const FACES: [Face; 6] = [
     Face { axis: 2, high: true },
 ];
 
-/// The outward normal of a face.
+/// The outward unit normal of a face of the region.
 pub(super) fn outwards(face: Face) -> DVec3 {
     DVec3::AXES[face.axis] * if face.high { 1.0 } else { -1.0 }
 }
 
-/// The centre of a face in space, and its outward unit normal.
+/// The centre of a face of the region in space, mm, and its outward unit normal.
 pub(super) fn face_axis(scene: &Scene, face: Face) -> (DVec3, DVec3) {
     let middle = (scene.low + scene.high) / 2.0;
     let half = (scene.high - scene.low) / 2.0;
     (middle + outwards(face) * half, outwards(face))
 }
 
-/// The range in which a face can move outwards, mm: minimum (at most 0) and maximum (at least 0). A region that is already thinner than
+/// How far a face can move outwards, mm: the smallest distance (at most 0) and the largest (at least 0). A region that is already thinner than
 /// [`MIN_THICKNESS`] can only grow.
 pub(super) fn face_travel(scene: &Scene, face: Face) -> [f64; 2] {
     let (low, high) = insonified_box(&scene.geometry);
@@ -230,7 +232,7 @@ pub(super) fn face_travel(scene: &Scene, face: Face) -> [f64; 2] {
     [-inwards, out.max(0.0)]
 }
 
-/// Settings whose region has a face moved outwards, mm, within its range.
+/// The settings with a face of the region moved outwards by `by` mm, as far as it can move.
 pub(super) fn move_face(scene: &Scene, face: Face, by: f64) -> Settings {
     let [least, most] = face_travel(scene, face);
     let by = by.clamp(least, most);
@@ -246,13 +248,13 @@ pub(super) fn move_face(scene: &Scene, face: Face, by: f64) -> Settings {
     settings
 }
 
-/// How far the region can move along each axis, mm: backwards (at most 0) and forwards (at least 0).
+/// How far the region can move along each axis, mm: towards lower coordinates (at most 0) and towards higher ones (at least 0).
 pub(super) fn region_travel(scene: &Scene) -> [DVec3; 2] {
     let (low, high) = insonified_box(&scene.geometry);
     [(low - scene.low).min(DVec3::ZERO), (high - scene.high).max(DVec3::ZERO)]
 }
 
-/// Settings whose region is moved, mm, as far as it can be, with its start line.
+/// The settings with the region and its start curve moved by a vector, mm, as far as they can move.
 pub(super) fn move_region(scene: &Scene, by: DVec3) -> Settings {
     let [least, most] = region_travel(scene);
     let by = by.clamp(least, most);
@@ -273,7 +275,7 @@ pub(super) fn move_region(scene: &Scene, by: DVec3) -> Settings {
 /// A face cannot be dragged if its axis appears shorter than this fraction of its length: small drags would move it too far.
 const MIN_FORESHORTENING: f64 = 0.25;
 
-/// True if the axis of a face is long enough in the rendering for the face to be dragged.
+/// True if the normal of a face is long enough in the picture for the face to be dragged.
 pub(super) fn can_be_dragged(scene: &Scene, picker: &Picker, face: Face) -> bool {
     let (middle, out) = face_axis(scene, face);
     let ends = picker.project(middle).zip(picker.project(middle + out));
@@ -282,7 +284,8 @@ pub(super) fn can_be_dragged(scene: &Scene, picker: &Picker, face: Face) -> bool
     })
 }
 
-/// The face whose axis, from its centre outwards, is nearest to a position on the picture.
+/// The face of the region whose normal, drawn from its centre outwards, is nearest to a position (pixels of the picture). None if no face can be
+/// dragged.
 pub(super) fn nearest_face(scene: &Scene, at: [f64; 2]) -> Option<Face> {
     let picker = Picker::of(scene);
     let distance = |face: &Face| {

@@ -32,18 +32,18 @@ const RECORDING: &str = "volume.frames";
 const BASE: &str = "3";
 
 impl Format {
-    /// True if all volumes of the loop are exported, false if only the shown one is.
+    /// True if all volumes of the cine loop are exported, false if only the shown one is.
     pub(super) fn takes_the_loop(&self) -> bool {
         self.work == Work::Loop
     }
 }
 
-/// What can be exported.
+/// A format in the menu of exports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Format {
     pub name: &'static str,
     pub hint: &'static str,
-    /// Ending of the file; pictures are in a folder, which has its own.
+    /// File name ending; for a series of pictures that of its folder.
     pub(super) ending: &'static str,
     work: Work,
 }
@@ -63,7 +63,7 @@ const fn format(name: &'static str, ending: &'static str, work: Work, hint: &'st
     Format { name, hint, ending, work }
 }
 
-/// All formats, in the order of the menu.
+/// All export formats, in the order of the menu.
 pub const FORMATS: &[Format] = &[
     format(texts::VOLUME_NRRD, "nrrd", Work::Convert, texts::VOLUME_NRRD_HINT),
     format(texts::VOLUME_NIFTI, "nii.gz", Work::Convert, texts::VOLUME_NIFTI_HINT),
@@ -102,7 +102,7 @@ impl Export {
         lock(&self.state)
     }
 
-    /// Cancels the export; nothing of it stays.
+    /// Cancels the export. Nothing of it is left.
     pub(super) fn cancel(&self) {
         self.lock().is_cancelled = true;
     }
@@ -115,15 +115,15 @@ impl Export {
         self.lock().is_finished
     }
 
-    /// The progress, once the process has reported any.
+    /// The progress that the export has reported last; None before it has reported any.
     pub(super) fn progress(&self) -> Option<Progress> {
         *lock(&self.progress)
     }
 
-    /// Writes a volume to `file`, which does not exist before, whole or not at all. `settings`: the scene of a turntable as TOML.
+    /// Exports the volumes of a job to `file`, which must not exist. The file is complete or not written.
     ///
     /// # Errors
-    /// One line: a disk that is full, what the process said of its fault, or that it was cancelled.
+    /// One line: the disk is full, the process that exports has failed, or the export was cancelled.
     pub(super) fn run(&self, job: &Job, file: &Path) -> Result<(), String> {
         // A signal that ends this program waits until nothing unfinished is left. Dropped last.
         let signals = Writing::begin();
@@ -203,10 +203,10 @@ fn lock<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {
     shared.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Writes volumes as a recording, whole or not at all.
+/// Writes volumes as a `.frames` recording. The file is complete or not written.
 ///
 /// # Errors
-/// One line: a file that cannot be written.
+/// One line: the file cannot be written.
 pub(super) fn write_frames(file: &Path, header: Header, volumes: &[CineVolume]) -> Result<(), String> {
     let mut writer = Writer::create(file, header).map_err(|e| e.to_string())?;
     let mut frames = volumes.iter().flat_map(|volume| &volume.frames);
@@ -223,16 +223,16 @@ pub(super) fn write_frames(file: &Path, header: Header, volumes: &[CineVolume]) 
     }
 }
 
-/// The volumes to export, and the format.
+/// The volumes to export, the format and the settings.
 pub(super) struct Job {
     pub(super) format: Format,
     pub(super) header: Header,
-    /// The shown volume, or all volumes of the loop.
+    /// The shown volume, or all volumes of the cine loop.
     pub(super) volumes: Vec<CineVolume>,
-    /// Rate of a loop, volumes a second.
+    /// Rate at which the cine loop is played, volumes a second.
     pub(super) rate: f64,
     pub(super) settings: crate::scene::Settings,
-    /// The name of the view's device, for turntables.
+    /// Name of the device that draws the view, which also draws turntables.
     pub(super) device: String,
 }
 
@@ -299,7 +299,7 @@ fn enlarged(size: [u32; 2], edge: u32) -> [u32; 2] {
     size.map(|n| ((f64::from(n) * f64::from(edge) / longest).round() as u32).max(1))
 }
 
-/// The measurements on the volumes with these numbers, renumbered as in a recording of them.
+/// Copies of the measurements on the volumes with these numbers, with the numbers that the volumes have in a recording of them.
 pub(super) fn renumbered(measures: &[Measurement], volumes: &[u32]) -> Vec<Measurement> {
     let place = |number: u32| volumes.iter().position(|volume| *volume == number);
     let renumber = |measured: &Measurement| {

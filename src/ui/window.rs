@@ -18,28 +18,28 @@ use winit::monitor::MonitorHandle;
 use winit::platform::modifier_supplement::KeyEventExtModifierSupplement;
 use winit::window::{Fullscreen, Window, WindowId};
 
-/// How to open the window.
+/// How the window is opened.
 pub struct WindowOptions {
-    /// Size of the window, pixels.
+    /// Width and height of the window, pixels.
     pub size: [u32; 2],
     pub full_screen: bool,
-    /// Part of the name of the monitor for full screen; `None`: the monitor of the window.
+    /// Part of the name of the monitor on which full screen is shown; `None`: the monitor of the window.
     pub monitor: Option<String>,
     pub present_mode: PresentMode,
-    /// Whether the window is opened again when it is closed.
+    /// True if the window is opened again when it is closed, as in a kiosk.
     pub stays_open: bool,
-    /// Ends the console after this time.
+    /// The console ends after this time; None: it does not end by itself.
     pub time: Option<Duration>,
 }
 
-/// Creates the console when the window is open, and again whenever the console asks to be replaced. Arguments: the context, the size of
-/// the window in pixels, its pixels per point, and the function that wakes the event loop.
+/// A function that creates the console when the window is open, and again whenever the console asks to be replaced. Arguments: the context, the
+/// size of the window in pixels, its pixels per point, and the function that wakes the event loop.
 pub type MakeConsole<'a> = dyn FnMut(&Arc<Context>, [u32; 2], f32, Wake) -> Console + 'a;
 
-/// Opens a window and runs until the user leaves. Returns the console and its last context.
+/// Opens a window and runs the console that `make` creates, until the user leaves. Returns the console and its last context.
 ///
 /// # Errors
-/// There is no windowing system, or no device that can present on it, or the device is lost repeatedly.
+/// There is no window system, no device can present on it, or the device is lost repeatedly.
 pub fn run(
     device: &ContextOptions,
     options: WindowOptions,

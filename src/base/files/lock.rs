@@ -5,8 +5,8 @@ use std::fs::{File, OpenOptions, TryLockError, metadata, remove_file};
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
-/// Holds the lock until it is dropped. The lock is on a hidden file: `.NAME.lock` beside a file, `.echolume.lock` in a folder. After a
-/// crash this file remains, unlocked.
+/// A lock of a file or a folder against other processes; dropping it releases the lock. What is locked is a hidden file: `.NAME.lock` beside a
+/// file, `.echolume.lock` in a folder. After a crash this file remains, unlocked.
 #[derive(Debug)]
 pub struct Lock {
     /// None: the place cannot be locked.
@@ -14,13 +14,13 @@ pub struct Lock {
 }
 
 impl Lock {
-    /// False if no lock file can be made, such as in a missing folder.
+    /// False if nothing is locked, because no lock file can be made there, for example in a missing folder.
     pub fn is_held(&self) -> bool {
         self.held.is_some()
     }
 
-    /// Locks a file or a folder. Devices and pipes are not locked, and neither is a place where no lock file can be made: writing there
-    /// then reports the fault.
+    /// Locks a file or a folder. For devices, pipes and places where no lock file can be made it succeeds without a lock ([`Lock::is_held`]):
+    /// writing there reports the fault.
     ///
     /// # Errors
     /// Another process holds the lock: one line with the path, and with the process if it is known.

@@ -61,7 +61,8 @@ enum Readers {
 /// The files of this process follow the umask.
 static FOLLOWS_UMASK: AtomicBool = AtomicBool::new(false);
 
-/// From now on the umask decides who may read new files.
+/// From now on the umask alone decides who may read the files that this process creates. Otherwise files that may hold patients' frames are for
+/// their owner only.
 pub fn follow_umask() {
     FOLLOWS_UMASK.store(true, Ordering::Relaxed);
 }
@@ -84,7 +85,7 @@ impl Readers {
     }
 }
 
-/// Name of the environment variable that is 0 where the umask decides who may read new files.
+/// Name of the environment variable whose value 0 has the effect of [`follow_umask`].
 pub const PRIVATE: &str = "ECHOLUME_PRIVATE";
 
 /// Replaces a file atomically: writes a temporary file next to it, then renames. A full disk or a signal leaves the old file unchanged. Only
@@ -104,7 +105,7 @@ pub fn replace_shared(file: &Path, bytes: &[u8]) -> Result<(), String> {
     replace_file(file, bytes, Readers::Umask)
 }
 
-/// Like [`replace_shared`], but every user may read the file, whatever the umask is: another service reads it.
+/// Like [`replace_shared`], but every user may read the file, whatever the umask is, because another service has to read it.
 ///
 /// # Errors
 /// As for [`replace`].
@@ -129,7 +130,7 @@ fn replace_file(file: &Path, bytes: &[u8], readers: Readers) -> Result<(), Strin
         .map_err(|e| cannot(&e))
 }
 
-/// Checks that a file can be written there, before any work is done.
+/// Checks, before any work is done, that a file of this name can be written.
 ///
 /// # Errors
 /// One line: the folder does not exist or cannot be written, or the name is a folder.
@@ -166,7 +167,7 @@ fn is_special(file: &Path) -> bool {
 pub struct WorkFolder(tempfile::TempDir);
 
 impl WorkFolder {
-    /// A new folder in `parent`, whose name begins with `prefix`.
+    /// Creates a folder in `parent`, whose name begins with `prefix`.
     ///
     /// # Errors
     /// One line: the folder cannot be created.
@@ -180,8 +181,8 @@ impl WorkFolder {
     }
 }
 
-/// A file under a temporary name until it is complete. Dropping it earlier deletes it. After a signal, writes fail, so that the writer
-/// stops; the signal takes effect when the file is deleted.
+/// A file that is written under a temporary name until it is complete. Dropping it earlier deletes it. After a signal, writes fail, so that the
+/// writer stops; the signal takes effect when the file is deleted.
 pub struct Unfinished {
     file: BufWriter<Part>,
     target: PathBuf,
@@ -194,7 +195,7 @@ struct Part {
 }
 
 impl Unfinished {
-    /// A file that only its owner may read.
+    /// Creates the temporary file in the folder of `target`. Only its owner may read it.
     ///
     /// # Errors
     /// The folder cannot be written, or the target exists and is not a regular file.
@@ -233,7 +234,7 @@ impl Unfinished {
         Ok(())
     }
 
-    /// Replaces bytes that were written before, `at` bytes after the beginning.
+    /// Overwrites bytes that were written before, from `at` bytes after the beginning of the file.
     ///
     /// # Errors
     /// The disk is full, or a signal arrived.
@@ -315,38 +316,38 @@ impl InputError {
         }
     }
 
-    /// The operating system cannot read the file.
+    /// The error that the operating system cannot read `file`.
     pub fn unreadable(file: &Path, error: &io::Error) -> InputError {
         InputError::new(file, "file", format!("cannot be read: {error}"))
     }
 
-    /// The operating system cannot write the file.
+    /// The error that the operating system cannot write `file`.
     pub fn unwritable(file: &Path, error: &io::Error) -> InputError {
         InputError::new(file, "file", format!("cannot be written: {error}"))
     }
 
-    /// This error with the name by which the user knows the file.
+    /// The same error, with `name` in place of the file's name: the name by which the user knows the file.
     pub fn renamed(self, name: &str) -> InputError {
         InputError { file: escaped(name, MAX_PART), ..self }
     }
 
-    /// Name of the faulty field.
+    /// Name of the faulty field of the file.
     pub fn field(&self) -> &str {
         &self.field
     }
 
-    /// What is wrong with the field.
+    /// What is wrong with the field of the file.
     pub fn fault(&self) -> &str {
         &self.fault
     }
 }
 
-/// A value from a file in quotes, escaped and shortened.
+/// A value from a file, for messages: in quotes, escaped and shortened.
 pub fn quoted(value: &str) -> String {
     format!("'{}'", escaped(value, MAX_QUOTE))
 }
 
-/// Text with control characters and other invisible ones escaped, at most `longest` characters of the original.
+/// The first `longest` characters of a text, with control characters and other invisible ones escaped.
 pub fn escaped(text: &str, longest: usize) -> String {
     let mut line = String::new();
     for (i, c) in text.chars().enumerate() {

@@ -10,7 +10,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-/// Progress of one reading: the reading thread counts, and another thread asks for the state.
+/// Progress of reading input files: the thread that reads counts, and any other thread may query it. All clones share the counts.
 #[derive(Clone, Debug, Default)]
 pub struct Progress(Arc<Counts>);
 
@@ -27,10 +27,10 @@ struct Counts {
     is_cancelled: AtomicBool,
 }
 
-/// State of a reading.
+/// How much of the input was read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Share {
-    /// The total is not known.
+    /// The total is not known yet.
     Unknown,
     /// `done` of `count` headers of the files of a folder were read.
     Files { done: u64, count: u64 },
@@ -43,7 +43,7 @@ thread_local! {
 }
 
 impl Progress {
-    /// Runs `work` on this thread and counts what it reads.
+    /// Runs `work` on this thread and adds all that it reads to this progress.
     pub fn during<T>(&self, work: impl FnOnce() -> T) -> T {
         /// Puts back what was there before, also if the work panics.
         struct Before(Option<Progress>);
@@ -56,7 +56,7 @@ impl Progress {
         work()
     }
 
-    /// Cancels the reading: every later read of the work fails.
+    /// Cancels the reading: every later read within [`Progress::during`] fails.
     pub fn cancel(&self) {
         self.0.is_cancelled.store(true, Ordering::Relaxed);
     }
@@ -65,7 +65,7 @@ impl Progress {
         self.0.is_cancelled.load(Ordering::Relaxed)
     }
 
-    /// State of the reading.
+    /// How much of the input was read so far.
     pub fn share(&self) -> Share {
         let get = |count: &AtomicU64| count.load(Ordering::Relaxed);
         let counts = &*self.0;
@@ -93,8 +93,8 @@ fn of_thread() -> Option<Progress> {
     OF_THREAD.with_borrow(Clone::clone)
 }
 
-/// Announces a pass over the data that reads `bytes` bytes of files. If an earlier pass still expects at least as many bytes, this one is a
-/// part of it.
+/// Announces that this thread will read `bytes` bytes of input, to which progress is counted from now on. Ignored if at least as many announced
+/// bytes are still to be read: then this reading is a part of what was announced.
 pub fn expect_bytes(bytes: u64) {
     if let Some(Progress(counts)) = of_thread() {
         let done = counts.bytes.load(Ordering::Relaxed) - counts.before.load(Ordering::Relaxed);
@@ -106,7 +106,7 @@ pub fn expect_bytes(bytes: u64) {
     }
 }
 
-/// Announces that the headers of `count` files are read next.
+/// Announces that this thread will read the headers of `count` files next.
 pub fn expect_files(count: u64) {
     if let Some(Progress(counts)) = of_thread() {
         counts.files.store(0, Ordering::Relaxed);
@@ -114,7 +114,7 @@ pub fn expect_files(count: u64) {
     }
 }
 
-/// Counts one of the announced headers as read.
+/// Counts the header of one more file as read.
 pub fn file_read() {
     if let Some(Progress(counts)) = of_thread() {
         counts.files.fetch_add(1, Ordering::Relaxed);
@@ -131,7 +131,7 @@ pub fn add_bytes(bytes: u64) -> io::Result<()> {
     progress.check()
 }
 
-/// A file whose bytes count for the thread that opened it, and whose reads fail when that reading is cancelled.
+/// A file whose bytes count for the [`Progress`] of the thread that opened it, and whose reads fail once that reading is cancelled.
 #[derive(Debug)]
 pub struct CountedFile {
     file: File,

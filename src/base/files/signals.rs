@@ -110,7 +110,7 @@ impl Handlers {
     }
 }
 
-/// The name of a signal, such as SIGSEGV; None if it has none.
+/// The name of a signal number, for example SIGSEGV; None if the number is not a signal's.
 pub fn name_of(signal: i32) -> Option<&'static str> {
     low_level::signal_name(signal)
 }
@@ -123,24 +123,24 @@ pub fn raise_segmentation_fault() {
     }
 }
 
-/// The last signal that arrived while a [`Held`] existed, if any. Work that can end early asks for it.
+/// Name of the last signal that arrived while a [`Held`] or [`Writing`] existed; None if none did. Work that can end early polls this.
 pub fn received() -> Option<&'static str> {
     handlers().signal().map(|(_, name)| name)
 }
 
-/// While one exists, SIGINT, SIGTERM and SIGHUP do not end the process; [`Held::signal`] reports them.
+/// While a value of this type exists, SIGINT, SIGTERM and SIGHUP do not end the process; [`Held::signal`] reports them.
 #[derive(Debug)]
 pub struct Held {
     patient: bool,
 }
 
 impl Held {
-    /// Holds every signal, for work that must never be interrupted, such as stopping a motor.
+    /// Defers every signal, for work that must never be interrupted, such as stopping a motor.
     pub fn take() -> Held {
         Held::with(true)
     }
 
-    /// Holds the first signal. The second ends the process at once, unless another holder takes every signal.
+    /// Defers only the first signal: the second ends the process at once, unless a value of [`Held::take`] exists.
     pub fn first() -> Held {
         Held::with(false)
     }
@@ -153,7 +153,7 @@ impl Held {
         Held { patient }
     }
 
-    /// The last signal, if any.
+    /// Name of the last signal that arrived; None if none did.
     pub fn signal(&self) -> Option<&'static str> {
         handlers().signal().map(|(_, name)| name)
     }
@@ -168,7 +168,7 @@ impl Drop for Held {
     }
 }
 
-/// While one exists and no [`Held`] does, the first signal is deferred until the last of these is dropped.
+/// While values of this type exist and no [`Held`] does, the first signal is deferred: it ends the process when the last of them is dropped.
 #[derive(Debug)]
 pub struct Writing(());
 
@@ -178,7 +178,7 @@ impl Writing {
         Writing(())
     }
 
-    /// The deferred signal, so that the writer stops. None if a [`Held`] decides what the signal means.
+    /// Name of the deferred signal, after which the writer has to stop. None without one, and while a [`Held`] decides what the signal means.
     pub fn signal(&self) -> Option<&'static str> {
         let handlers = handlers();
         let (_, name) = handlers.signal()?;

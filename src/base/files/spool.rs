@@ -3,8 +3,8 @@
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
-/// A temporary file with the bytes of a stream. On Linux the file has no name and vanishes when the process ends in any way. Elsewhere it
-/// is removed when this is dropped.
+/// A temporary file that holds all bytes of a stream. On Linux the file has no name and vanishes however the process ends. Elsewhere it is
+/// removed when this value is dropped.
 pub struct Spool {
     path: PathBuf,
     // Open, or kept by its name, as long as this lives.
@@ -37,7 +37,7 @@ impl Spool {
         Ok(Spool { path, _file: file })
     }
 
-    /// A path that opens the bytes.
+    /// A path under which the temporary file can be opened while this value exists.
     pub fn path(&self) -> &Path {
         &self.path
     }

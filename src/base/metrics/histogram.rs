@@ -1,6 +1,6 @@
 //! A Prometheus histogram: counts of values up to fixed limits, and the sum of the values.
 
-/// Counts of values. Its memory does not depend on the number of values.
+/// A histogram of values with fixed limits, so that its memory does not depend on the number of values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Histogram {
     /// Rising. A value belongs to the first limit that it does not exceed.
@@ -11,12 +11,12 @@ pub struct Histogram {
 }
 
 impl Histogram {
-    /// An empty histogram. `limits`: upper limits of the counts, rising and finite.
+    /// An empty histogram. `limits`: the inclusive upper limit of each bin, finite and ascending; a last bin holds larger values.
     pub fn new(limits: &'static [f64]) -> Histogram {
         Histogram { limits, counts: vec![0; limits.len() + 1], sum: 0.0 }
     }
 
-    /// Counts a value. One that is not finite is left out.
+    /// Counts a value. NaN and infinities are ignored.
     pub fn record(&mut self, value: f64) {
         if value.is_finite() {
             self.counts[self.limits.partition_point(|limit| *limit < value)] += 1;
@@ -24,19 +24,19 @@ impl Histogram {
         }
     }
 
-    /// Adds the values of another histogram, which has the same limits.
+    /// Adds the counts of another histogram, which must have the same limits.
     pub fn add(&mut self, other: &Histogram) {
         self.counts.iter_mut().zip(&other.counts).for_each(|(sum, count)| *sum += count);
         self.sum += other.sum;
     }
 
-    /// Removes all values.
+    /// Sets all counts and the sum to 0.
     pub fn reset(&mut self) {
         self.counts.fill(0);
         self.sum = 0.0;
     }
 
-    /// For each limit, and at last for infinity, the number of values that do not exceed it.
+    /// Each upper limit, infinity last, with the number of values that do not exceed it.
     pub(super) fn cumulative(&self) -> impl Iterator<Item = (f64, u64)> + '_ {
         let limits = self.limits.iter().copied().chain([f64::INFINITY]);
         limits.zip(self.counts.iter().scan(0, |sum, count| {
@@ -49,7 +49,7 @@ impl Histogram {
         self.sum
     }
 
-    /// Number of values.
+    /// Number of values that were counted.
     pub fn count(&self) -> u64 {
         self.counts.iter().sum()
     }

@@ -7,21 +7,21 @@ pub mod table;
 pub mod text_format;
 pub mod textfile;
 
-/// What a metric counts or measures.
+/// Kind of a metric in the Prometheus sense.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// A value that only grows until the program restarts.
     Counter,
     /// A value that rises and falls.
     Gauge,
-    /// Counts of values by limits.
+    /// A histogram: numbers of values up to given limits.
     Histogram,
     /// Sum and number of values.
     Summary,
 }
 
 impl Kind {
-    /// The kind in the line `# TYPE` of the text format.
+    /// The word for this kind in the line `# TYPE` of Prometheus' text format.
     pub fn word(self) -> &'static str {
         match self {
             Kind::Counter => "counter",
@@ -32,12 +32,12 @@ impl Kind {
     }
 }
 
-/// A metric: its name with the unit, what it is, and the names of its labels.
+/// Declaration of a Prometheus metric: its name, which includes the unit, its kind, its help text and the names of its labels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Metric {
     pub name: &'static str,
     pub kind: Kind,
-    /// One sentence without backslashes and line breaks.
+    /// Description of the metric: one sentence without backslashes and line breaks.
     pub help: &'static str,
     pub labels: &'static [&'static str],
 }

@@ -8,7 +8,7 @@ macro_rules! metrics {
             #[doc = $help]
             pub const $id: Metric = Metric { name: $name, kind: Kind::$kind, help: $help, labels: &[$($label),*] };
         )*
-        /// All metrics.
+        /// Every metric that the program exports.
         pub const ALL: &[Metric] = &[$($id),*];
     };
 }

@@ -5,18 +5,18 @@ use super::histogram::Histogram;
 use crate::text::escaped;
 use std::fmt::Write as _;
 
-/// A file of metrics that is being written. Metrics without a sample are left out.
+/// Text in Prometheus' format that is being composed. Metrics without a sample are left out.
 #[derive(Default)]
 pub struct Exposition(String);
 
 impl Exposition {
-    /// Adds a metric that has no labels.
+    /// Appends a metric without labels and its value.
     pub fn number(&mut self, metric: &Metric, value: f64) {
         self.numbers(metric, [(Vec::new(), value)]);
     }
 
-    /// Adds a metric: for each sample the values of its labels, in the order of [`Metric::labels`], and its value. No two samples have
-    /// the same labels.
+    /// Appends a metric with labels. Each sample has the values of its labels, in the order of [`Metric::labels`], and its value. No two samples
+    /// may have the same labels.
     pub fn numbers(&mut self, metric: &Metric, samples: impl IntoIterator<Item = (Vec<String>, f64)>) {
         for (n, (labels, value)) in samples.into_iter().enumerate() {
             if n == 0 {
@@ -26,7 +26,7 @@ impl Exposition {
         }
     }
 
-    /// Adds a metric of the kind [`Kind::Histogram`](super::Kind::Histogram).
+    /// Appends a metric of the kind [`Kind::Histogram`](super::Kind::Histogram).
     pub fn histogram(&mut self, metric: &Metric, values: &Histogram) {
         self.head(metric);
         let name = metric.name;
@@ -37,7 +37,8 @@ impl Exposition {
         self.sample(&format!("{name}_count"), &[], &[], values.count() as f64);
     }
 
-    /// Adds a metric of the kind [`Kind::Summary`](super::Kind::Summary): for each sample its labels, the sum and the number of values.
+    /// Appends a metric of the kind [`Kind::Summary`](super::Kind::Summary). Each sample has the values of its labels, the sum of its
+    /// observations and their number.
     pub fn summary(&mut self, metric: &Metric, samples: impl IntoIterator<Item = (Vec<String>, f64, u64)>) {
         for (n, (labels, sum, count)) in samples.into_iter().enumerate() {
             if n == 0 {
@@ -48,7 +49,7 @@ impl Exposition {
         }
     }
 
-    /// The text.
+    /// The complete text.
     pub fn into_text(self) -> String {
         self.0
     }

@@ -10,7 +10,7 @@ use std::time::Duration;
 /// Longest wait for the last text at the end.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-/// The file. Dropping it writes the last text.
+/// A file of metrics that a thread of its own writes. Dropping it writes the last text.
 pub struct Textfile {
     shared: Arc<Shared>,
 }
@@ -34,7 +34,7 @@ struct Slot {
 }
 
 impl Textfile {
-    /// Starts the thread. Nothing is written before the first [`Textfile::put`].
+    /// Starts the thread that writes `file`. Nothing is written before the first [`Textfile::put`].
     ///
     /// # Errors
     /// One line: the thread cannot be started.

@@ -32,8 +32,8 @@ const TILES: usize = 4;
 const SEQUENCE_HEADER: u8 = 1;
 const TEMPORAL_DELIMITER: u8 = 2;
 
-/// An MP4 file of pictures of one size that is being written. The encoder keeps about forty pictures for comparison; encoded pictures are
-/// written at once.
+/// An MP4 file (AV1) of pictures of one size that is being written. The encoder holds about forty pictures back, which it compares; encoded
+/// pictures are written at once.
 pub struct FilmWriter {
     encoder: Context<u8>,
     muxer: Mp4FileMuxer,
@@ -87,7 +87,7 @@ impl FilmWriter {
         Ok(FilmWriter { encoder, muxer, file, size, duration, entry: None, length })
     }
 
-    /// Adds a picture.
+    /// Appends a picture.
     ///
     /// # Errors
     /// One line: a picture of another size, a full disk, a signal.
@@ -107,7 +107,7 @@ impl FilmWriter {
         self.take_packets()
     }
 
-    /// Writes what is left, and puts the complete file in its place.
+    /// Encodes the pictures that the encoder still holds, and renames the complete file to its path.
     ///
     /// # Errors
     /// One line: no picture was added, a full disk, a signal.

@@ -10,13 +10,13 @@ use std::path::Path;
 /// Quality of JPEG pictures, 1 to 100. Colours keep their resolution.
 const JPEG_QUALITY: u8 = 95;
 
-/// A format of pictures that can be written.
+/// A file format in which pictures can be written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PictureFormat {
     Png,
     Jpeg,
     Bmp,
-    /// PGM or PPM, by the number of channels.
+    /// PGM for one channel, PPM for three.
     Pnm,
 }
 

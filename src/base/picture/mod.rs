@@ -82,7 +82,7 @@ impl Picture {
         save(file, |format| self.encoded(format))
     }
 
-    /// Reads a PNG.
+    /// Reads a PNG file.
     ///
     /// # Errors
     /// One line naming the file and the fault. Files and pixels of more than 512 MiB are refused, whatever the file claims.
@@ -101,10 +101,10 @@ impl Picture {
 pub struct Grey {
     pub width: u32,
     pub height: u32,
-    /// True for values to 65535, false for values to 255.
+    /// True if samples have 16 bits (0 to 65535), false if 8 bits (0 to 255).
     pub sixteen: bool,
     pub values: Vec<u16>,
-    /// True if the values are the brightness of a colour picture.
+    /// True if the file was in colour, so that the samples are the brightness of its pixels.
     pub from_colour: bool,
 }
 
@@ -145,23 +145,23 @@ impl Grey {
         Ok(Grey { width, height, sixteen, values, from_colour: colour.has_color() })
     }
 
-    /// The value of white.
+    /// The sample value of white: 255 or 65535.
     pub fn white(&self) -> f64 {
         if self.sixteen { 65535.0 } else { 255.0 }
     }
 
-    /// The values scaled to 0..1.
+    /// The samples divided by [`Grey::white`], 0..1, rows from the top.
     pub fn shares(&self) -> Vec<f64> {
         self.values.iter().map(|v| f64::from(*v) / self.white()).collect()
     }
 
-    /// A picture of this size and depth with other values in 0..1, each rounded to the nearest stored one.
+    /// A picture of this one's size and depth from other pixel values in 0..1, each rounded to the nearest sample.
     pub fn with(&self, shares: &[f64]) -> Grey {
         let values = shares.iter().map(|v| (v.clamp(0.0, 1.0) * self.white()).round() as u16).collect();
         Grey { values, ..*self }
     }
 
-    /// The samples as stored in a frame, little-endian.
+    /// The samples as little-endian bytes, as a frame stores them.
     pub fn bytes(&self) -> Vec<u8> {
         match self.sixteen {
             true => self.values.iter().flat_map(|v| v.to_le_bytes()).collect(),
@@ -172,7 +172,7 @@ impl Grey {
     /// Encodes a grey picture of 8 or 16 bits.
     ///
     /// # Errors
-    /// One line: 16 bits in a format of 8.
+    /// One line: the picture has 16 bits and the format only 8.
     pub fn encoded(&self, format: PictureFormat) -> Result<Vec<u8>, String> {
         // Encoders take 16 bits in native byte order.
         let (texels, colour) = match self.sixteen {
@@ -202,11 +202,11 @@ fn brightness<const CHANNELS: usize, T: Copy + Into<f64>>(pixels: &[T]) -> Vec<u
     pixels.chunks_exact(CHANNELS).map(|p| of([p[0].into(), p[1].into(), p[2].into()])).collect()
 }
 
-/// A rectangle of pixels. Its ratios of signal to noise and of contrast to noise measure how a filter smooths and preserves contrast
-/// (thesis 5.6).
+/// A rectangle of a picture. The ratios of signal to noise and of contrast to noise of its pixels measure how a filter smooths and preserves
+/// contrast (thesis 5.6).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Region {
-    /// Left column and upper row.
+    /// Left column and upper row, pixels from the upper left corner of the picture.
     pub at: [u32; 2],
     pub size: [u32; 2],
 }
@@ -235,7 +235,7 @@ pub struct Level {
 }
 
 impl Region {
-    /// Checks that the region is within a picture of `size` pixels.
+    /// Checks that the region is within a picture of `size` pixels (width, height).
     ///
     /// # Errors
     /// The region reaches beyond the picture.
@@ -247,7 +247,8 @@ impl Region {
         }
     }
 
-    /// Mean and deviation of the region in a picture `width` pixels wide, which must contain it.
+    /// Mean and deviation of the pixels in the region. `values`: the pixels of the picture, 0..1, rows from the top, `width` a row; the region
+    /// must be within it.
     pub fn level(&self, values: &[f64], width: u32) -> Level {
         let row = |y: u32| {
             let from = (self.at[1] + y) as usize * width as usize + self.at[0] as usize;
@@ -262,19 +263,20 @@ impl Region {
 }
 
 impl Level {
-    /// Signal-to-noise ratio: mean over standard deviation; None without noise.
+    /// Signal-to-noise ratio: mean over standard deviation; None if the deviation is 0.
     pub fn snr(&self) -> Option<f64> {
         (self.deviation > 0.0).then(|| self.mean / self.deviation)
     }
 
-    /// Contrast-to-noise ratio against another region: |m1 - m2| / sqrt(s1^2 + s2^2); None without noise.
+    /// Contrast-to-noise ratio against another region: |m1 - m2| / sqrt(s1^2 + s2^2) of the means m and deviations s; None if both s are 0.
     pub fn cnr(&self, other: &Level) -> Option<f64> {
         let noise = self.deviation.hypot(other.deviation);
         (noise > 0.0).then(|| (self.mean - other.mean).abs() / noise)
     }
 }
 
-/// A table of the levels and ratios of a region and its background before and after a filter.
+/// A text table with levels and ratios of a region and its background before and after a filter. `before` and `after`: pixels, 0..1, `width` a
+/// row.
 pub fn region_table(before: &[f64], after: &[f64], width: u32, region: &Region, background: Option<&Region>) -> String {
     let mut text = format!("{:<22} {:>8} {:>8} {:>8} {:>8}\n", "", "mean", "sd", "SNR", "CNR");
     let ratio = |r: Option<f64>| r.map_or("no noise".into(), |r| format!("{r:.3}"));

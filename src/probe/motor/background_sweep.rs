@@ -13,8 +13,8 @@ const MIN_POSITIONS: usize = 4096;
 /// Between two positions that are further apart the position is not known, s. At 9600 baud a position takes 20 ms, three requests 60.
 const MAX_GAP: f64 = 0.1;
 
-/// A motor that sweeps until this is dropped, or until it fails. Dropping it stops the motor and waits for one request and its reply, or
-/// for all attempts to stop if the module no longer replies.
+/// A motor that a thread of its own sweeps until it fails or this value is dropped. Dropping it stops the motor and waits for one request and
+/// its reply, or for all attempts to stop if the module no longer replies.
 pub struct BackgroundSweep {
     port: String,
     positions: PositionLog,
@@ -24,7 +24,7 @@ pub struct BackgroundSweep {
     thread: Option<JoinHandle<()>>,
 }
 
-/// The recent positions of the array, with their clock. All clones share them.
+/// The recent positions of the array, with the clock of their times. All clones share them.
 #[derive(Clone)]
 pub struct PositionLog {
     /// Time 0 of the positions.
@@ -40,10 +40,10 @@ struct State {
 }
 
 impl BackgroundSweep {
-    /// Finds home unless `homed`, and sweeps until stopped. `volumes` of the sweep is ignored.
+    /// Starts a thread that finds home, unless `homed`, and sweeps until it is stopped. `volumes` of the sweep is ignored.
     ///
     /// # Errors
-    /// A sweep that exceeds the limits of the motor, before anything moves. Later faults are returned by [`BackgroundSweep::stop`].
+    /// The sweep exceeds the limits of the motor; then nothing moved. Later faults are returned by [`BackgroundSweep::stop`].
     pub fn start(mut drive: Drive, sweep: Sweep, homed: bool) -> Result<BackgroundSweep, MotorError> {
         let sweep = Sweep { volumes: None, ..sweep };
         let speed = sweep.speed(&drive.table, drive.guard.port().settings().round_trip());
@@ -69,12 +69,12 @@ impl BackgroundSweep {
         &self.positions
     }
 
-    /// Speed between the ramps, deg/s.
+    /// Speed of the array between the ramps at both ends, deg/s.
     pub fn speed(&self) -> f64 {
         self.speed
     }
 
-    /// Angle from end to end, degrees.
+    /// Angle of the sweep from end to end, degrees.
     pub fn angle(&self) -> f64 {
         self.angle
     }
@@ -84,10 +84,10 @@ impl BackgroundSweep {
         self.thread.as_ref().is_none_or(JoinHandle::is_finished)
     }
 
-    /// Stops the motor and waits for that.
+    /// Stops the motor and waits until it has stopped.
     ///
     /// # Errors
-    /// The reason if the sweep had ended before: a fault or a signal; or that the motor could not be stopped.
+    /// The fault or the signal that ended the sweep before; or the motor could not be stopped.
     pub fn stop(&mut self) -> Result<(), MotorError> {
         self.interrupter.interrupt();
         if self.thread.take().is_some_and(|thread| thread.join().is_err()) {
@@ -141,13 +141,14 @@ impl PositionLog {
         }
     }
 
-    /// Converts a time stamp in s since 1970 to the clock of the positions, s. The error is the adjustment of the system's clock since the
-    /// start.
+    /// Converts a time stamp in s since 1970 to the clock of the positions, s. It is wrong by as much as the system's clock was adjusted since
+    /// the sweep began.
     pub fn time_of_stamp(&self, stamp: f64) -> f64 {
         stamp - self.start_since_1970
     }
 
-    /// Converts a time on the clock of the positions to an instant. Times that are not finite or lie before the start give the start.
+    /// Converts a time in s on the clock of the positions to an instant. Times before 0 and those that are not finite give the time 0 of that
+    /// clock.
     pub fn instant(&self, time: f64) -> Instant {
         let since = Duration::try_from_secs_f64(time.max(0.0)).unwrap_or_default();
         self.start.checked_add(since).unwrap_or(self.start)
@@ -158,7 +159,7 @@ impl PositionLog {
         self.lock().track.at(time)
     }
 
-    /// The oldest and the newest position; None before the sweep has begun.
+    /// The oldest and the newest position that are stored; None before the sweep has begun.
     pub fn span(&self) -> Option<(Position, Position)> {
         let state = self.lock();
         let positions = state.track.positions();

@@ -15,14 +15,14 @@ const STALL_TIME: Duration = Duration::from_millis(400);
 /// The limit switch ahead is read after so many positions.
 const LOOK_AHEAD: usize = 8;
 
-/// Status of the module.
+/// What a motor's module reports about itself and its motor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MotorStatus {
-    /// Number and firmware, for example `TMCM-1140 firmware 1.16`.
+    /// Type and firmware of the module, for example `TMCM-1140 firmware 1.16`.
     pub module: String,
-    /// Degrees; valid only after [`Drive::home`].
+    /// Angle of the array in the sweep, degrees. It is valid only after [`Drive::home`].
     pub angle: f64,
-    /// Degrees a second.
+    /// Speed of the array, deg/s.
     pub speed: f64,
     pub home_switch: bool,
     pub left_limit: bool,
@@ -39,7 +39,7 @@ pub struct Drive {
 }
 
 impl Drive {
-    /// Opens the port and checks that the module is the one of the table. Moves nothing.
+    /// Opens the port and checks that its module is the one of the `[motor]` table. Moves nothing.
     ///
     /// # Errors
     /// Any [`Fault`] of the port, and [`Fault::WrongModule`]; a motor that is already moving is then stopped if possible.
@@ -57,7 +57,7 @@ impl Drive {
         Ok(Drive { guard: Guard::new(port, table), table: table.clone(), module: String::new() })
     }
 
-    /// Position, speed, switches and watchdog. Moves nothing.
+    /// Reads position, speed, switches and watchdog. Moves nothing.
     ///
     /// # Errors
     /// Any [`Fault`] of the port.
@@ -66,7 +66,7 @@ impl Drive {
         self.done("status", status)
     }
 
-    /// Finds home. Positions are counted from there.
+    /// Moves the motor until it has found home, from which positions are counted.
     ///
     /// # Errors
     /// Any [`Fault`]; the motor is then stopped.
@@ -78,10 +78,10 @@ impl Drive {
     }
 
     /// Moves to the start of the sweep and back and forth over it. Call [`Drive::home`] first. Each position that is read is passed to
-    /// `on_position`, with its time in s since `start`, in rising order. Returns the number of passes.
+    /// `on_position`, with its time in s since `start`, in order of time. Returns the number of passes.
     ///
     /// # Errors
-    /// Any [`Fault`], [`Fault::OutOfRange`] before anything moves. The motor is stopped after any other.
+    /// Any [`Fault`], after which the motor is stopped. With [`Fault::OutOfRange`] nothing moved.
     pub fn sweep(
         &mut self,
         sweep: &Sweep,
@@ -97,7 +97,7 @@ impl Drive {
         self.guard.interrupter().clone()
     }
 
-    /// Opens the port and stops the motor before anything else is requested, whichever module it is.
+    /// Opens the port and stops the motor before anything else is requested, whichever module is there.
     ///
     /// # Errors
     /// As [`Drive::stop`], and [`Fault::NotOpened`].
@@ -108,7 +108,7 @@ impl Drive {
     /// Stops the motor and waits until it is at rest.
     ///
     /// # Errors
-    /// The module does not confirm it, or the motor keeps moving.
+    /// The module does not confirm the stop, or the motor keeps moving.
     pub fn stop(&mut self) -> Result<(), MotorError> {
         let stopped = self.guard.stop();
         let path = self.guard.port().settings().path.clone();

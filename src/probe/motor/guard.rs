@@ -16,8 +16,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub struct Interrupter(Arc<AtomicBool>);
 
 impl Interrupter {
-    /// The current operation ends with [`Fault::Interrupted`] before its next request, and the motor is stopped. All later operations
-    /// end in the same way.
+    /// Ends the current operation with [`Fault::Interrupted`] before its next request, and stops the motor. All later operations end in the same
+    /// way.
     pub fn interrupt(&self) {
         self.0.store(true, Ordering::SeqCst);
     }
@@ -27,7 +27,7 @@ impl Interrupter {
     }
 }
 
-/// All requests to the module go through the guard, so that it knows whether the motor has to be stopped.
+/// Passes all requests on to the module, and stops the motor when dropped if one of them may have set it in motion.
 pub(crate) struct Guard {
     port: Port,
     address: u8,
@@ -67,6 +67,8 @@ impl Guard {
         self.port.ask_raw(request)
     }
 
+    /// Checks whether the operation has to end.
+    ///
     /// # Errors
     /// [`Fault::Interrupted`] once a signal has come or the [`Interrupter`] was used.
     pub fn interrupted(&self) -> Result<(), Fault> {
@@ -85,12 +87,12 @@ impl Guard {
         &self.port
     }
 
-    /// The motor has stopped by itself at its target.
+    /// Notes that the motor has stopped by itself at its target, so that it need not be stopped.
     pub(crate) fn at_rest(&mut self) {
         (self.moving, self.searching) = (false, false);
     }
 
-    /// Stops the motor, and a reference search, also after a signal. Each command is sent up to three times until the module confirms it.
+    /// Stops the motor and any reference search, also after a signal. Each command is sent up to three times until the module confirms it.
     pub fn stop(&mut self) -> Stopped {
         // Does not wait for the replies to earlier requests.
         self.port.hurry();
@@ -110,7 +112,7 @@ impl Guard {
         }
     }
 
-    /// Stops the motor after a fault.
+    /// Stops the motor after a fault of `operation`, and returns the fault with whether the stop succeeded.
     pub fn fail(&mut self, operation: &'static str, fault: Fault) -> MotorError {
         // A motor that this program did not move is stopped, too: another program may have left it moving.
         let harmless = matches!(fault, Fault::OutOfRange(_)) && !self.moving;

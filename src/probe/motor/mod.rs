@@ -26,7 +26,7 @@ use std::time::Duration;
 use table::Side;
 use tmcl::status_words;
 
-/// A fault, with what to do about it.
+/// A fault of the motor or its port. Its message says what to do about it.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Fault {
     #[error("the port cannot be opened: {0}; take one that `echolume probe ports` lists and nothing else uses")]
@@ -53,7 +53,7 @@ pub enum Fault {
     TooLong { what: &'static str, limit: Duration },
     #[error("interrupted by {0}")]
     Interrupted(&'static str),
-    /// The request exceeds the limits of the probe or the module. Nothing moved.
+    /// The request exceeds the limits of the probe or the module, as the text says. Nothing moved.
     #[error("{0}")]
     OutOfRange(String),
 }
@@ -65,9 +65,9 @@ pub enum Stopped {
     NotMoved,
     /// The module confirmed that it stopped.
     Confirmed,
-    /// The command to stop was sent, but the module did not confirm it: the reason.
+    /// The command to stop was sent, but the module did not confirm it for the given reason.
     Unconfirmed(String),
-    /// The command to stop could not be sent: the reason.
+    /// The command to stop could not be sent for the given reason.
     Failed(String),
 }
 

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 pub use serialport::{Parity, StopBits};
 
-/// Shortest time between two requests for the position.
+/// Shortest time between two requests for the motor's position.
 pub(super) const PERIOD: Duration = Duration::from_millis(5);
 /// Most attempts of a repeatable request.
 const MAX_TRIES: usize = 3;
@@ -20,13 +20,13 @@ const MAX_TRIES: usize = 3;
 /// Settings of the serial port. The default of TMCL modules is 9600 baud, no parity, one stop bit.
 #[derive(Clone, Debug)]
 pub struct PortSettings {
-    /// For example `/dev/ttyUSB0` or `COM3`.
+    /// Name of the serial port, for example `/dev/ttyUSB0` or `COM3`.
     pub path: String,
-    /// Bits a second.
+    /// Baud rate, bits a second.
     pub baud: u32,
     pub parity: Parity,
     pub stop_bits: StopBits,
-    /// Longest wait for one reply.
+    /// Longest time to wait for a reply of the module.
     pub timeout: Duration,
 }
 
@@ -41,7 +41,7 @@ impl PortSettings {
         }
     }
 
-    /// Transmission time of a request and its reply.
+    /// Time that transmitting a request and its reply takes at this baud rate.
     pub fn round_trip(&self) -> Duration {
         let parity = u32::from(self.parity != Parity::None);
         let stop = if self.stop_bits == StopBits::Two { 2 } else { 1 };
@@ -53,9 +53,9 @@ impl PortSettings {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Answer {
     pub value: i32,
-    /// Midway between the request and its reply.
+    /// Time of the value: the middle between sending the request and receiving the reply.
     pub at: Instant,
-    /// More than one attempt was needed: `at` may belong to another reply than `value`.
+    /// The request was sent more than once, so that `at` may belong to another reply than `value`.
     pub repeated: bool,
 }
 
@@ -68,7 +68,7 @@ pub(crate) struct Port {
 }
 
 impl Port {
-    /// Opens the port exclusively.
+    /// Opens the port, exclusively for this process.
     ///
     /// # Errors
     /// [`Fault::NotOpened`].
@@ -85,11 +85,10 @@ impl Port {
         &self.settings
     }
 
-    /// Sends a request and waits for its reply.
+    /// Sends a request and waits for its reply. Requests that can be repeated without harm are tried three times, others once.
     ///
     /// # Errors
-    /// [`Fault::NoReply`], [`Fault::Checksum`] after three tries of a repeatable request and one of any other;
-    /// [`Fault::Refused`]; [`Fault::Unplugged`].
+    /// [`Fault::NoReply`] or [`Fault::Checksum`] after the last try; [`Fault::Refused`]; [`Fault::Unplugged`].
     pub fn ask(&mut self, request: &Request) -> Result<Answer, Fault> {
         let tries = if request.repeatable() { MAX_TRIES } else { 1 };
         let mut fault = None;
@@ -126,7 +125,7 @@ impl Port {
         bytes.ok_or(Fault::NoReply { request: request.to_string(), timeout: self.settings.timeout })
     }
 
-    /// Sends the next request at once, even if the reply to an earlier one may still arrive.
+    /// Makes the next request be sent at once, even if the reply to an earlier one may still arrive.
     pub(crate) fn hurry(&mut self) {
         self.late = false;
     }

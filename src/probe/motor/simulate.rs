@@ -19,7 +19,7 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// The kinds of faults that can be simulated.
+/// The faults of a motor's module that can be simulated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FaultKind {
     /// Carries out requests but does not reply.
@@ -54,8 +54,8 @@ impl FaultKind {
     ];
 }
 
-/// A fault and its time: `NAME` begins at once, `NAME@SECONDS` that long after the first move to a position, which is the beginning of a
-/// sweep.
+/// A simulated fault and when it begins: `NAME` at once, `NAME@SECONDS` so many seconds after the first move to a position, with which a sweep
+/// begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SimulatedFault {
     pub kind: FaultKind,
@@ -79,12 +79,12 @@ impl FromStr for SimulatedFault {
     }
 }
 
-/// What to simulate.
+/// What the simulated module is like: its `[motor]` table, and a fault.
 #[derive(Clone, Debug, Default)]
 pub struct SimulatorOptions {
     pub table: MotorTable,
     pub fault: Option<SimulatedFault>,
-    /// The module has no watchdog.
+    /// True if the module has no watchdog.
     pub no_watchdog: bool,
 }
 
@@ -94,7 +94,7 @@ struct Shared {
     end: AtomicBool,
 }
 
-/// A simulated module, running until it is dropped.
+/// A simulated TMCL module on a pseudo-terminal, which runs until it is dropped.
 pub struct Simulator {
     path: PathBuf,
     shared: Arc<Shared>,
@@ -102,8 +102,10 @@ pub struct Simulator {
 }
 
 impl Simulator {
+    /// Starts the simulation on a thread of its own.
+    ///
     /// # Errors
-    /// The system has no pseudo-terminal to give.
+    /// The system provides no pseudo-terminal.
     pub fn start(options: SimulatorOptions) -> std::io::Result<Simulator> {
         let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
         grantpt(&master)?;
@@ -124,12 +126,12 @@ impl Simulator {
         Ok(Simulator { path, shared, thread: Some(thread) })
     }
 
-    /// Path of the serial port to open.
+    /// Path of the pseudo-terminal, to be opened as the serial port.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// All valid requests so far, in order.
+    /// All valid requests that the module received so far, in order.
     pub fn received(&self) -> Vec<Request> {
         locked(&self.shared.received).clone()
     }
@@ -139,7 +141,7 @@ impl Simulator {
         locked(&self.shared.module).is_moving()
     }
 
-    /// The true angle of the array in the sweep, degrees.
+    /// The true angle of the simulated array in the sweep, degrees.
     pub fn angle(&self) -> f64 {
         locked(&self.shared.module).angle()
     }

@@ -10,22 +10,22 @@ const MIN_RATE: f64 = 1e-3;
 /// Narrowest sweep, degrees.
 const MIN_ANGLE: f64 = 1e-3;
 
-/// A requested sweep.
+/// A sweep that is requested of the motor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sweep {
-    /// From end to end, degrees; centred on 0.
+    /// Angle of the sweep from end to end, degrees. The sweep is centred on angle 0.
     pub angle: f64,
-    /// Passes over the angle, that is volumes, a second.
+    /// Passes over the angle a second; each pass is one volume.
     pub rate: f64,
-    /// Number of passes; None: until interrupted.
+    /// Number of passes; None: passes until interrupted.
     pub volumes: Option<usize>,
 }
 
 impl Sweep {
-    /// Speed between the ramps of a pass, deg/s. `round_trip`: time of a request and its reply.
+    /// Speed of the array between the ramps of a pass, deg/s, that gives the requested rate. `round_trip`: time of a request and its reply.
     ///
     /// # Errors
-    /// [`Fault::OutOfRange`] naming the limit.
+    /// [`Fault::OutOfRange`], which names the limit that the sweep exceeds.
     pub fn speed(&self, table: &MotorTable, round_trip: Duration) -> Result<f64, Fault> {
         let Sweep { angle, rate, volumes } = *self;
         let refuse = |fault: String| Err(Fault::OutOfRange(fault));
@@ -87,31 +87,31 @@ impl Direction {
     }
 }
 
-/// A position that was read during a sweep.
+/// A position of the array that was read during a sweep.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Position {
-    /// s, on a clock that positions and frames share.
+    /// Time of the reading, s, on a clock that positions and frames share.
     pub time: f64,
-    /// Degrees.
+    /// Angle of the array in the sweep, degrees.
     pub angle: f64,
-    /// Direction of its pass.
+    /// Direction of the pass during which the position was read.
     pub direction: Direction,
-    /// Number of the pass, from 0.
+    /// Number of the pass during which the position was read, from 0.
     pub pass: usize,
 }
 
 /// Position of the array at the time of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ArrayState {
-    /// Within a pass; angle in degrees.
+    /// Within a pass at the given angle, degrees.
     Sweeping { angle: f64, direction: Direction, pass: usize },
-    /// Near a reversal between two passes: the direction is not known. Angle in degrees.
+    /// Near a reversal between two passes, at the given angle in degrees; the direction is not known.
     Reversing { angle: f64 },
-    /// Not known: before the first or after the last position, or within a gap.
+    /// Not known: the time is before the first or after the last position, or within a gap between positions.
     Unknown,
 }
 
-/// Positions over time.
+/// The positions of the array over time, in order of time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Track {
     pub(super) positions: Vec<Position>,
@@ -119,7 +119,7 @@ pub struct Track {
 }
 
 impl Track {
-    /// Positions in order of time. Between two that are more than `longest_gap` seconds apart the position is not known.
+    /// Makes a track of positions in order of time. Between two that are more than `longest_gap` seconds apart the position counts as not known.
     ///
     /// # Errors
     /// One line: a time or an angle is not finite, the times do not rise, or the gap is not above 0.
@@ -140,7 +140,7 @@ impl Track {
         &self.positions
     }
 
-    /// Appends a position. One that is not finite or not later than the last is left out; then false.
+    /// Appends a position. Returns false, and ignores it, if it is not finite or not later than the last.
     pub fn push(&mut self, position: Position) -> bool {
         let later = self.positions.last().is_none_or(|last| position.time > last.time);
         let fits = later && position.time.is_finite() && position.angle.is_finite();
@@ -150,7 +150,7 @@ impl Track {
         fits
     }
 
-    /// Removes the oldest positions: at least `newest` remain, and never more than twice as many.
+    /// Removes old positions so that at least the `newest` newest remain and never more than twice as many.
     pub fn forget_all_but(&mut self, newest: usize) {
         if self.positions.len() > 2 * newest {
             self.positions.drain(..self.positions.len() - newest);

@@ -6,14 +6,14 @@ use serde::Deserialize;
 /// Clock of the motion controllers whose velocities are not in microsteps a second, Hz.
 const TMC429_CLOCK: f64 = 16e6;
 
-/// How the motor finds home, the position that all others are counted from.
+/// How the motor finds home, the position from which all others are counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Home {
-    /// By the module's own reference search (RFS), in the mode that is set in the module.
+    /// The module does its own reference search (RFS), in the mode that is set in it.
     #[default]
     ReferenceSearch,
-    /// By rotating until the home switch closes, and slowly back until it opens: that is home.
+    /// The motor rotates until the home switch closes, and slowly back until it opens; there is home.
     Switch,
 }
 
@@ -21,10 +21,10 @@ pub enum Home {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Side {
-    /// Towards smaller positions of the module.
+    /// Towards smaller position counts of the module.
     #[default]
     Left,
-    /// Towards larger positions of the module.
+    /// Towards larger position counts of the module.
     Right,
 }
 
@@ -38,14 +38,14 @@ impl Side {
     }
 }
 
-/// Unit of the module's velocities and accelerations.
+/// Unit in which the module states velocities and accelerations.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Units {
     /// Microsteps/s and microsteps/s2.
     #[default]
     Pps,
-    /// 0 to 2047, scaled by the pulse and the ramp divisor (axis parameters 154 and 153).
+    /// Integers from 0 to 2047 that the pulse and the ramp divisor (axis parameters 154 and 153) scale.
     Tmc429,
 }
 
@@ -53,47 +53,48 @@ pub enum Units {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MotorTable {
-    /// Full steps of one revolution of the motor, 4 to 10000.
+    /// Full steps in one revolution of the motor, 4 to 10000.
     pub steps_per_turn: u32,
-    /// Microsteps of a full step, as set in the module: 1, 2, 4 ... 256.
+    /// Microsteps in a full step, as set in the module: a power of 2 from 1 to 256.
     pub microsteps: u32,
     /// Revolutions of the motor for one revolution of the array, 0.001 to 10000.
     pub gear: f64,
-    /// Increasing positions rotate the array backwards.
+    /// Increasing positions of the motor move the array towards smaller angles.
     #[serde(default)]
     pub reversed: bool,
-    /// Address of the module, 1 to 255.
+    /// Address of the module in TMCL requests, 1 to 255.
     #[serde(default = "one")]
     pub address: u8,
-    /// The axis of the module, 0 to 5.
+    /// Number of the motor's axis in its module, 0 to 5.
     #[serde(default)]
     pub motor: u8,
-    /// Number that the firmware reports (1140 for a TMCM-1140); None: any TMCL module.
+    /// Type of the module that the firmware has to report (1140 for a TMCM-1140); None: any TMCL module.
     pub module: Option<u16>,
     #[serde(default)]
     pub home: Home,
-    /// Direction in which the home switch is searched first.
+    /// Direction in which the motor first rotates to find the home switch.
     #[serde(default)]
     pub home_direction: Side,
-    /// The home switch reads 0 when it is closed.
+    /// The input of the home switch reads 0 when the switch is closed; otherwise 1.
     #[serde(default)]
     pub home_inverted: bool,
-    /// Angle of home in the sweep, degrees.
+    /// Angle of the array at home, degrees; 0 is the middle of the sweep.
     #[serde(default)]
     pub home_angle_deg: f64,
-    /// Speed of the search for home, deg/s; None: the module's own (reference search) or 10 (switch).
+    /// Speed of the array while home is searched, deg/s. None: the module's own for its reference search; for a switch 10, or the largest
+    /// speed if that is lower.
     pub search_speed_deg_per_s: Option<f64>,
-    /// Largest sweep of the probe from end to end, degrees, up to 360.
+    /// Largest angle of a sweep from end to end, degrees, up to 360.
     pub largest_angle_deg: f64,
-    /// Most sweeps (volumes) a second, up to 100.
+    /// Largest number of passes (volumes) a second, up to 100.
     pub largest_rate: f64,
-    /// Largest speed that the motor follows, deg/s.
+    /// Largest speed of the array, deg/s.
     pub largest_speed_deg_per_s: f64,
-    /// Acceleration of the ramps, which the motor must be able to follow under its load, deg/s2.
+    /// Acceleration of the array at both ends of a pass, deg/s2. The motor must be able to follow it under its load.
     pub acceleration_deg_per_s2: f64,
     #[serde(default)]
     pub units: Units,
-    /// For `units = 'tmc429'`, as set in the module, 0 to 13.
+    /// Pulse divisor that is set in the module, 0 to 13; used only with `units = 'tmc429'`.
     #[serde(default)]
     pub pulse_divisor: u8,
     #[serde(default)]
@@ -136,7 +137,7 @@ impl Default for MotorTable {
 }
 
 impl MotorTable {
-    /// Checks all fields.
+    /// Checks that all fields are in their ranges.
     ///
     /// # Errors
     /// The first field that is out of its range, and what is wrong with it.
@@ -187,17 +188,17 @@ impl MotorTable {
         Ok(())
     }
 
-    /// Microsteps of the motor for one degree of the array.
+    /// Microsteps of the motor that rotate the array by one degree; positive in either direction.
     pub fn steps_per_degree(&self) -> f64 {
         f64::from(self.steps_per_turn) * f64::from(self.microsteps) * self.gear / 360.0
     }
 
-    /// The position nearest to an angle in degrees: microsteps from home. Saturates.
+    /// The motor's position, in microsteps from home, that is nearest to an angle of the array in degrees. Saturates.
     pub fn position(&self, angle: f64) -> i32 {
         ((angle - self.home_angle_deg) * self.steps_per_degree() * self.sign()).round() as i32
     }
 
-    /// The angle, in degrees, of a position in microsteps.
+    /// Angle of the array, degrees, at a position of the motor in microsteps from home.
     pub fn angle(&self, position: i32) -> f64 {
         f64::from(position) * self.sign() / self.steps_per_degree() + self.home_angle_deg
     }
@@ -206,7 +207,7 @@ impl MotorTable {
         if self.reversed { -1.0 } else { 1.0 }
     }
 
-    /// Speed of the search for home, deg/s.
+    /// Speed of the array while home is searched, deg/s, with the default filled in.
     pub fn search_speed(&self) -> f64 {
         self.search_speed_deg_per_s.unwrap_or(self.largest_speed_deg_per_s.min(10.0))
     }
@@ -219,7 +220,7 @@ impl MotorTable {
         acceleration * self.steps_per_degree() * self.acceleration_scale()
     }
 
-    /// Size of one microstep/s in the module's unit of velocity.
+    /// One microstep/s in the module's unit of velocity.
     pub(crate) fn speed_scale(&self) -> f64 {
         match self.units {
             Units::Pps => 1.0,
@@ -228,7 +229,7 @@ impl MotorTable {
         }
     }
 
-    /// Size of one microstep/s2 in the module's unit of acceleration.
+    /// One microstep/s2 in the module's unit of acceleration.
     pub(crate) fn acceleration_scale(&self) -> f64 {
         match self.units {
             Units::Pps => 1.0,
@@ -239,17 +240,17 @@ impl MotorTable {
         }
     }
 
-    /// A speed in deg/s as the module's velocity, at least 1.
+    /// Converts a speed of the array, deg/s, to the module's unit of velocity, at least 1.
     pub fn velocity(&self, speed: f64) -> i32 {
         (self.speed_register(speed).round() as i32).max(1)
     }
 
-    /// A velocity of the module in deg/s.
+    /// Converts a velocity in the module's unit to a speed of the array, deg/s.
     pub fn speed(&self, velocity: i32) -> f64 {
         f64::from(velocity) / self.speed_scale() / self.steps_per_degree() * self.sign()
     }
 
-    /// An acceleration in deg/s2 in the module's unit, at least 1.
+    /// Converts an acceleration of the array, deg/s2, to the module's unit, at least 1.
     pub fn acceleration(&self, acceleration: f64) -> i32 {
         (self.acceleration_register(acceleration).round() as i32).max(1)
     }

@@ -7,7 +7,7 @@
 /// Length of a request and of a reply, bytes.
 pub const LENGTH: usize = 9;
 
-/// Numbers of the commands.
+/// Numbers of the TMCL commands.
 pub mod command {
     pub(crate) const ROTATE_RIGHT: u8 = 1;
     pub(crate) const ROTATE_LEFT: u8 = 2;
@@ -22,7 +22,7 @@ pub mod command {
     pub const VERSION: u8 = 136;
 }
 
-/// Numbers of the axis parameters: positions in microsteps, speeds and accelerations in the module's own units.
+/// Numbers of the TMCL axis parameters. Positions are in microsteps, speeds and accelerations in the module's own units.
 pub mod axis {
     pub const TARGET: u8 = 0;
     pub const POSITION: u8 = 1;
@@ -38,7 +38,7 @@ pub mod axis {
     pub(crate) const LEFT_LIMIT: u8 = 11;
     pub(crate) const RIGHT_LIMIT_OFF: u8 = 12;
     pub(crate) const LEFT_LIMIT_OFF: u8 = 13;
-    /// Microsteps of a full step, as a power of 2.
+    /// Axis parameter with the number of microsteps in a full step, as exponent of 2.
     pub(crate) const MICROSTEPS: u8 = 140;
     pub(crate) const SEARCH_MODE: u8 = 193;
     pub(crate) const SEARCH_SPEED: u8 = 194;
@@ -56,7 +56,7 @@ pub const SUCCESS: u8 = 100;
 /// Status of a reply: the checksum of the request was wrong.
 pub(crate) const WRONG_CHECKSUM: u8 = 1;
 
-/// Description of a status code.
+/// Words for the status code of a reply.
 pub fn status_words(status: u8) -> &'static str {
     match status {
         SUCCESS => "carried out",
@@ -77,15 +77,15 @@ pub fn checksum(bytes: &[u8]) -> u8 {
     bytes.iter().fold(0, |sum, b| sum.wrapping_add(*b))
 }
 
-/// A request.
+/// A TMCL request to a module.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Request {
     /// Address of the module, 1 to 255.
     pub address: u8,
     pub command: u8,
-    /// Type of the command: the number of a parameter, or how to move.
+    /// Field "type" of the request: the number of a parameter, or how to move.
     pub kind: u8,
-    /// The axis, or the bank of global parameters and inputs.
+    /// Number of the axis, or of the bank of global parameters or inputs.
     pub motor: u8,
     pub value: i32,
 }
@@ -95,12 +95,12 @@ impl Request {
         Request { address, command, kind, motor, value }
     }
 
-    /// ROR: rotates right, towards larger positions, until another command. `velocity` in the module's unit.
+    /// ROR: rotates right, towards larger positions, until another command. `velocity` is in the module's unit.
     pub fn rotate_right(address: u8, motor: u8, velocity: i32) -> Request {
         Request::new(address, motor, command::ROTATE_RIGHT, 0, velocity)
     }
 
-    /// ROL: rotates left, towards smaller positions, until another command.
+    /// ROL: rotates left, towards smaller positions, until another command. `velocity` is in the module's unit.
     pub fn rotate_left(address: u8, motor: u8, velocity: i32) -> Request {
         Request::new(address, motor, command::ROTATE_LEFT, 0, velocity)
     }
@@ -120,57 +120,57 @@ impl Request {
         Request::new(address, motor, command::MOVE_TO, 1, distance)
     }
 
-    /// SAP, see [`axis`].
+    /// SAP: sets an axis parameter, see [`axis`].
     pub fn set_axis(address: u8, motor: u8, parameter: u8, value: i32) -> Request {
         Request::new(address, motor, command::SET_AXIS, parameter, value)
     }
 
-    /// GAP, see [`axis`].
+    /// GAP: reads an axis parameter, see [`axis`].
     pub fn get_axis(address: u8, motor: u8, parameter: u8) -> Request {
         Request::new(address, motor, command::GET_AXIS, parameter, 0)
     }
 
-    /// SGP in bank 0; the module stores the value permanently.
+    /// SGP: sets a global parameter of bank 0, which the module stores permanently.
     pub fn set_global(address: u8, parameter: u8, value: i32) -> Request {
         Request::new(address, 0, command::SET_GLOBAL, parameter, value)
     }
 
-    /// GGP in bank 0.
+    /// GGP: reads a global parameter of bank 0.
     pub fn get_global(address: u8, parameter: u8) -> Request {
         Request::new(address, 0, command::GET_GLOBAL, parameter, 0)
     }
 
-    /// RFS START: the module searches its reference by itself.
+    /// RFS START: the module starts its own reference search.
     pub fn search_start(address: u8, motor: u8) -> Request {
         Request::new(address, motor, command::REFERENCE_SEARCH, 0, 0)
     }
 
-    /// RFS STOP: ends the search of the reference.
+    /// RFS STOP: ends the reference search.
     pub fn search_stop(address: u8, motor: u8) -> Request {
         Request::new(address, motor, command::REFERENCE_SEARCH, 1, 0)
     }
 
-    /// RFS STATUS: 0 if no search is in progress.
+    /// RFS STATUS: asks whether a reference search is in progress; the value of the reply is 0 if none is.
     pub fn search_status(address: u8, motor: u8) -> Request {
         Request::new(address, motor, command::REFERENCE_SEARCH, 2, 0)
     }
 
-    /// GIO: an input of a bank (0 digital, 1 analogue).
+    /// GIO: reads an input of a bank (0 digital, 1 analogue).
     pub fn get_input(address: u8, bank: u8, input: u8) -> Request {
         Request::new(address, bank, command::GET_INPUT, input, 0)
     }
 
-    /// Version of the firmware as a number: module in the upper half (0 if the module omits it), version in the lower one.
+    /// Asks for the version of the firmware as a number: module type in the upper 16 bits (0 if the module omits it), version in the lower ones.
     pub fn version(address: u8) -> Request {
         Request::new(address, 0, command::VERSION, 1, 0)
     }
 
-    /// Version of the firmware as text, in a reply of its own format: see [`version_text`].
+    /// Asks for the version of the firmware as text. The reply has a format of its own: see [`version_text`].
     pub fn version_text(address: u8) -> Request {
         Request::new(address, 0, command::VERSION, 0, 0)
     }
 
-    /// The bytes that are transmitted.
+    /// The nine bytes of the request, with the checksum.
     pub fn bytes(&self) -> [u8; LENGTH] {
         let [a, b, c, d] = self.value.to_be_bytes();
         let mut bytes = [self.address, self.command, self.kind, self.motor, a, b, c, d, 0];
@@ -178,7 +178,7 @@ impl Request {
         bytes
     }
 
-    /// Parses a request; None if its checksum is wrong.
+    /// Parses the bytes of a request; None if the checksum is wrong.
     pub fn parse(bytes: &[u8; LENGTH]) -> Option<Request> {
         let [address, command, kind, motor, a, b, c, d, sum] = *bytes;
         let value = i32::from_be_bytes([a, b, c, d]);
@@ -196,7 +196,7 @@ impl Request {
         }
     }
 
-    /// True if carrying it out twice has the same effect as once: reads, and stopping.
+    /// True if sending the request twice has the same effect as once: it reads, or stops.
     pub fn repeatable(&self) -> bool {
         use command::*;
         match self.command {
@@ -229,12 +229,12 @@ impl std::fmt::Display for Request {
     }
 }
 
-/// A reply.
+/// A module's reply to a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Reply {
     pub host: u8,
     pub module: u8,
-    /// See [`status_words`].
+    /// Status code, see [`status_words`].
     pub status: u8,
     /// Command of the request that is answered.
     pub command: u8,
@@ -242,7 +242,7 @@ pub struct Reply {
 }
 
 impl Reply {
-    /// The bytes that are transmitted.
+    /// The nine bytes of the reply, with the checksum.
     pub fn bytes(&self) -> [u8; LENGTH] {
         let [a, b, c, d] = self.value.to_be_bytes();
         let mut bytes = [self.host, self.module, self.status, self.command, a, b, c, d, 0];
@@ -250,14 +250,14 @@ impl Reply {
         bytes
     }
 
-    /// Parses a reply; None if its checksum is wrong.
+    /// Parses the bytes of a reply; None if the checksum is wrong.
     pub fn parse(bytes: &[u8; LENGTH]) -> Option<Reply> {
         let [host, module, status, command, a, b, c, d, sum] = *bytes;
         let value = i32::from_be_bytes([a, b, c, d]);
         (checksum(&bytes[..8]) == sum).then_some(Reply { host, module, status, command, value })
     }
 
-    /// The first reply to this request in the received bytes. Noise may precede and follow it.
+    /// The first reply to this request in the received bytes, which may have noise before and after it. None if there is none.
     pub fn find(received: &[u8], request: &Request) -> Option<Reply> {
         let replies = received.windows(LENGTH).filter_map(|w| Reply::parse(w.try_into().ok()?));
         let mut ours = replies.filter(|r| r.module == request.address && r.command == request.command);
@@ -265,7 +265,7 @@ impl Reply {
     }
 }
 
-/// The module's number and version in a reply to [`Request::version_text`]: the host's address and eight characters such as
+/// Type and firmware version of the module from a reply to [`Request::version_text`]: the host's address and eight characters such as
 /// `1161V115`, without a checksum. None if the bytes have another format.
 pub fn version_text(bytes: &[u8; LENGTH]) -> Option<(u16, String)> {
     let text = std::str::from_utf8(&bytes[1..]).ok()?.trim_end_matches('\0');

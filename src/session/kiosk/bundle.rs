@@ -32,7 +32,7 @@ Contents:
 
 ";
 
-/// A support bundle.
+/// A support bundle that is being collected: an archive of redacted texts for whoever analyses a fault.
 pub struct Bundle {
     redactor: Redactor,
     entries: Vec<Entry>,
@@ -47,8 +47,8 @@ struct Entry {
 }
 
 impl Bundle {
-    /// Collects the system information, the configuration and its logs. `config`: path of the configuration, or None for the default one.
-    /// This never fails: the bundle notes what cannot be read.
+    /// Collects the system information, the configuration and its logs. `config`: path of the configuration, or None for the default one. It
+    /// never fails: what cannot be read is noted in the bundle.
     pub fn new(config: Option<&Path>) -> Bundle {
         let mut bundle = Bundle { redactor: Redactor::new(), entries: Vec::new(), notes: Vec::new() };
         let path = config.unwrap_or(Path::new(config::DEFAULT_PATH));
@@ -78,7 +78,7 @@ impl Bundle {
         value_of(Some("files"), "log").map_or(config::DEFAULT_LOG.into(), |log| folder.join(log))
     }
 
-    /// Adds an entry with redacted text, cut at 1 MiB.
+    /// Adds a file of this name with `text`, which is redacted and cut at 1 MiB. `description`: its line in the README.
     pub fn add(&mut self, name: &str, description: &str, text: &str) {
         let end = text.char_indices().nth(MAX_ENTRY).map_or(text.len(), |(end, _)| end);
         self.add_entry(name, description, &text[..end]);
@@ -146,7 +146,7 @@ impl Bundle {
         self.notes.push(note);
     }
 
-    /// Packs the archive (.tar.gz). It starts with `README.txt`, which lists the contents.
+    /// Packs the archive (.tar.gz). Its first file is `README.txt`, which lists the contents.
     ///
     /// # Errors
     /// Writing the archive to memory failed.

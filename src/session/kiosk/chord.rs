@@ -59,7 +59,7 @@ pub struct Modifiers {
     pub alt: bool,
 }
 
-/// A key with its modifiers.
+/// A key combination: a key with the modifiers that are held.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Chord {
     pub key: Key,
@@ -74,8 +74,8 @@ pub struct ChordError {
 }
 
 impl Chord {
-    /// Parses words separated by `+`, in any case: `ctrl` (or `control`), `alt`, `shift` in any order, then the key: a character, `f1` to
-    /// `f24`, or a name such as `escape`, `page_up` or `plus`.
+    /// Parses a key combination: words separated by `+`, in upper or lower case. `ctrl` (or `control`), `alt` and `shift` come first in any
+    /// order, then the key: a character, `f1` to `f24`, or a name such as `escape`, `page_up` or `plus`.
     ///
     /// # Errors
     /// One line with the wrong word and examples.

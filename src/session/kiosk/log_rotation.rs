@@ -9,9 +9,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant, SystemTime};
 
-/// Default size of one log file, bytes.
+/// Default of the largest size of one log file, bytes.
 pub const DEFAULT_FILE_BYTES: u64 = 10 << 20;
-/// Default number of log files, including the current one.
+/// Default number of log files, the current one included.
 pub const DEFAULT_FILES: u32 = 5;
 /// Minimum size of a log file, bytes: a line that is longer than a file is cut.
 const MIN_FILE_BYTES: u64 = 4096;
@@ -32,11 +32,11 @@ impl Sink for File {
 
 type Opener = Box<dyn FnMut(&Path) -> io::Result<Box<dyn Sink>> + Send>;
 
-/// The writer of a log with rotation. The text up to the end of a line is one event, which is written completely or not at all.
+/// Writes a log to several files in rotation. The text up to the end of a line is one event, which is written completely or not at all.
 ///
-/// Writing never fails. Lines that cannot be written, on a full disk or in a deleted folder, are counted. Every later write tries again,
-/// and the first one that succeeds reports how many lines are missing. No line is split between two files, and all files together hold at
-/// most `bytes` times `files`. Only one process at a time may write to a log ([`files::Lock`](crate::files::Lock)).
+/// Writing never fails. Lines that cannot be written, on a full disk or in a deleted folder, are counted. Every later write tries again, and the
+/// first one that succeeds reports how many lines are missing. No line is split between two files, and all files together hold at most `bytes`
+/// times `files`. Only one process at a time may write to a log ([`files::Lock`](crate::files::Lock)).
 pub struct RotatingLog {
     path: PathBuf,
     bytes: u64,
@@ -58,7 +58,7 @@ pub struct RotatingLog {
 }
 
 impl RotatingLog {
-    /// Opens the log at `path`, or creates it. `bytes`: size of one file, at least 4096; `files`: their number, at least 1.
+    /// Opens the log at `path`, or creates it. `bytes`: largest size of one file, at least 4096; `files`: their number, at least 1.
     ///
     /// # Errors
     /// One line that names the file: it cannot be written, or it or a file that rotation would move exists and is not a log.
@@ -104,8 +104,8 @@ impl RotatingLog {
         Ok(log)
     }
 
-    /// This log, but each time that `reopens` becomes true it opens its file again before the next line. After another program has
-    /// renamed the file, the lines go to a new one.
+    /// The same log, which opens its file anew before the next line whenever `reopens` has become true. When another program has renamed the
+    /// file, lines then go to a new one.
     #[must_use]
     pub fn reopened(mut self, reopens: Arc<AtomicBool>) -> RotatingLog {
         self.reopens = reopens;
@@ -232,10 +232,10 @@ impl Drop for RotatingLog {
     }
 }
 
-/// A log whose file may not exist yet. Until it can be opened, lines go to another writer.
+/// A log whose file may not be available yet. Until it can be opened, lines go to another writer.
 ///
-/// Writing never fails. A write tries to open the file if the last try is at least `pause` ago. The first line of the file then states
-/// where the earlier lines are.
+/// Writing never fails. A write tries to open the file if the last try is at least `pause` ago. The first line of the file then states where the
+/// earlier lines are.
 pub struct LateLog<O, W> {
     open: O,
     until: W,
@@ -246,12 +246,12 @@ pub struct LateLog<O, W> {
 }
 
 impl<O: FnMut() -> Result<RotatingLog, String>, W: Write> LateLog<O, W> {
-    /// Tries to open the log. `until`: receives the lines until that succeeds.
+    /// Tries to open the log by calling `open`. `until`: receives the lines until that succeeds; `pause`: shortest time between two tries.
     pub fn new(mut open: O, until: W, pause: Duration) -> LateLog<O, W> {
         LateLog { log: open(), open, until, pause, tried: Instant::now() }
     }
 
-    /// The reason why the file could not be opened, on one line.
+    /// The reason on one line why the file could not be opened; None if it is open.
     pub fn fault(&self) -> Option<&str> {
         self.log.as_ref().err().map(String::as_str)
     }
@@ -297,7 +297,7 @@ fn end_of(mut file: &File) -> io::Result<(u64, bool)> {
     Ok((size, last != *b"\n"))
 }
 
-/// The name of the log file after so many rotations; 0 is the current one.
+/// Path of the log file after it was rotated `number` times; 0 is the current file.
 pub(super) fn rotated_name(path: &Path, number: u32) -> PathBuf {
     if number == 0 {
         return path.into();
@@ -307,7 +307,7 @@ pub(super) fn rotated_name(path: &Path, number: u32) -> PathBuf {
     name.into()
 }
 
-/// True for an empty file, and for one that starts with a time like our logs. Other files, such as recordings, are never written to.
+/// True if a file is empty or begins with a time as logs of this program do. Other files, such as recordings, are never written to.
 pub(super) fn is_log_file(path: &Path) -> bool {
     let mut start = Vec::new();
     let read = File::open(path).and_then(|f| f.take(11).read_to_end(&mut start));

@@ -54,7 +54,7 @@ const LEVELS: &[&str] = &["ERROR", "WARN", "INFO", "DEBUG", "TRACE"];
 /// Longest line that is searched, bytes. Longer ones are removed completely.
 const MAX_LINE: usize = 16 << 10;
 
-/// Removes names from text.
+/// Replaces private names, such as those of recordings and of the user, in texts for others.
 #[derive(Default)]
 pub struct Redactor {
     numbers: HashMap<String, usize>,
@@ -69,7 +69,7 @@ impl Redactor {
         Redactor::default()
     }
 
-    /// Adds a private folder.
+    /// Makes a folder's path private.
     pub(crate) fn add_folder(&mut self, folder: &Path) {
         let folder = folder.to_string_lossy();
         let folder = folder.trim_end_matches(['/', '\\']);
@@ -78,7 +78,7 @@ impl Redactor {
         }
     }
 
-    /// Adds a recording: the names in its path are private anywhere in the text.
+    /// Makes a recording's path private: the names in it are replaced wherever they occur in a text.
     pub fn add_recording(&mut self, path: &Path) {
         if let Some(folder) = path.parent() {
             self.add_folder(folder);
@@ -97,7 +97,7 @@ impl Redactor {
         self.names.dedup();
     }
 
-    /// The redacted text, with the same number of lines.
+    /// The text with private names replaced. It has the same number of lines.
     pub fn redact(&mut self, text: &str) -> String {
         let mut redacted_text = String::with_capacity(text.len());
         for line in text.split_inclusive('\n') {

@@ -5,11 +5,11 @@ use crate::source::Frame;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-/// A complete volume.
+/// A complete volume in the cine loop.
 #[derive(Clone, Debug, Default)]
 pub struct CineVolume {
     pub volume: u32,
-    /// Frames in the order of the slices.
+    /// The frames of the volume in the order of its slices.
     pub frames: Vec<Arc<Frame>>,
     bytes: usize,
 }
@@ -17,9 +17,9 @@ pub struct CineVolume {
 /// Limits of a cine loop.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CineLimits {
-    /// Most volumes; 0 switches the cine loop off.
+    /// Largest number of volumes; 0 switches the cine loop off.
     pub volumes: usize,
-    /// Most bytes of samples. The newest volume is kept even if it alone is larger.
+    /// Largest memory of all samples, bytes. The newest volume is kept even if it alone is larger.
     pub bytes: usize,
 }
 
@@ -29,7 +29,7 @@ struct Filling {
     missing: usize,
 }
 
-/// The cine loop.
+/// The cine loop: the most recent complete volumes of a stream.
 pub struct Cine {
     limits: CineLimits,
     slices: usize,
@@ -39,12 +39,12 @@ pub struct Cine {
 }
 
 impl Cine {
-    /// An empty loop of volumes of `slices` frames.
+    /// An empty cine loop for volumes of `slices` frames.
     pub fn new(limits: CineLimits, slices: usize) -> Cine {
         Cine { limits, slices, volumes: VecDeque::new(), filling: None, bytes: 0 }
     }
 
-    /// True if the volumes have `slices` frames.
+    /// True if the loop is for volumes of `slices` frames.
     pub fn is_of(&self, slices: usize) -> bool {
         self.slices == slices
     }
@@ -54,12 +54,12 @@ impl Cine {
         &self.volumes
     }
 
-    /// Bytes of all samples.
+    /// Memory of the samples of all complete volumes, bytes.
     pub fn bytes(&self) -> usize {
         self.bytes
     }
 
-    /// True if another volume of the size of the newest would remove the oldest.
+    /// True if the next complete volume, if it is as large as the newest, will remove the oldest.
     pub(crate) fn is_full(&self) -> bool {
         let next = self.volumes.back().map_or(0, |newest| newest.bytes);
         self.volumes.len() >= self.limits.volumes || (next > 0 && self.bytes + next > self.limits.bytes)
@@ -70,12 +70,12 @@ impl Cine {
         *self = Cine::new(self.limits, self.slices);
     }
 
-    /// Removes the volume that is being filled, because its remaining frames will not arrive.
+    /// Removes the volume that is incomplete, because its remaining frames will not arrive.
     pub(crate) fn discard_partial(&mut self) {
         self.filling = None;
     }
 
-    /// Adds a frame. True if it completes a volume.
+    /// Adds a frame. Returns true if it completes a volume.
     pub fn frame(&mut self, frame: Frame) -> bool {
         if self.limits.volumes == 0 || frame.slice >= self.slices {
             return false;

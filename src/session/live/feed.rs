@@ -22,31 +22,31 @@ const MAX_EVENTS: usize = 4096;
 /// Longest wait of the thread before it checks whether it is to stop.
 const PATIENCE: Duration = Duration::from_millis(50);
 
-/// An event and its time of arrival.
+/// An event of a source and its time of arrival.
 #[derive(Clone, Debug)]
 pub struct Arrived {
     pub event: Event,
     pub at: Instant,
 }
 
-/// Sees every event of a feed.
+/// A function that is called with every event of a feed, before it is queued.
 pub type Observer = Box<dyn FnMut(&Event) + Send>;
 
-/// The counts of a feed.
+/// What a feed lost so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FeedCounts {
-    /// Frames that were lost because the queue was full.
+    /// Number of frames that were lost because the queue was full.
     pub lost: u64,
-    /// Frames that could not be recorded, and other failures of the recording.
+    /// Number of frames that could not be recorded, and of other failures of the recording.
     pub unrecorded: u64,
     /// Number of times that the source was disconnected.
     pub disconnected: u64,
-    /// Pictures of a freehand sweep that are missing from the volumes, in whole or in part.
+    /// Number of pictures of a freehand sweep that are not, or not wholly, in a volume.
     pub left_out: u64,
 }
 
 impl FeedCounts {
-    /// Both together.
+    /// The sums of both counts.
     pub(super) fn plus(self, other: FeedCounts) -> FeedCounts {
         FeedCounts {
             lost: self.lost + other.lost,
@@ -57,7 +57,7 @@ impl FeedCounts {
     }
 }
 
-/// A live source that is being read, or none.
+/// A live source that a thread of its own reads, and the queue of its events. It may also be without a source.
 pub struct Feed {
     shared: Arc<Shared>,
     can_wait: bool,
@@ -163,7 +163,7 @@ impl Shared {
 
 impl Feed {
     /// Reads a source until it ends or the feed is dropped. If `record` is given, every frame is also written to this `.frames` file. Each
-    /// further geometry gets a file of its own: NAME-2.frames.
+    /// further geometry gets a file of its own: NAME-2.frames, NAME-3.frames ...
     ///
     /// # Errors
     /// The thread cannot be started.
@@ -203,7 +203,7 @@ impl Feed {
         Ok(Feed { shared, can_wait, is_recording, thread: Some(thread) })
     }
 
-    /// The oldest queued event. If there is none, waits at most `patience` for one.
+    /// Takes the oldest event from the queue. If there is none, waits at most `patience` for one; None if none arrives.
     pub fn next(&self, patience: Duration) -> Option<Arrived> {
         let mut queue = self.shared.lock();
         if queue.events.is_empty() && !patience.is_zero() {
@@ -217,7 +217,7 @@ impl Feed {
         Some(arrived)
     }
 
-    /// True if the source loses nothing while it is kept waiting.
+    /// True if the source loses nothing while its events are not taken.
     pub fn can_wait(&self) -> bool {
         self.can_wait
     }
@@ -232,12 +232,12 @@ impl Feed {
         self.shared.lock().events.len()
     }
 
-    /// The reason why the source is not connected at present, on one line. None while it is connected.
+    /// The reason on one line why the source is not connected at present. None while it is connected.
     pub fn disconnected(&self) -> Option<String> {
         self.shared.lock().disconnected.clone()
     }
 
-    /// True if a complete volume has arrived after `volume` and the source cannot wait. Then `volume` need not be drawn.
+    /// True if a complete volume newer than `volume` has arrived and the source cannot wait. Then `volume` need not be drawn.
     pub fn is_behind(&self, volume: u32) -> bool {
         !self.can_wait && self.shared.lock().newest.is_some_and(|newest| newest > volume.saturating_add(1))
     }

@@ -7,7 +7,7 @@ use crate::scene::Settings;
 /// Limit of the changes of settings that are followed while pipelines are compiled, before the geometry begins.
 const MOST_CHANGES: u32 = 2;
 
-/// Pipelines in the making, made, and given up.
+/// The pipelines of the first geometry: being compiled, compiled, or cancelled.
 #[derive(Default)]
 pub(super) struct FirstPipelines {
     making: Option<Making>,
@@ -26,22 +26,23 @@ struct Making {
 }
 
 impl FirstPipelines {
-    /// Forgets cancelled ones that have ended.
+    /// Forgets cancelled compilations that have ended.
     pub(crate) fn forget_ended(&mut self) {
         self.cancelled.retain(|preparation| !preparation.is_finished());
     }
 
-    /// Progress of the compilation, if it has not ended: compiled pipelines and their total.
+    /// Progress of the current compilation: number of compiled pipelines and of all. None if there is none.
     pub fn progress(&self) -> Option<[usize; 2]> {
         self.making.as_ref().map(|making| making.preparation.progress())
     }
 
-    /// True while a thread compiles, false once it has ended, None if nothing is being compiled.
+    /// True while a thread compiles, false once it has ended, None if no compilation was begun.
     pub fn is_working(&self) -> Option<bool> {
         self.making.as_ref().map(|making| !making.preparation.is_finished())
     }
 
-    /// True if everything is compiled for these settings, or will be when the geometry begins. Otherwise `begin` starts the compilation.
+    /// True if the pipelines of these settings are compiled, or will be when the geometry begins. Otherwise `begin` starts the compilation.
+    /// `settings`: as drawn, and at full quality.
     ///
     /// # Errors
     /// The error with which a renderer of the settings would fail, a lost device, or the error of `begin`.
@@ -71,13 +72,14 @@ impl FirstPipelines {
         Ok(self.making.is_none())
     }
 
-    /// Releases the compiled pipelines: a geometry has begun and its renderer holds them, or nothing is prepared for the next one.
+    /// Releases the compiled pipelines, because a geometry has begun and its renderer holds them, or because nothing is to be prepared for the
+    /// next one.
     pub fn release(&mut self) {
         self.made = None;
         self.making.take_if(|making| making.preparation.is_finished());
     }
 
-    /// Cancels the compilation without waiting for its end. False if nothing was being compiled.
+    /// Cancels the compilation without waiting for its end. Returns false if nothing was being compiled.
     pub fn cancel(&mut self) -> bool {
         self.made = None;
         let Some(Making { preparation, .. }) = self.making.take() else { return false };

@@ -7,7 +7,7 @@ use crate::scene::{EchoHistogram, EchoLevels, Input};
 use crate::source::Frame;
 use crate::source::recorder::Header;
 
-/// The search for the levels of a stream's echoes.
+/// Finds the levels of echoes in the first complete volume of a stream, from which default settings are derived.
 pub(super) struct FirstVolume {
     layers: Layers,
     header: Option<Header>,
@@ -28,7 +28,8 @@ impl FirstVolume {
         FirstVolume { layers, header: None, collected: None }
     }
 
-    /// The basis of the default settings of a geometry, before any frame. None if the geometry is the previous one, whose settings stay.
+    /// Notes a new header. Returns what the default settings are derived from before any frame has arrived. None if the header is the previous
+    /// one, whose settings stay.
     pub fn begin(&mut self, header: &Header) -> Option<Defaults> {
         if self.header.as_ref() == Some(header) {
             return None;
@@ -38,7 +39,7 @@ impl FirstVolume {
         Some(self.defaults(header, None))
     }
 
-    /// The value that [`FirstVolume::begin`] will return.
+    /// The value that [`FirstVolume::begin`] would return for this header.
     pub(crate) fn at_begin(&self, header: &Header) -> Option<Defaults> {
         (self.header.as_ref() != Some(header)).then(|| self.defaults(header, None))
     }
@@ -47,7 +48,7 @@ impl FirstVolume {
         Defaults { layers: self.layers.clone(), geometry: header.forward.clone(), levels }
     }
 
-    /// Takes a frame. Returns the basis of the default settings if the frame completes the first volume.
+    /// Evaluates a frame. If it completes the first volume, returns what the default settings are derived from; otherwise None.
     pub fn frame(&mut self, frame: &Frame) -> Option<Defaults> {
         let (header, collected) = (self.header.as_ref()?, self.collected.as_mut()?);
         if !collected.take(header, frame) {

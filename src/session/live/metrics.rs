@@ -10,36 +10,36 @@ use crate::metrics::textfile::Textfile;
 use std::path::Path;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-/// Time between two writes of the file.
+/// Time between two writes of the metrics file.
 pub const INTERVAL: Duration = Duration::from_secs(15);
 
-/// Values of the metrics that are not part of the statistics.
+/// Values that are exported as metrics besides the [`Statistics`].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Conditions {
-    /// The subcommand, such as `stream`.
+    /// Name of the subcommand, such as `stream`.
     pub command: &'static str,
     pub device: String,
     pub driver: String,
-    /// Vulkan version.
+    /// Vulkan version of the device.
     pub vulkan: String,
-    /// False in the last metrics of a run.
+    /// True while the program runs, false in the last metrics of a run.
     pub is_running: bool,
-    /// Seconds since 1970.
+    /// Time at which the counters began, s since 1970; `now` is the current time.
     pub started: f64,
     pub now: f64,
-    /// Number of times that the metrics could not be written.
+    /// Number of times that the metrics file could not be written.
     pub write_failures: u64,
-    /// Resident memory, bytes; None if it is not known.
+    /// Resident memory of the process, bytes; None if it is not known.
     pub memory: Option<u64>,
-    /// Number of losses of the device, and how many of these happened because it did not finish.
+    /// Number of times that the device was lost. `device_stalls` is how many of these happened because it did not finish in time.
     pub device_losses: u64,
     pub device_stalls: u64,
-    /// Time since the device last finished any work, while it is busy.
+    /// Time for which the device has been busy without finishing anything; 0 if it is idle.
     pub busy: Duration,
     pub source: SourceStatus,
 }
 
-/// The state of the source.
+/// State of the source, and of the display that is frozen or not.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SourceStatus {
     pub is_connected: bool,
@@ -48,8 +48,8 @@ pub struct SourceStatus {
     pub not_opened: u64,
 }
 
-/// The metrics as text. `totals`: statistics since the run began. The length of the text does not grow with the run, except for the digits
-/// of numbers.
+/// The metrics in Prometheus' text format. `totals`: statistics since the run began. The length of the text grows during the run only by the
+/// digits of its numbers.
 pub fn text(totals: &Statistics, conditions: &Conditions) -> String {
     let Conditions { command, device, driver, vulkan, .. } = conditions;
     let truth = |is: bool| f64::from(u8::from(is));
@@ -91,7 +91,7 @@ pub fn text(totals: &Statistics, conditions: &Conditions) -> String {
     text.into_text()
 }
 
-/// The metrics of a run, and their file.
+/// Collects the metrics of a run and writes them to a file.
 pub struct LiveMetrics {
     file: Textfile,
     totals: Statistics,
@@ -102,7 +102,7 @@ pub struct LiveMetrics {
 }
 
 impl LiveMetrics {
-    /// Metrics of the subcommand `command` in `file`. The first write is due at once.
+    /// Starts to collect metrics of the subcommand `command` for `file`. The first write is due at once.
     ///
     /// # Errors
     /// One line: a thread cannot be started.
@@ -122,12 +122,12 @@ impl LiveMetrics {
         self.kept.device_stalls += u64::from(why.is_given_up());
     }
 
-    /// Time of the next write of the file.
+    /// Time at which the file is to be written next.
     pub fn due(&self) -> Instant {
         self.due
     }
 
-    /// Writes the file. The next write is due one interval after `now`; a delay is not made up for.
+    /// Writes the file. The next write is due one [`INTERVAL`] after `now`, even if this one was late.
     pub fn write(&mut self, now: Instant, stream: &Stream, context: &Context, source: SourceStatus) {
         self.due = now + INTERVAL;
         self.put(true, stream, context, source);

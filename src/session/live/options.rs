@@ -12,37 +12,38 @@ use std::sync::Arc;
 #[derive(Clone)]
 pub struct StreamOptions {
     pub update: Update,
-    /// Number of volume images used in rotation if volumes are shown whole: 2, or 3 so that a volume need not wait for a picture.
+    /// Number of volume images in rotation with [`Update::Whole`]: 2, or 3 so that a volume need not wait for a picture.
     pub images: u32,
-    /// Number of queues to use. None: all queues of the device.
+    /// Number of device queues to use. None: all queues of the device.
     pub queues: Option<usize>,
-    /// Copies every picture to host memory. Otherwise it stays on the device, for a window.
+    /// True: every picture is copied to host memory (readback). False: it stays on the device, for a window.
     pub readback: bool,
-    /// Size of the cine loop; none by default.
+    /// Limits of the cine loop; by default there is none.
     pub cine: CineLimits,
-    /// Called when the next step has work: the source reported an event, or a pipeline was compiled. If it is set, pipelines of changed
+    /// Called when the next step has work, because the source reported an event or a pipeline was compiled. If it is given, pipelines of changed
     /// settings are compiled in the background.
     pub wake: Option<Wake>,
-    /// The operations that are timed on the device. With [`TimeStamps::EachPass`] passes do not overlap, so that pictures take longer.
+    /// Which operations are timed on the device. With [`TimeStamps::EachPass`] passes do not overlap, so that pictures take longer.
     pub time_stamps: TimeStamps,
-    /// Shaders to use instead of the embedded ones. Changed shaders are loaded again between two pictures.
+    /// Folder of shaders that are used in place of the embedded ones. Changed shaders are loaded again between two pictures.
     pub shaders: Option<Arc<ShaderFolder>>,
-    /// The settings that were chosen. All others are derived from the geometry and the first complete volume. None: the settings are
-    /// complete.
+    /// The settings that the user chose. All others are derived from the geometry and the first complete volume. None: the settings given to the
+    /// stream are complete, and nothing is derived.
     pub chosen: Option<Layers>,
-    /// Makes, from the scene at full quality, lower settings with which pictures of a volume may also be drawn. The result of stage 1
-    /// serves all of them, so that a change between them sends no frame again.
+    /// A function that gives settings of lower quality for a scene at full quality. One result of stage 1 serves all of them, so that no frame
+    /// is sent again when the quality changes.
     pub lowered: Option<Lowered>,
-    /// Compiles the pipelines of the first geometry in the background, if `wake` is set. Steps meanwhile return at once.
+    /// Compile the pipelines of the first geometry in the background, if `wake` is given. Meanwhile [`Stream::step`](super::Stream::step)
+    /// returns at once.
     pub prepares: bool,
-    /// Draws the first picture with a 16th of the rays, and then the same picture in full, so that a slow device shows something soon.
+    /// Draw the first picture with a 16th of the rays, and then in full, so that a slow device shows something soon.
     pub coarse_first: bool,
-    /// Holds back work that would keep the device busy, so that a window's panels are drawn while a picture is being drawn: see
+    /// Submit work in small portions, so that a window's panels can be drawn while a picture is being drawn: see
     /// [`RendererOptions::paced`](crate::gpu::RendererOptions::paced). Frames that the device has no room for stay in the feed.
     pub paced: bool,
 }
 
-/// Returns the settings that replace those of a scene at full quality while the view moves.
+/// A function that returns, for a scene at full quality, the settings that may replace its own while the view moves.
 pub type Lowered = Arc<dyn Fn(&Scene) -> Vec<Settings> + Send + Sync>;
 
 impl Default for StreamOptions {

@@ -4,27 +4,27 @@
 use super::cine::CineVolume;
 use std::time::Instant;
 
-/// What the next step of a stream does.
+/// What the next step of a stream has to do.
 #[derive(Debug, Default)]
 pub(super) enum Phase {
-    /// The next step begins a picture if anything changed. Otherwise it takes an event of the source.
+    /// Begin a picture if anything changed, otherwise take an event of the source.
     #[default]
     Idle,
-    /// A picture is being drawn. Until it is done, steps continue the replay or take events.
+    /// A picture is being drawn. Until it is done, each step sends frames of the replay or takes an event.
     Drawing { picture: InFlight, replay: Option<Replay> },
-    /// Rolling volumes, and sources that do not wait: so many queued events are taken before the next picture begins. A picture after the
-    /// first of them would show an older state with every frame or volume.
+    /// Take this number of queued events before the next picture begins. Used with rolling volumes and sources that do not wait: a picture after
+    /// the first event would show a state that the others already replace.
     Draining { events: usize, replay: Option<Replay> },
-    /// As `Idle`, but a volume of the cine loop is being sent to the device, and events wait until that is done.
+    /// As `Idle`, but a volume of the cine loop is being sent to the device. Events wait until that is done.
     Replaying(Replay),
 }
 
 /// A picture that is being drawn.
 #[derive(Debug, Default)]
 pub(super) struct InFlight {
-    /// The volume that it shows.
+    /// Number of the volume that the picture shows.
     pub volume: u32,
-    /// When the frames arrived that it is the first picture to show.
+    /// Times of arrival of the frames that no earlier picture shows.
     pub arrived: Vec<Instant>,
 }
 
@@ -32,9 +32,9 @@ pub(super) struct InFlight {
 #[derive(Debug)]
 pub(super) struct Replay {
     pub volume: CineVolume,
-    /// Frames sent so far.
+    /// Number of frames sent so far.
     pub sent: usize,
-    /// The volume image that they go into.
+    /// Index of the volume image that the frames are sent to.
     pub image: u32,
 }
 
@@ -44,13 +44,14 @@ impl Phase {
         replay.map_or(Phase::Idle, Phase::Replaying)
     }
 
-    /// A picture begins. A replay continues while it is drawn.
+    /// Notes that a picture begins. A replay continues while it is drawn.
     pub fn begin(&mut self, picture: InFlight) {
         let replay = self.take_replay();
         *self = Phase::Drawing { picture, replay };
     }
 
-    /// The picture is done; `queued` events are to be taken before the next one. Returns the picture, or a default one if none was drawn.
+    /// Notes that the picture is done, and returns it, or a default one if none was being drawn. `queued`: number of events to take before the
+    /// next picture.
     pub fn finish(&mut self, queued: usize) -> InFlight {
         match std::mem::take(self) {
             Phase::Drawing { picture, replay } => {
@@ -67,7 +68,7 @@ impl Phase {
         }
     }
 
-    /// One of the queued events was taken; `is_empty`: there was none left.
+    /// Notes that one of the queued events was taken. `is_empty`: the queue had none left.
     pub(crate) fn drained(&mut self, is_empty: bool) {
         if let Phase::Draining { events, replay } = self {
             *events = if is_empty { 0 } else { events.saturating_sub(1) };
@@ -77,7 +78,7 @@ impl Phase {
         }
     }
 
-    /// Starts a replay. It takes the place of one that has not finished.
+    /// Starts a replay, in place of one that has not finished.
     pub(crate) fn start_replay(&mut self, new: Replay) {
         match self {
             Phase::Idle | Phase::Replaying(_) => *self = Phase::Replaying(new),
@@ -85,7 +86,7 @@ impl Phase {
         }
     }
 
-    /// Ends a replay, finished or not.
+    /// Removes the current replay, finished or not, and returns it; None if there is none.
     pub(crate) fn take_replay(&mut self) -> Option<Replay> {
         match self {
             Phase::Idle => None,
@@ -118,14 +119,14 @@ impl Phase {
     }
 }
 
-/// Changed settings that are not applied yet.
+/// Changed settings, made into `T`, that pictures do not use yet.
 #[derive(Default)]
 pub(super) enum Pending<T> {
     #[default]
     None,
-    /// Their pipelines are being compiled in the background. Each step between pictures asks again; the end of a compilation wakes the loop.
+    /// Their pipelines are being compiled in the background. Each step between pictures checks this; the end of a compilation wakes the caller.
     Compiling(T),
-    /// The next step that may begin a picture applies them, or starts their compilation.
+    /// The next step that may begin a picture applies them or starts to compile their pipelines.
     Ready(T),
 }
 
@@ -137,7 +138,7 @@ impl<T> Pending<T> {
         }
     }
 
-    /// The next step that may begin a picture asks whether the pipelines are compiled.
+    /// Makes the next step that may begin a picture check whether the pipelines are compiled.
     pub(crate) fn ask_again(&mut self) {
         *self = match std::mem::take(self) {
             Pending::Compiling(next) => Pending::Ready(next),
@@ -154,14 +155,14 @@ impl<T> Pending<T> {
     }
 }
 
-/// The volume on display.
+/// The number of the volume on display, and whether the last picture shows its present state.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Display {
     #[default]
     Empty,
-    /// The last picture shows it unchanged.
+    /// The last picture shows the volume of this number unchanged.
     Current(u32),
-    /// It changed, or how it is drawn did, after the last picture began.
+    /// The volume of this number, or the way in which it is drawn, has changed since the last picture began.
     Stale(u32),
 }
 
@@ -173,7 +174,7 @@ impl Display {
         }
     }
 
-    /// The last picture no longer shows the current state.
+    /// Notes that the last picture no longer shows the present state.
     pub fn invalidate(&mut self) {
         if let Display::Current(volume) = *self {
             *self = Display::Stale(volume);

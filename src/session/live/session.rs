@@ -17,20 +17,21 @@ use std::time::{Duration, Instant};
 /// Frames of a replay that one step sends: a few milliseconds of work.
 const REPLAY_FRAMES: usize = 8;
 
-/// A finished picture.
+/// A picture of a stream that the device has finished.
 #[derive(Debug)]
 pub struct FinishedPicture {
-    /// The volume that it shows. Rolling: the newest one that has a slice in it.
+    /// Number of the volume that the picture shows; of a rolling one that of the newest slice.
     pub volume: u32,
-    /// None if pictures stay on the device ([`StreamOptions::readback`](super::StreamOptions::readback)).
+    /// The pixels. None if pictures stay on the device ([`StreamOptions::readback`](super::StreamOptions::readback)).
     pub picture: Option<Picture>,
-    /// Time from the arrival of the last frame that is new in the picture to its completion.
+    /// Time from the arrival of the newest frame that no earlier picture shows to the completion of the picture.
     pub latency: Duration,
-    /// Time from the start of its drawing to its completion.
+    /// Time from the start of the drawing to the completion of the picture.
     pub took: Duration,
-    /// The stages that ran again for it.
+    /// Which stages had to run again for the picture.
     pub work: Work,
-    /// It was drawn with few rays, to be finished soon ([`StreamOptions::coarse_first`](super::StreamOptions::coarse_first)).
+    /// True if the picture was drawn with few rays and will be drawn in full next
+    /// ([`StreamOptions::coarse_first`](super::StreamOptions::coarse_first)).
     pub is_coarse: bool,
 }
 
@@ -46,6 +47,8 @@ pub struct Views {
 }
 
 impl Views {
+    /// The scenes for a geometry and settings.
+    ///
     /// # Errors
     /// The geometry cannot be drawn with the settings.
     pub fn new(header: &Header, settings: &Settings, update: Update) -> Result<Views, SceneError> {
@@ -58,11 +61,11 @@ impl Views {
         Ok(Views { forward, backward, is_directional, is_mixed: is_directional && update == Update::Rolling })
     }
 
-    /// As [`Views::new`], but the result of stage 1 also serves pictures of `full` and of the scenes that `lowered` makes of it. Scenes
-    /// that cannot be drawn are left out.
+    /// The same scenes with visible bounds so large that one result of stage 1 also serves pictures with the settings `full` and with those that
+    /// `lowered` makes of them. Settings that cannot be drawn are ignored.
     ///
     /// # Errors
-    /// The geometry cannot be drawn with the settings.
+    /// The geometry cannot be drawn with the settings `full`.
     pub fn sharing(
         self,
         header: &Header,
@@ -82,13 +85,13 @@ impl Views {
         Ok(Views { forward: forward.sharing(&full, &others), backward: backward.sharing(&full, &others), ..self })
     }
 
-    /// The scene that the first frames are filtered for. The filters are the same in all of them.
+    /// The scene by which the first frames are filtered. The filters of stage 1 are the same in all scenes.
     pub fn first(&self) -> &Scene {
         &self.forward
     }
 
-    /// The scene of a volume. `backward`: for each slice, true if it was swept backwards. If neighbouring slices of different directions
-    /// would cross, all slices get the direction of the majority.
+    /// The scene of a volume. `backward`: for each slice, true if it was swept backwards. If neighbouring slices of different directions would
+    /// cross, all slices get the direction of the majority.
     pub fn of(&self, backward: &[bool]) -> Cow<'_, Scene> {
         let count = backward.iter().filter(|b| **b).count();
         let majority = 2 * count > backward.len();
@@ -102,18 +105,18 @@ impl Views {
     }
 }
 
-/// Result of the step between two pictures, in which the next one may begin.
+/// What the step between two pictures did.
 pub(super) enum Begun {
-    /// A picture is being drawn.
+    /// It began to draw a picture.
     Picture,
-    /// Changed settings were refused, and why. The previous ones remain.
+    /// Changed settings were refused for the given reason. The previous ones remain.
     Refused(String),
-    /// This volume has to go through stage 1 again before it can be drawn.
+    /// The volume of this number has to go through stage 1 again before it can be drawn.
     Restore(u32),
     Nothing,
 }
 
-/// Everything that depends on the geometry of the frames.
+/// The part of a stream's state that depends on the geometry of the frames, and is created anew with each geometry.
 pub(super) struct Session {
     pub views: Views,
     pub renderer: Renderer,
@@ -121,7 +124,7 @@ pub(super) struct Session {
     pub phase: Phase,
     pub pending: Pending<Views>,
     pub display: Display,
-    /// When the last picture was begun, and of which volume.
+    /// Time at which the last picture was begun.
     pub begun: Instant,
     drawn: Option<u32>,
     /// By volume image: the volume of its last frame, and when those frames arrived that no picture shows yet.
@@ -134,12 +137,13 @@ pub(super) struct Session {
     refused: Option<String>,
     /// A volume that was on display and has to be sent again before it can be drawn.
     to_restore: Option<u32>,
-    /// Pipelines were asked for in advance.
+    /// True if pipelines of settings that may follow were requested ([`Session::warm`]).
     pub has_warmed: bool,
 }
 
 impl Session {
-    /// `to_restore`: a volume of the cine loop to show first.
+    /// Starts without volumes. `compiles_async`: pipelines of changed settings are compiled in the background. `to_restore`: number of a volume
+    /// of the cine loop to show first.
     pub fn new(
         views: Views,
         renderer: Renderer,
@@ -165,7 +169,7 @@ impl Session {
         }
     }
 
-    /// A frame of `volume` is in volume image `image`.
+    /// Notes that a frame of `volume`, which arrived at `at`, is in the volume image `image`.
     pub(crate) fn frame_arrived(&mut self, image: u32, volume: u32, at: Instant) {
         let (previous, arrived) = &mut self.arrived[image as usize];
         // Arrivals of a volume that was never shown are discarded. A rolling volume takes the frames of all.
@@ -222,19 +226,22 @@ impl Session {
         Ok(())
     }
 
-    /// Compiles the pipelines of changed shaders again, and draws with them.
+    /// Compiles the pipelines of the changed shaders again; later pictures use them.
+    ///
+    /// # Errors
+    /// A shader cannot be compiled, or the device fails.
     pub fn reload_shaders(&mut self, shaders: &HashSet<String>) -> Result<(), GpuError> {
         let rerun = self.renderer.reload_shaders(shaders)?;
         self.run_again(&rerun);
         Ok(())
     }
 
-    /// By slice of the volume on display: swept backwards.
+    /// For each slice of the volume on display: true if it was swept backwards.
     pub(crate) fn swept_backward(&self) -> &[bool] {
         &self.backward
     }
 
-    /// Compiles the pipelines of scenes that may come next, where pipelines are compiled in the background.
+    /// Compiles the pipelines of scenes that may follow, if pipelines are compiled in the background.
     pub fn warm(&mut self, scenes: Vec<SceneMaker>) {
         self.has_warmed = true;
         if self.compiles_async
@@ -258,17 +265,17 @@ impl Session {
         }
     }
 
-    /// The volume on display, or the next one to be.
+    /// Number of the volume on display, or of the one that will be displayed next.
     pub(crate) fn current_volume(&self) -> Option<u32> {
         self.pool.waiting().or(self.display.volume()).or(self.to_restore)
     }
 
-    /// The volume of the last picture, also if it is being drawn.
+    /// Number of the volume of the last picture, even if that is still being drawn.
     pub(crate) fn drawn_volume(&self) -> Option<u32> {
         self.drawn
     }
 
-    /// The volume that is being sent again, if any.
+    /// Number of the volume that is being sent to the device again; None if none is.
     pub(crate) fn replayed_volume(&self) -> Option<u32> {
         self.phase.replay().map(|replay| replay.volume.volume)
     }
@@ -283,7 +290,10 @@ impl Session {
             || matches!(self.display, Display::Stale(_))
     }
 
-    /// Applies pending settings, and begins a picture if there is anything new to show.
+    /// Applies changed settings, and begins a picture if there is anything new to show.
+    ///
+    /// # Errors
+    /// The device fails.
     pub fn begin(&mut self) -> Result<Begun, GpuError> {
         self.apply_pending()?;
         let mut arrived = Vec::new();
@@ -306,7 +316,10 @@ impl Session {
         Ok(Begun::Picture)
     }
 
-    /// Waits for the picture in flight. `queued`: events to take before the next picture begins.
+    /// Waits for the picture that is being drawn. `queued`: number of events to take before the next picture begins.
+    ///
+    /// # Errors
+    /// The device fails.
     pub fn finish(&mut self, queued: usize, statistics: &mut Statistics) -> Result<FinishedPicture, GpuError> {
         let picture = self.renderer.end_drawing()?;
         let InFlight { volume, arrived } = self.phase.finish(queued);
@@ -320,7 +333,7 @@ impl Session {
         Ok(FinishedPicture { volume, picture, latency, took, work, is_coarse: false })
     }
 
-    /// Starts to send a volume again, instead of one that is being sent. Without a free volume image nothing happens.
+    /// Starts to send a volume of the cine loop to the device, in place of one that is being sent. Does nothing if no volume image is free.
     pub(crate) fn start_replay(&mut self, volume: CineVolume) {
         let image = match self.phase.replay() {
             Some(replay) => Some(replay.image),
@@ -331,8 +344,8 @@ impl Session {
         }
     }
 
-    /// Shows a volume again that was discarded because of changed settings or another device, if it is in the cine loop; otherwise the
-    /// newest volume of the loop.
+    /// Shows a volume again that was discarded because of changed settings or another device: the one of this number if it is in the cine loop,
+    /// otherwise the newest of the loop.
     pub fn restore(&mut self, volume: u32, cine: &Cine) {
         let volumes = cine.volumes();
         if let Some(volume) = volumes.iter().find(|kept| kept.volume == volume).or(volumes.back()) {
@@ -340,7 +353,10 @@ impl Session {
         }
     }
 
-    /// Sends the next frames of the replay.
+    /// Sends the next frames of the replay to the device.
+    ///
+    /// # Errors
+    /// The device fails.
     pub(crate) fn continue_replay(&mut self) -> Result<(), GpuError> {
         let Some(replay) = self.phase.replay_mut() else { return Ok(()) };
         let (frames, image) = (&replay.volume.frames, replay.image);

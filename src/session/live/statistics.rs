@@ -14,41 +14,41 @@ const MAX_LATENCY: u64 = 60_000_000;
 const LATENCY_LIMITS: &[f64] =
     &[0.005, 0.01, 0.02, 0.035, 0.05, 0.075, 0.1, 0.15, 0.2, 0.3, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 5.0, 10.0, 30.0];
 
-/// Counts of the faults of a source, by kind.
+/// Numbers of faults of a source, by kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SourceFaults {
-    /// A part of the data was left out, and the source went on.
+    /// Number of faults after which the source went on without a part of the data.
     pub reported: u64,
-    /// The source ended unexpectedly.
+    /// Number of times that the source ended unexpectedly.
     pub ended: u64,
-    /// The connection was lost or refused.
+    /// Number of times that the connection was lost or refused.
     pub disconnected: u64,
 }
 
-/// Statistics of a stream since it began, or since they were last taken.
+/// Statistics of a stream over a period: since it began, or since they were last taken.
 #[derive(Clone, Debug)]
 pub struct Statistics {
-    /// Time covered.
+    /// Length of the period.
     pub time: Duration,
-    /// Frames that arrived.
+    /// Number of frames that arrived.
     pub frames: u64,
-    /// Frames that were lost because the queue was full.
+    /// Number of frames that were lost because the queue was full.
     pub lost: u64,
-    /// Frames that the renderer refused, for example of the wrong size.
+    /// Number of frames that the renderer refused, for example because of a wrong size.
     pub refused: u64,
-    /// Frames that were ignored because the picture is frozen.
+    /// Number of frames that were ignored because the display was frozen.
     pub frozen: u64,
-    /// Frames that could not be recorded, and other failures of the recording.
+    /// Number of frames that could not be recorded, and of other failures of the recording.
     pub unrecorded: u64,
     pub faults: SourceFaults,
     pub pictures: u64,
     pub volumes: VolumeCounts,
     /// Latency from the arrival of each frame to the end of the first picture that shows it, us.
     pub latency: Histogram<u64>,
-    /// Counts of the same latencies, s, between fixed limits.
+    /// The same latencies, s, in bins with fixed limits.
     pub latencies: histogram::Histogram,
     pub passes: Vec<PassTime>,
-    /// Passes and copies that could not be timed.
+    /// Number of passes and copies that could not be timed.
     pub untimed: u64,
 }
 
@@ -80,19 +80,19 @@ impl Statistics {
         self.latencies.record(latency.as_secs_f64());
     }
 
-    /// Forgets the latencies.
+    /// Removes all latencies.
     pub(super) fn reset_latencies(&mut self) {
         self.latency.reset();
         self.latencies.reset();
     }
 
-    /// Quantile `share` (0..=1) of the latencies, ms.
+    /// Quantile of the latencies at `share` (0..=1), ms.
     pub fn latency_ms(&self, share: f64) -> f64 {
         self.latency.value_at_quantile(share) as f64 / 1e3
     }
 
-    /// The difference to the earlier statistics `before`. Latencies and times of passes are not subtracted, because they are reset when
-    /// they are taken.
+    /// These statistics minus the earlier ones. Latencies and times of passes are not subtracted, because they are reset whenever statistics are
+    /// taken.
     pub fn since(&self, before: &Statistics) -> Statistics {
         let counts = |now: VolumeCounts, then: VolumeCounts| VolumeCounts {
             shown: now.shown.saturating_sub(then.shown),
@@ -149,7 +149,7 @@ impl Statistics {
         }
     }
 
-    /// The counts since the beginning on one line. Every frame that arrived and every volume that ended is in one of them.
+    /// The counts on one line, for statistics since the beginning.
     pub fn totals(&self) -> String {
         let VolumeCounts { shown, dropped, incomplete, left_out } = self.volumes;
         let frozen =
@@ -161,7 +161,7 @@ impl Statistics {
         )
     }
 
-    /// The statistics on one line. `floor`: the time that sound needs for a volume, s, if it is known.
+    /// Rates and latencies on one line. `floor`: time that sound needs for a volume, s, if it is known.
     pub fn line(&self, floor: Option<f64>) -> String {
         let seconds = self.time.as_secs_f64().max(1e-9);
         let rate = |n: u64| n as f64 / seconds;

@@ -14,29 +14,29 @@ pub enum Update {
     Rolling,
 }
 
-/// Counts of volumes. Each volume is counted once, when it has ended.
+/// Numbers of volumes. Each volume is counted once, when it has ended.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct VolumeCounts {
-    /// Shown. Rolling: complete.
+    /// Number of volumes that were shown; of rolling ones those that were complete.
     pub shown: u64,
-    /// Complete volumes that a newer one replaced, or for which no image was free.
+    /// Number of complete volumes that were not shown, because a newer one replaced them or no volume image was free.
     pub dropped: u64,
-    /// Volumes that ended with frames missing.
+    /// Number of volumes that ended with frames missing.
     pub incomplete: u64,
-    /// Frames (not volumes) that arrived for a volume that had ended or was dropped.
+    /// Number of frames (not volumes) that arrived for a volume that had ended or was dropped.
     pub left_out: u64,
 }
 
-/// A volume that can be shown.
+/// A volume that can be shown, and the volume image that holds it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Ready {
     pub image: u32,
     pub volume: u32,
-    /// By slice: true if it was swept backwards.
+    /// For each slice: true if it was swept backwards.
     pub backward: Vec<bool>,
 }
 
-/// The volume images of a stream.
+/// Decides which volume image each frame goes to, and which one is shown.
 pub(crate) struct VolumePool {
     update: Update,
     slices: usize,
@@ -63,7 +63,8 @@ struct Filling {
 }
 
 impl VolumePool {
-    /// `images`: volume images used in rotation; at least two for whole volumes, always one for a rolling one. `slices`: frames a volume.
+    /// `images`: number of volume images in rotation; at least two are used for whole volumes, always one for a rolling one. `slices`: frames a
+    /// volume.
     pub fn new(update: Update, images: u32, slices: usize) -> VolumePool {
         let images = if update == Update::Whole { images.max(2) } else { 1 };
         VolumePool {
@@ -80,19 +81,20 @@ impl VolumePool {
         }
     }
 
-    /// The contents of all images are discarded.
+    /// Discards the contents of all volume images.
     pub fn forget(&mut self) {
         self.end();
         self.counts.dropped += u64::from(self.is_waiting() && !self.is_replay);
         (self.ready, self.shown, self.replay) = (None, None, None);
     }
 
-    /// True if a complete volume waits to be shown; never for a rolling one.
+    /// True if a complete volume waits to be shown; never for rolling volumes.
     pub fn is_waiting(&self) -> bool {
         self.update == Update::Whole && self.ready.is_some()
     }
 
-    /// The volume that waits to be shown. Rolling: the newest one with a slice that was not shown.
+    /// Number of the volume that waits to be shown; with rolling volumes, of the newest that has a slice that was not shown. None if there is
+    /// none.
     pub fn waiting(&self) -> Option<u32> {
         self.ready.as_ref().map(|ready| ready.volume)
     }
@@ -111,20 +113,20 @@ impl VolumePool {
         self.backward.len() as u32
     }
 
-    /// Continues the counts of the pool of another geometry or device. Its volumes that were not shown are dropped.
+    /// Takes over the counts of the pool of another geometry or device. Its volumes that were not shown count as dropped.
     pub(crate) fn continue_from(&mut self, mut previous: VolumePool) {
         previous.forget();
         (self.counts, self.over) = (previous.counts, previous.over);
     }
 
-    /// Another source begins, which may number its volumes from 0 again.
+    /// Prepares for another source, which may number its volumes from 0 again.
     pub(crate) fn restart_numbering(&mut self) {
         self.end();
         self.over = None;
     }
 
-    /// A free image for a replayed volume: neither the one on display nor the one being filled. If there is no other, the image of a volume
-    /// that waits to be shown. None if all are in use.
+    /// Index of a volume image for a replayed volume: one that is neither on display nor being filled, or else that of a volume that waits to be
+    /// shown. None if there is none.
     pub fn spare(&mut self) -> Option<u32> {
         if self.is_rolling() {
             return Some(0);
@@ -141,7 +143,8 @@ impl VolumePool {
         self.replay
     }
 
-    /// A replayed volume is complete in the image that [`VolumePool::spare`] gave: it is shown next.
+    /// Notes that a replayed volume is complete in the volume image that [`VolumePool::spare`] gave; it is shown next. `backward`: for each
+    /// slice, true if it was swept backwards.
     pub fn put(&mut self, image: u32, volume: u32, backward: Vec<bool>) {
         self.backward[image as usize].clone_from(&backward);
         let replaced = self.ready.replace(Ready { image, volume, backward });
@@ -153,8 +156,8 @@ impl VolumePool {
         self.counts
     }
 
-    /// The image that a frame of this volume goes into. None if the frame is left out. `stale` is called once for a new volume: if it
-    /// returns true, the whole volume is left out, because newer ones have arrived.
+    /// Index of the volume image that a frame of this volume goes to. None if the frame is left out. `stale` is called once for each new volume:
+    /// if it returns true, the whole volume is left out, because newer ones have arrived.
     pub fn place(&mut self, volume: u32, stale: impl FnOnce() -> bool) -> Option<u32> {
         let current = self.filling.as_ref().map(|f| f.volume);
         if current != Some(volume) {
@@ -183,7 +186,7 @@ impl VolumePool {
         self.filling = Some(Filling { volume, image: free, arrived, missing: self.slices });
     }
 
-    /// Ends the volume that is being filled: no more of its frames will arrive.
+    /// Ends the volume that is being filled, because no more of its frames will arrive.
     pub fn end(&mut self) {
         let Some(Filling { volume, image, .. }) = self.filling.take() else { return };
         self.over = Some(volume);
@@ -193,14 +196,14 @@ impl VolumePool {
         }
     }
 
-    /// A volume is complete that no frame was placed of: it is not shown.
+    /// Counts a volume as dropped that was complete although no frame of it was stored.
     pub(crate) fn pass_over(&mut self, volume: u32) {
         if self.over < Some(volume) {
             (self.over, self.counts.dropped) = (Some(volume), self.counts.dropped + 1);
         }
     }
 
-    /// A frame is in the image that [`VolumePool::place`] gave. True if it completes its volume.
+    /// Notes that a frame is in the volume image that [`VolumePool::place`] gave. Returns true if it completes its volume.
     pub fn arrived(&mut self, slice: usize, backward: bool) -> bool {
         let Some(filling) = self.filling.as_mut().filter(|_| slice < self.slices) else { return false };
         let Some(image) = filling.image else { return false };
@@ -221,7 +224,8 @@ impl VolumePool {
         is_complete
     }
 
-    /// The next volume to show, if there is a new one. The image that was shown before becomes free, so no picture of it may be in flight.
+    /// Takes the next volume to show; None if there is no new one. The volume image that was shown before becomes free, so that no picture of it
+    /// may be in flight.
     pub fn take(&mut self) -> Option<Ready> {
         let ready = self.ready.take()?;
         self.shown = Some(ready.image);

@@ -21,7 +21,7 @@ const LETTER: [f64; 2] = [14.0, 48.0];
 /// Mean width of a character as a share of the text's height.
 const CHARACTER: f64 = 0.55;
 
-/// Date and time for a bar: `2026-11-23 20:00:00 UTC`.
+/// Date and time as the bar of a picture shows them: `2026-11-23 20:00:00 UTC`.
 pub fn time_line(now: SystemTime) -> String {
     // A clock before 1970 is not set.
     let now = humantime::format_rfc3339_seconds(now.max(UNIX_EPOCH)).to_string();
@@ -31,17 +31,16 @@ pub fn time_line(now: SystemTime) -> String {
 /// When a picture of the phantom that has no bar below it (`marks.bar`) states that it is not of a patient.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Demo {
-    /// Only if something else is drawn on it. Otherwise it has the rendered pixels and nothing else.
+    /// Only if something else is drawn over it, too. Otherwise it keeps exactly the rendered pixels.
     WithOthers,
-    /// Always.
+    /// In every case.
     Always,
 }
 
-/// Returns the picture as the settings of its scene ask for it to be saved: with its measurements and body marks, and with marks and a bar
-/// if `marks.bar` is set.
+/// The picture as it is saved: with its measurements and body marks, and, if `marks.bar` of its settings is set, with marks and a bar of text.
 ///
-/// `volume`: number of the volume that it shows; measurements of other volumes are dimmed. `start`: where its rendering starts, if that
-/// follows the fluid. `demo`: None if the volume may be of a patient.
+/// `volume`: number of the volume that it shows; measurements of other volumes are dimmed. `start`: the start surface, if one was found. `demo`:
+/// None if the volume may be of a patient.
 ///
 /// # Errors
 /// One line: the picture is not of this scene's size, or the drawing failed.
@@ -63,7 +62,8 @@ pub fn as_set<'a>(
     }
 }
 
-/// Returns the picture with its marks. `time`: time of the picture, for the bar. `origin`: what it shows, such as "Demo data (phantom)".
+/// The picture with its marks and a bar of text. `volume` and `start`: as for [`as_set`]. `time`: time of the picture, for the bar. `origin`:
+/// what the picture shows, such as "Demo data (phantom)"; None for patients.
 ///
 /// # Errors
 /// One line: the picture is not of this scene's size, or the drawing failed.
@@ -96,10 +96,9 @@ pub fn marked(
     Ok(marked)
 }
 
-/// Returns the picture with its measurements, annotations and body marks, the lines of its reference tile, and the line at which rendering
-/// starts.
+/// The picture with its measurements, annotations and body marks, the lines on its reference tile, and the line at which rendering starts.
 ///
-/// `origin`: what it shows, in small letters in a corner.
+/// `volume` and `start`: as for [`as_set`]. `origin`: what the picture shows, in small letters in a corner; None for nothing.
 ///
 /// # Errors
 /// One line: the drawing failed.

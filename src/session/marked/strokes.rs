@@ -9,7 +9,7 @@ use crate::scene::planes::CURVE_COLOUR;
 use crate::scene::{Mode, Scene};
 use plotters::prelude::{BLACK, DrawingBackend, ShapeStyle, WHITE};
 
-/// Colour of lines: yellow, which no tissue has.
+/// Colour of lines (red, green, blue): yellow, which no tissue has.
 pub(super) const LINE: [u8; 3] = [255, 214, 64];
 /// Colour of lines of measurements that belong to another volume.
 const DIMMED: [u8; 3] = [150, 150, 150];
@@ -29,7 +29,7 @@ const TEXT: u32 = 14;
 /// Widest label, pixels.
 const WIDEST: f64 = 600.0;
 
-/// Draws the measurements of a scene into its picture, those of other volumes than this one dimmed.
+/// Draws the measurements of a scene into its picture. Those that belong to another volume than `volume` are dimmed.
 ///
 /// # Errors
 /// One line: the drawing of a label failed.
@@ -58,7 +58,7 @@ pub(super) fn draw(picture: &mut Picture, scene: &Scene, volume: Option<u32>) ->
     Ok(())
 }
 
-/// Draws where the slices are on the reference tile of a tomography, and their distance.
+/// Draws the lines of the slices on the reference tile of a tomography, and the distance between them.
 ///
 /// # Errors
 /// One line: the drawing of the label failed.
@@ -80,7 +80,7 @@ pub(super) fn slices(picture: &mut Picture, scene: &Scene) -> Result<(), String>
     Ok(())
 }
 
-/// Writes on each slice of a tomography where it is.
+/// Writes on each slice of a tomography its position.
 ///
 /// # Errors
 /// One line: the drawing of a label failed.
@@ -99,7 +99,7 @@ pub(super) fn places(picture: &mut Picture, scene: &Scene) -> Result<(), String>
     Ok(())
 }
 
-/// Draws the line of a curved plane on its plane, with its direction, and the length of it on the curved plane.
+/// Draws the line of a curved plane on the plane that it lies on, with its direction, and the line's length on the curved plane's tile.
 ///
 /// # Errors
 /// One line: the drawing of the label failed.
@@ -125,7 +125,7 @@ pub(super) fn curve(picture: &mut Picture, scene: &Scene) -> Result<(), String> 
     Ok(())
 }
 
-/// Draws the body marks: the body as a thin line, the probe as a bar with a dot at its marker.
+/// Draws the body marks: the outline of the body as a thin line, the probe as a bar with a dot at its marked end.
 pub(super) fn body_marks(picture: &mut Picture, scene: &Scene) {
     let size = [picture.width, picture.height].map(f64::from);
     for mark in bodies::drawn(&scene.settings.body_marks, size) {
@@ -148,7 +148,7 @@ pub(super) fn body_marks(picture: &mut Picture, scene: &Scene) {
     }
 }
 
-/// Draws where rendering starts on the planes.
+/// Draws on the planes the lines at which rendering starts.
 pub(super) fn start(picture: &mut Picture, lines: &[StartLine]) {
     for (half, colour) in [(HALF_EDGE, EDGE), (HALF, START)] {
         for line in lines {

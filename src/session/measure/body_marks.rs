@@ -10,28 +10,28 @@ const DOT: f64 = 0.09;
 /// Distance between a mark and the edge of the picture, as a share of the picture's shorter edge.
 const MARGIN: f64 = 0.01;
 
-/// A body mark, in pixels of the picture from its upper left corner.
+/// The drawing of a body mark. Positions and lengths are in pixels of the picture, from its upper left corner.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Drawn {
-    /// Index in the list.
+    /// Index of the mark in the list of body marks.
     pub index: usize,
-    /// Upper left corner of its square, whose edge is `edge`.
+    /// Upper left corner of the mark's square; its side length is `edge`.
     pub corner: [f64; 2],
     pub edge: f64,
-    /// The lines of the body.
+    /// The lines of the body's outline.
     pub outline: Vec<Vec<[f64; 2]>>,
-    /// The probe: the end with the marker, and the other end.
+    /// The ends of the probe's bar: the one with the marker, and the other one.
     pub probe: [[f64; 2]; 2],
-    /// Radius of the marker's dot.
+    /// Radius of the dot at the marked end of the probe.
     pub dot: f64,
 }
 
-/// A part of a body mark that can be grabbed.
+/// A part of a body mark that can be dragged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
-    /// The probe on it.
+    /// The bar of the probe.
     Probe,
-    /// The rest of its square.
+    /// The rest of the mark's square.
     Body,
 }
 
@@ -44,7 +44,7 @@ fn square(mark: &BodyMark, picture: [f64; 2]) -> ([f64; 2], f64) {
     ([corner(0), corner(1)], edge)
 }
 
-/// Computes the drawing of body marks on a picture of this size, pixels.
+/// Computes the drawings of body marks on a picture of size `picture` (width, height), pixels.
 pub fn drawn(marks: &[BodyMark], picture: [f64; 2]) -> Vec<Drawn> {
     let one = |(index, mark): (usize, &BodyMark)| {
         let (corner, edge) = square(mark, picture);
@@ -59,8 +59,8 @@ pub fn drawn(marks: &[BodyMark], picture: [f64; 2]) -> Vec<Drawn> {
     marks.iter().enumerate().map(one).collect()
 }
 
-/// The index of the mark at a pixel of the picture, and its part there. `reach`: largest distance from the probe at which it is grabbed,
-/// pixels. Of overlapping marks the last one counts, which is drawn on top.
+/// The index of the body mark at a pixel of the picture, and the part of it that is there. `reach`: largest distance from the probe at which the
+/// pixel counts as on it, pixels. Of overlapping marks the last one counts, which is drawn on top. None if there is no mark.
 pub fn part_at(marks: &[BodyMark], picture: [f64; 2], pixel: [f64; 2], reach: f64) -> Option<(usize, Part)> {
     let part = |drawn: &Drawn| {
         let [a, b] = drawn.probe;
@@ -79,26 +79,26 @@ pub fn part_at(marks: &[BodyMark], picture: [f64; 2], pixel: [f64; 2], reach: f6
     drawn(marks, picture).iter().rev().find_map(|drawn| Some((drawn.index, part(drawn)?)))
 }
 
-/// Returns a mark whose probe is at a pixel of the picture, or at the nearest position within its square.
+/// The mark with its probe moved to a pixel of the picture, or to the nearest position within its square.
 pub fn with_probe_at(mark: &BodyMark, picture: [f64; 2], pixel: [f64; 2]) -> BodyMark {
     let (corner, edge) = square(mark, picture);
     let probe = [0, 1].map(|i| short(((pixel[i] - corner[i]) / edge * 2.0 - 1.0).clamp(-1.0, 1.0)));
     BodyMark { probe, ..*mark }
 }
 
-/// The middle of a mark's probe, pixels of the picture.
+/// The middle of the probe of a mark, in pixels of the picture.
 pub fn probe_of(mark: &BodyMark, picture: [f64; 2]) -> [f64; 2] {
     let (corner, edge) = square(mark, picture);
     [0, 1].map(|i| corner[i] + (mark.probe[i] + 1.0) / 2.0 * edge)
 }
 
-/// The centre of a mark, pixels of the picture.
+/// The centre of the square of a mark, in pixels of the picture.
 pub fn centre_of(mark: &BodyMark, picture: [f64; 2]) -> [f64; 2] {
     let (corner, edge) = square(mark, picture);
     corner.map(|from| from + edge / 2.0)
 }
 
-/// Returns a mark whose centre is at a pixel of the picture, or as near to it as the edges of the picture allow.
+/// The mark with its centre moved to a pixel of the picture, or as near to it as the edges of the picture allow.
 pub fn moved_to(mark: &BodyMark, picture: [f64; 2], pixel: [f64; 2]) -> BodyMark {
     let at = [0, 1].map(|i| (pixel[i] / picture[i].max(1.0)).clamp(0.0, 1.0));
     // Where it is drawn, so that the next drag begins there.

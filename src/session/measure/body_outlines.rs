@@ -148,7 +148,7 @@ const BREAST: &[Line] = &[
     Straight(&[[-0.60, 0.12], [-0.50, 0.12]]),
 ];
 
-/// The lines of a part of the body, each of points from -1 to 1, right and down.
+/// The lines of the outline of a part of the body. Coordinates of their points are from -1 to 1, to the right and down.
 pub(super) fn outline(body: Body) -> Vec<Vec<Point>> {
     // Lines that are there once, lines that are there on both sides, and by how many quarters a fetus is turned from head down.
     let (once, on_both, quarters): (&[&[Line]], &[&[Line]], Option<u8>) = match body {

@@ -5,18 +5,18 @@ use crate::segment::sections::{Arrangement, Plane, SAME_ANGLE, SAME_PLANE, arran
 use glam::DVec3;
 use std::f64::consts::PI;
 
-/// The arrangement of the planes of contours.
+/// How the planes of contours are arranged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stack {
     Parallel,
-    /// Planes that are rotated about an axis that all of them contain.
+    /// The planes contain a common axis, about which they are rotated.
     Rotated,
 }
 
-/// The volume that contours enclose, mm^3, and the arrangement of their planes.
+/// The volume that contours (in mm) enclose, mm^3, and the arrangement of their planes.
 ///
-/// In parallel planes each area counts from halfway to the previous plane to halfway to the next one; the outermost areas extend as far
-/// outwards as inwards. In planes through an axis each half of a contour is turned about the axis by its share of half a turn.
+/// In parallel planes each area counts from halfway to the previous plane to halfway to the next one; the outermost areas extend as far outwards
+/// as inwards. In planes through an axis each half of a contour is rotated about the axis by its share of half a turn.
 ///
 /// # Errors
 /// One line: there are fewer than two planes, a contour has no area, or the planes are neither parallel nor share an axis.

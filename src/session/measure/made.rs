@@ -5,8 +5,8 @@ use crate::scene::{Scene, Settings};
 /// Largest distance of a point that counts as on a plane, mm. Coordinates are stored to a tenth of a micrometre.
 const ON_PLANE: f64 = 1e-3;
 
-/// Describes the plane of a picture that contains all of these points by its centre (lateral, depth, elevation, mm) and its normal. For
-/// points on the rendered surface it gives the direction of the view. Empty if no plane contains them.
+/// Describes the plane of the picture in which all points of a measurement lie, by its centre (lateral, depth, elevation, mm) and its normal.
+/// For points on the rendered surface (`on_surface`) it states the angles of the view instead. Empty if no plane contains them.
 pub fn plane(scene: &Scene, points: &[[f64; 3]], on_surface: bool) -> String {
     if on_surface {
         let camera = &scene.settings.camera;
@@ -34,7 +34,7 @@ pub fn plane(scene: &Scene, points: &[[f64; 3]], on_surface: bool) -> String {
     format!("{name} at {x}, {y}, {z} mm, normal {along_x}, {along_y}, {along_z}")
 }
 
-/// The mode, and a digest of all settings except the size of the picture and what is drawn over it (FNV-1a of their text, 64 bits).
+/// The mode in words, and a digest of all settings except the size of the picture and what is drawn over it (FNV-1a of their text, 64 bits).
 pub fn settings(of: &Settings) -> String {
     let settings = Settings { picture: Settings::default().picture, ..of.clone().without_drawings() };
     let text = settings.to_toml().unwrap_or_default();

@@ -7,12 +7,12 @@ use crate::text::csv_quoted;
 use glam::DVec3;
 use std::fmt::Write as _;
 
-/// A measured quantity.
+/// A measured quantity: its name, value and unit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Quantity {
     pub name: &'static str,
     pub value: f64,
-    /// mm, cm2, cm3 or deg; empty for an echo of 0..=255.
+    /// Unit of the value: mm, cm2, cm3 or deg; empty for an echo, whose range is 0..=255.
     pub unit: &'static str,
 }
 
@@ -39,10 +39,10 @@ fn places(points: &[[f64; 3]]) -> Vec<DVec3> {
     points.iter().map(|point| DVec3::from(*point)).collect()
 }
 
-/// The quantities of a measurement, the most important one first. Texts and arrows have none.
+/// The quantities that a measurement gives, the most important one first; empty for texts and arrows.
 ///
 /// # Errors
-/// One line: the reason why its points measure nothing.
+/// One line: the reason why its points give no result.
 pub fn quantities(measured: &Measurement) -> Result<Vec<Quantity>, &'static str> {
     let points = places(&measured.points);
     Ok(match (measured.kind, &points[..]) {
@@ -107,8 +107,8 @@ pub fn label(number: usize, measured: &Measurement) -> String {
     }
 }
 
-/// All results as CSV: a line for each quantity, with the conditions of the measurement if they are known. Numbers have a decimal point and
-/// four decimals. `recording`: its name; empty for live volumes.
+/// All results as CSV: a line for each quantity, with the conditions of the measurement if they are known. Numbers have a decimal point and four
+/// decimals. `recording`: name of the recording; empty for live volumes.
 pub fn csv(all: &[Measurement], recording: &str) -> String {
     let mut text = String::from("number,measurement,text,quantity,value,unit,recording,volume,time,plane,settings\n");
     let recording = csv_quoted(recording);

@@ -13,28 +13,28 @@ const OUTLINE: usize = 72;
 /// Largest distance from the plane of a tile, mm, of a point that counts as in the plane. In a slab, half of its thickness is used.
 const IN_PLANE: f64 = 0.5;
 
-/// The drawing of one measurement on one tile. Positions are in pixels of the picture from its upper left corner.
+/// The drawing of one measurement on one tile of a picture. Positions are in pixels of the picture, from its upper left corner.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Drawn {
-    /// Index in the list.
+    /// Index of the measurement in the list.
     pub index: usize,
-    /// The tile that it is drawn on: upper left corner and size.
+    /// The tile on which it is drawn: upper left corner, and width and height.
     pub tile: [[f64; 2]; 2],
-    /// Open lines.
+    /// The lines to draw, each as a list of points; none is closed.
     pub lines: Vec<Vec<[f64; 2]>>,
-    /// The points that were set, by their index. Crosses are drawn there, and they can be grabbed.
+    /// The points that the user set: the index of each in the measurement, and its position, where a cross is drawn and it can be dragged.
     pub points: Vec<(usize, [f64; 2])>,
-    /// The tip of an arrow's head, and a point on its shaft, which gives the direction.
+    /// The tip of an arrow's head, and a point on its shaft, from which the direction follows; None if it is no arrow.
     pub head: Option<[[f64; 2]; 2]>,
     pub label: String,
-    /// It belongs to another volume than the one that is shown, so it is dimmed and cannot be grabbed.
+    /// The measurement belongs to another volume than the one that is shown, so that it is dimmed and cannot be dragged.
     pub is_of_other: bool,
-    /// The lower left corner of the label.
+    /// Position of the lower left corner of the label.
     pub at: [f64; 2],
 }
 
-/// The drawing of all measurements over the picture of a scene. `all`: the list, as in [`crate::scene::Settings::measure`]; `volume`:
-/// number of the volume that the picture shows, if it is known.
+/// The drawings of all measurements over the picture of a scene. `all`: the list in [`crate::scene::Settings::measure`]; `volume`: number of the
+/// volume that the picture shows, if it is known.
 pub fn drawn(scene: &Scene, volume: Option<u32>, all: &[Measurement]) -> Vec<Drawn> {
     if all.is_empty() {
         return Vec::new();
@@ -69,8 +69,8 @@ pub fn drawn(scene: &Scene, volume: Option<u32>, all: &[Measurement]) -> Vec<Dra
     found
 }
 
-/// The drawing of an unfinished measurement as if `hover`, the position of the pointer, were its next point. The pointer may be on a curved
-/// plane.
+/// The drawings of an unfinished measurement, as if `hover`, the position of the pointer, were its next point. `number`: that of its label;
+/// `on_section`: the pointer is on a curved plane.
 pub fn preview(
     scene: &Scene,
     number: usize,
@@ -109,7 +109,7 @@ pub fn preview(
     found
 }
 
-/// The distance of the slices of a tomography, for its reference tile.
+/// A label with the distance between the slices of a tomography, for its reference tile.
 pub fn spacing_label(tiling: &Tiling) -> String {
     match &tiling.tiles[..] {
         [_, first, second, ..] => format!("every {:.1} mm", second.plane.at.distance(first.plane.at)),
@@ -117,7 +117,7 @@ pub fn spacing_label(tiling: &Tiling) -> String {
     }
 }
 
-/// The two strokes of an arrow's head, pixels. The first argument has the tip and a point on the shaft.
+/// The two lines of an arrow's head, each `length` pixels long. The first argument is the tip and a point on the shaft.
 pub fn arrow_head([tip, tail]: [[f64; 2]; 2], length: f64) -> Vec<[[f64; 2]; 2]> {
     let (x, y) = (tail[0] - tip[0], tail[1] - tip[1]);
     let shaft = x.hypot(y);
@@ -129,7 +129,7 @@ pub fn arrow_head([tip, tail]: [[f64; 2]; 2], length: f64) -> Vec<[[f64; 2]; 2]>
     vec![[tip, turned(0.45)], [tip, turned(-0.45)]]
 }
 
-/// The upper left corner of a label of this size, next to its measurement and within its tile, pixels.
+/// The upper left corner, in pixels of the picture, for a label of this size (pixels) next to its measurement and within its tile.
 pub fn label_corner(drawn: &Drawn, size: [f64; 2]) -> [f64; 2] {
     let [corner, tile] = drawn.tile;
     let wanted = [drawn.at[0], drawn.at[1] - size[1]];

@@ -9,7 +9,7 @@ pub fn length(path: &[DVec3]) -> f64 {
     path.windows(2).map(|ends| ends[0].distance(ends[1])).sum()
 }
 
-/// Length of a closed path, mm. Its last point is joined to its first.
+/// Length of a closed path, mm, whose last point is joined to its first.
 pub(crate) fn perimeter(contour: &[DVec3]) -> f64 {
     match contour {
         [first, .., last] => length(contour) + last.distance(*first),
@@ -17,7 +17,7 @@ pub(crate) fn perimeter(contour: &[DVec3]) -> f64 {
     }
 }
 
-/// The angle between two legs at their vertex, 0..=180 degrees; none if a leg has no length.
+/// The angle at `vertex` between the directions to the two other points, 0..=180 degrees; None if one of them is equal to the vertex.
 pub fn angle(leg: DVec3, vertex: DVec3, other: DVec3) -> Option<f64> {
     let (a, b) = (leg - vertex, other - vertex);
     // Exact for small and for straight angles too, where the arc cosine is not.
@@ -25,7 +25,7 @@ pub fn angle(leg: DVec3, vertex: DVec3, other: DVec3) -> Option<f64> {
     is_one.then(|| a.cross(b).length().atan2(a.dot(b)).to_degrees())
 }
 
-/// The area that a plane contour encloses, mm^2. If a contour crosses itself, parts of opposite sense are subtracted from each other.
+/// The area that a contour in a plane encloses, mm^2. If the contour crosses itself, parts of opposite sense are subtracted from each other.
 pub fn area(contour: &[DVec3]) -> f64 {
     vector_area(contour).length()
 }
@@ -34,12 +34,12 @@ pub fn area(contour: &[DVec3]) -> f64 {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ellipse {
     pub centre: DVec3,
-    /// Its two semi-axes, perpendicular to each other, mm.
+    /// The two semi-axes as vectors, perpendicular to each other, mm.
     pub semi: [DVec3; 2],
 }
 
 impl Ellipse {
-    /// The ellipse with the first two points as ends of one axis and a third point whose distance from that axis is the other semi-axis.
+    /// The ellipse of three points: the first two are the ends of one axis, and the distance of the third from that axis is the other semi-axis.
     /// None if an axis has no length.
     pub fn of(points: [DVec3; 3]) -> Option<Ellipse> {
         let [from, to, side] = points;
@@ -55,13 +55,13 @@ impl Ellipse {
         [a.max(b), a.min(b)]
     }
 
-    /// Its area, mm^2.
+    /// Area of the ellipse, mm^2.
     pub fn area(&self) -> f64 {
         let [a, b] = self.axes();
         PI * a * b / 4.0
     }
 
-    /// Its circumference, mm, by the arithmetic-geometric mean, which gives the complete elliptic integral to rounding.
+    /// Circumference of the ellipse, mm, by the arithmetic-geometric mean, which gives the complete elliptic integral up to rounding.
     pub fn circumference(&self) -> f64 {
         let [mut a, mut b] = self.axes().map(|axis| axis / 2.0);
         let (mut sum, mut power) = (a * a - (a * a - b * b) / 2.0, 1.0);

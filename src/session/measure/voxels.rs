@@ -9,15 +9,15 @@ const MAX_VOXELS: f64 = 4e6;
 /// Most voxels along an edge of the box.
 const MAX_EDGE: f64 = 4096.0;
 
-/// Result of a count.
+/// The voxels of a box whose echo reaches a threshold.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Counted {
-    /// Volume of the counted voxels, mm^3.
+    /// Volume of the voxels whose echo reaches the threshold, mm^3.
     pub volume: f64,
-    /// Number of voxels in the box, and of those that reach the threshold.
+    /// Number of voxels in the box. `above` is the number of those whose echo reaches the threshold.
     pub voxels: u64,
     pub above: u64,
-    /// Edges of a voxel, mm.
+    /// Lengths of the edges of a voxel, mm.
     pub voxel: DVec3,
 }
 

@@ -12,23 +12,24 @@ const MOST: usize = 1024;
 /// Most volumes of a cycle where nothing else is asked for.
 const USUAL: usize = 20;
 
-/// Options of the sorting.
+/// How many volumes and slices a sweep over a beating heart is sorted into.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CycleOptions {
-    /// Number of volumes of one cycle, 2..=1024. None: the number of frames of a cycle, at most 20, the length of the viewer's cine loop.
+    /// Number of volumes of one cycle, 2..=1024. None: as many as frames were acquired in a cycle, but at most 20, the length of the viewer's
+    /// cine loop.
     pub phases: Option<usize>,
-    /// Slices of a volume, 2..=1024. None: one less than the number of cycles, which is the number of positions of the sweep that are seen
-    /// at every phase.
+    /// Slices of a volume, 2..=1024. None: one less than the number of cycles, the number of positions of the sweep at which every phase was
+    /// acquired.
     pub slices: Option<usize>,
 }
 
-/// A sweep that was sorted into the volumes of one cycle.
+/// A slow sweep over a beating heart, sorted into the volumes of one cycle (STIC).
 pub struct Cycle {
-    /// Geometry of the volumes: the part of the sweep that is seen at every phase.
+    /// Geometry of the volumes: the part of the sweep in which every phase was acquired.
     pub probe: Probe,
-    /// Number of volumes.
+    /// Number of volumes of the cycle.
     pub phases: usize,
-    /// Mean length of a cycle, s.
+    /// Mean length of a heart cycle, s.
     pub seconds: f64,
     stored: StoredType,
     /// By frame of the sweep.
@@ -39,7 +40,7 @@ pub struct Cycle {
 }
 
 impl Cycle {
-    /// Sorts the frames of a volume, which are in order of acquisition, at `rate` frames a second.
+    /// Sorts the frames of one slow sweep, given in order of acquisition, `rate` frames a second.
     ///
     /// # Errors
     /// One line: fewer than four cycles, or numbers of phases or slices out of their range.
@@ -75,7 +76,7 @@ impl Cycle {
         Ok(cycle)
     }
 
-    /// The header of a recording of the volumes; `range`: stored values that are shown as 0 and 1.
+    /// The header of a recording of the volumes. `range`: the stored values that are displayed as 0 and 1.
     pub fn header(&self, range: [f64; 2]) -> Header {
         let geometry = crate::probe::Geometry::Sweep(self.probe.clone());
         Header {
@@ -88,7 +89,7 @@ impl Cycle {
         }
     }
 
-    /// The frames of a volume of the cycle, 0..phases, by slice. All have the time stamp of the phase.
+    /// The frames of the volume at a phase (an index from 0 up to `phases`), by slice. All have the time stamp of that phase within the cycle.
     pub fn volume(&self, phase: usize) -> Vec<Frame> {
         let share = phase as f64 / self.phases as f64;
         let (begin, end) = (self.rhythm.phases[0], self.rhythm.phases[0] + self.rhythm.cycles());

@@ -48,7 +48,7 @@ const INTERVALS: std::ops::RangeInclusive<f64> = 0.06..=6.0;
 /// Most cycles before the first or after the last R wave.
 const MOST_BEYOND: f64 = 2.0;
 
-/// Mean grey values of the blocks of each frame.
+/// Mean grey values of blocks of pixels of each frame, from which the heartbeat is found.
 pub struct Motion {
     /// Samples of a line, and lines.
     size: [usize; 2],
@@ -58,7 +58,7 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// A motion without frames. `size`: samples a line, lines a frame.
+    /// Starts without frames. `size`: samples a line, lines a frame.
     pub fn new(size: [usize; 2], stored: StoredType) -> Motion {
         Motion { size, stored, means: Vec::new() }
     }
@@ -196,19 +196,20 @@ impl Spectrum {
     }
 }
 
-/// The cycles of a heart, by frame.
+/// The phase of the heart in each frame of a sweep.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rhythm {
-    /// Cycles since the first frame, or since the first R wave; rising.
+    /// For each frame the number of heart cycles, rising and fractional, since the first frame or the first R wave.
     pub phases: Vec<f64>,
-    /// Mean rate, cycles a frame: over the frames that show a heart, or in all.
+    /// Mean heart rate, cycles a frame: over the frames that show a heart, or over all if R waves were given.
     pub mean: f64,
-    /// Height of the rate's peak above the spectrum around it, dB. None if the times of R waves were given.
+    /// Height of the heart rate's peak above the spectrum around it, dB. None if the times of R waves were given.
     pub height: Option<f64>,
 }
 
 impl Rhythm {
-    /// Finds the rhythm of frames that follow each other at `rate` frames a second. `heart_rate`: least and largest, cycles a minute.
+    /// Finds the heartbeat in frames that follow each other at `rate` frames a second. `heart_rate`: least and largest that is looked for,
+    /// cycles a minute.
     ///
     /// # Errors
     /// One line: too few frames for such a rate, or nothing that repeats.
@@ -252,8 +253,8 @@ impl Rhythm {
         Ok(Rhythm { phases, mean, height: Some(height) })
     }
 
-    /// The rhythm from the times of an ECG's R waves, s, on the clock of the frames. Before the first and after the last, the nearest cycle
-    /// repeats.
+    /// The phases of frames at `times` from `triggers`, the times of an ECG's R waves; both in s on the clock of the frames. Before the first R
+    /// wave and after the last, the nearest cycle is repeated.
     ///
     /// # Errors
     /// One line: fewer than two R waves during the sweep, or times that do not rise.
@@ -301,7 +302,7 @@ impl Rhythm {
         Ok(Rhythm { phases: times.iter().map(|time| phase(*time)).collect(), mean, height: None })
     }
 
-    /// Cycles from the first frame to the last.
+    /// Number of heart cycles from the first frame to the last.
     pub fn cycles(&self) -> f64 {
         match (self.phases.first(), self.phases.last()) {
             (Some(first), Some(last)) => last - first,

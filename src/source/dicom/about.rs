@@ -12,10 +12,10 @@ const READ: &str = "of DICOM, ultrasound is read: images, enhanced volumes, Kret
 /// Longest name of a scanner, characters.
 const MAX_NAME: usize = 64;
 
-/// The class of a file that is read.
+/// Finds out which class of objects a DICOM file holds.
 ///
 /// # Errors
-/// One line that names what the file is.
+/// One line that names what the file is, if it is of no class that can be read.
 pub(super) fn accept(path: &Path, elements: &Elements) -> Result<Class, InputError> {
     let uid = class_uid(elements);
     let (class, name) = class(&uid);
@@ -50,7 +50,7 @@ fn class_uid(elements: &Elements) -> String {
     if stated.is_empty() { elements.class.clone() } else { stated }
 }
 
-/// Rows for users: what the object is and which scanner made it. Never who the patient is.
+/// Rows for users: what the object is and which scanner made it. They never say who the patient is.
 pub(super) fn about(elements: &Elements) -> Vec<(String, String)> {
     let root = &elements.root;
     let (_, name) = class(&class_uid(elements));

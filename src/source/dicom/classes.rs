@@ -1,15 +1,15 @@
 //! Names of what DICOM files are: the classes of objects, and the transfer syntaxes.
 
-/// The object that a file holds.
+/// The kind of object that a DICOM file holds, as far as its reader distinguishes it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Class {
-    /// Pictures, each with its own regions.
+    /// 2D pictures with ultrasound regions.
     Pictures,
-    /// Planes of volumes, each with its place.
+    /// Enhanced US Volume: slices of volumes, each with its position and orientation.
     EnhancedVolume,
-    /// Philips' volumes in the form that QLAB exports.
+    /// Cartesian volumes of Philips in the form that QLAB exports.
     Philips,
-    /// Ultrasound only if the modality says so.
+    /// Secondary captures, which are ultrasound only if the modality says so.
     Capture,
     Other,
 }
@@ -51,7 +51,7 @@ const CLASSES: [(&str, Class, &str); 30] = [
 const DIRECTORY: &str = "1.2.840.10008.1.3.10";
 const PHILIPS: &str = "1.2.840.113543.6.6.1.3.10002";
 
-/// What a class of objects is, and its name for users.
+/// The kind of object that the UID of a SOP class stands for, and its name for users.
 pub(super) fn class(uid: &str) -> (Class, &'static str) {
     let known = uid.strip_prefix(STORAGE).and_then(|end| CLASSES.iter().find(|(ending, ..)| *ending == end));
     match (known, uid) {
@@ -90,7 +90,7 @@ const SYNTAXES: [(&str, &str, bool); 24] = [
     (".4.203", "High-Throughput JPEG 2000", false),
 ];
 
-/// The name of a transfer syntax, and whether its pixels are read.
+/// The name of the transfer syntax with this UID, and whether pixels of it can be read.
 pub(super) fn syntax(uid: &str) -> (&'static str, bool) {
     let known = uid.strip_prefix("1.2.840.10008.1.2").and_then(|end| SYNTAXES.iter().find(|(known, ..)| *known == end));
     known.map_or(("unknown", false), |(_, name, is_read)| (name, *is_read))

@@ -30,7 +30,7 @@ const TAIL: u64 = 32;
 /// A length that is not stated: the end has a mark.
 const UNDEFINED: u32 = u32::MAX;
 
-/// The elements of a file or of an item of a sequence.
+/// A list of data elements: those of a file, or of an item of a sequence.
 #[derive(Debug, Default)]
 pub(super) struct Item {
     elements: Vec<Element>,
@@ -65,7 +65,7 @@ impl Item {
         }
     }
 
-    /// The items of a sequence; none if it is absent.
+    /// The items of the sequence with this tag; empty if it is absent.
     pub fn items(&self, tag: Tag) -> &[Item] {
         match self.value(tag) {
             Some(Value::Items(items)) => items,
@@ -73,13 +73,13 @@ impl Item {
         }
     }
 
-    /// Text without the spaces and zeros around it; empty if it is absent.
+    /// The value of an element as text, without the spaces and zeros around it; empty if it is absent.
     pub fn text(&self, tag: Tag) -> String {
         let text = String::from_utf8_lossy(self.bytes(tag).unwrap_or_default());
         text.trim_matches(|c: char| c.is_whitespace() || c == '\0').to_string()
     }
 
-    /// Decimal numbers that stand as text; none if one of them is no number.
+    /// The value of an element of decimal text (DS, IS); empty if it is absent or one of its parts is no number.
     pub fn decimals(&self, tag: Tag) -> Vec<f64> {
         let text = self.text(tag);
         let words = text.split('\\').filter(|word| !word.trim().is_empty());
@@ -110,44 +110,44 @@ impl Item {
         self.reals(tag).first().copied().filter(|value| value.is_finite())
     }
 
-    /// Whole numbers of 64 bits.
+    /// The value of an element as integers of 64 bits; empty if it is absent.
     pub(crate) fn offsets(&self, tag: Tag) -> Vec<u64> {
         self.bytes(tag).unwrap_or_default().as_chunks::<8>().0.iter().map(|b| u64::from_le_bytes(*b)).collect()
     }
 }
 
-/// Where the pixels are in the file: offset and length, bytes.
+/// Location of the pixel data in the file.
 #[derive(Debug)]
 pub(super) enum PixelData {
-    /// The last one says that they stand in words of 16 bits (OW).
+    /// Uncompressed: offset and length in bytes, and true if the value representation is OW (words of 16 bits).
     Native(u64, u64, bool),
-    /// The offsets of frames as the first item states them, and the fragments after it.
+    /// Compressed: the offsets of frames from the first item (the basic offset table), and the fragments after it.
     Encapsulated(Vec<u32>, Vec<Fragment>),
 }
 
 /// A piece of compressed pixels.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fragment {
-    /// Offset in the file and length, bytes.
+    /// Offset in the file, bytes.
     pub at: u64,
     pub length: u64,
-    /// First bytes of the fragment, filled up with zeros.
+    /// The first bytes of the fragment, zeros after its end.
     pub head: [u8; 8],
-    /// The end mark of a JPEG or JPEG 2000 is in it, with nothing but padding behind it.
+    /// True if the fragment ends with the end mark of JPEG or JPEG 2000, padding apart.
     pub ends: bool,
 }
 
-/// What was found in a file.
+/// The data elements that were read from a file.
 #[derive(Debug)]
 pub(super) struct Elements {
     /// UID of the transfer syntax.
     pub syntax: String,
-    /// UID of the class, of the file meta information.
+    /// UID of the SOP class, from the file meta information.
     pub class: String,
     pub big_endian: bool,
     pub root: Item,
     pub pixels: Option<PixelData>,
-    /// Offset and length of a Kretz file inside.
+    /// Offset and length, bytes, of a Kretz file that is embedded in this one; None if there is none.
     pub kretz: Option<(u64, u64)>,
     skipped: Skipped,
 }
@@ -160,16 +160,16 @@ struct Skipped {
     known: Vec<(&'static Key, String)>,
 }
 
-/// True if a file begins like this.
+/// True if a file that begins with these bytes is DICOM.
 pub(in super::super) fn is_one(start: &[u8]) -> bool {
     start.get(128..132) == Some(b"DICM")
 }
 
 impl Elements {
-    /// Reads a file up to its end, without its pixels.
+    /// Reads all data elements of a file except its pixels.
     ///
     /// # Errors
-    /// A file that cannot be read, is cut short, or whose elements contradict each other; a compressed data set.
+    /// The file cannot be read, is cut short, has elements that contradict each other, or a compressed data set.
     pub fn read(file: &InputFile) -> Result<Elements, InputError> {
         let input = file.open().map_err(|e| InputError::unreadable(file.path, &e))?;
         let mut walk = Walk {
@@ -207,7 +207,8 @@ impl Elements {
         Ok(Elements { syntax, class: meta.text(META_CLASS), big_endian, root, pixels, kretz, skipped })
     }
 
-    /// The elements that were not used, once everything was read; what a user must know of them is a warning.
+    /// The names of the elements that no reader used; call it when everything was read. Elements that could change a picture are added to
+    /// `remarks` as warnings.
     pub fn unused(self, path: &Path, remarks: &mut Vec<(String, String)>) -> Unused {
         let Skipped { mut names, known } = self.skipped;
         for element in self.root.elements.iter().filter(|element| !element.asked.get()) {

@@ -13,10 +13,10 @@ use super::tags;
 use super::{regions, volume};
 use crate::files::InputError;
 
-/// Reads one file.
+/// Reads the layout of one DICOM file.
 ///
 /// # Errors
-/// A file that is cut short or damaged, holds no ultrasound, or pixels that are not read.
+/// The file is cut short or damaged, holds no ultrasound, or has pixels of a kind that is not read.
 pub(in super::super) fn read(file: &InputFile, options: &OpenOptions) -> Result<Layout, InputError> {
     let elements = Elements::read(file)?;
     let fault = |field: &str, fault: String| Err(InputError::new(file.path, field, fault));

@@ -2,29 +2,29 @@
 
 use super::elements::Fragment;
 
-/// Fragments divided among frames.
+/// Which fragments of compressed pixels make up which frame.
 #[derive(Debug, PartialEq)]
 pub(super) struct Divided {
     /// For each frame, the index of its first fragment and the number of its fragments.
     pub frames: Vec<(usize, usize)>,
-    /// Statements of the file that are not true.
+    /// One line for each statement of the file that turned out to be wrong.
     pub warnings: Vec<String>,
 }
 
-/// How fragments are compressed.
+/// How the compression marks the code streams of which frames consist.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stream<'a> {
-    /// The bytes that every code stream begins with.
+    /// The bytes with which every code stream begins.
     pub start: &'a [u8],
-    /// A code stream has an end mark too.
+    /// True if every code stream ends with an end mark.
     pub has_end: bool,
 }
 
-/// Divides fragments. `stated`: the numbers of frames that agree with what the file states, none if it states nothing. What is there counts
-/// where the number, the table and the code streams contradict each other, and a warning says so.
+/// Divides fragments among frames. `stated`: the numbers of frames that are consistent with the file's header, empty if it states none. `table`:
+/// the offsets of frames. If the header, the table and the code streams contradict each other, the frames that are there count, with a warning.
 ///
 /// # Errors
-/// One line: fragments that nothing divides, fewer frames than stated.
+/// One line: nothing tells how to divide the fragments, or there are fewer frames than stated.
 pub(super) fn divided(
     stated: &[usize],
     table: &[u64],

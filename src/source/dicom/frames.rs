@@ -8,7 +8,7 @@ use std::io::{self, Read, Seek, SeekFrom};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// How frames are compressed.
+/// How the frames of a DICOM file are compressed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in super::super) enum Coding {
     Native,
@@ -19,52 +19,52 @@ pub(in super::super) enum Coding {
     Jpeg2000,
 }
 
-/// How the numbers of a frame stand after it is decompressed.
+/// How the numbers of a decompressed frame are arranged.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Arrangement {
-    /// As they are drawn.
+    /// Pixel by pixel, in the channels that are read.
     Plain,
-    /// All of the first channel, then all of the next.
+    /// Plane by plane: all of the first channel, then all of the next.
     Planes,
-    /// Luminance and two differences of colour for each pixel: the luminance is taken.
+    /// Luminance and two colour differences for each pixel, of which the luminance is read.
     Luma,
-    /// The same plane by plane.
+    /// Luminance and two colour differences, plane by plane, of which the luminance is read.
     LumaPlane,
-    /// Two luminances and the two differences that they share.
+    /// For each pair of pixels two luminances and two shared colour differences; the luminances are read.
     LumaPairs,
-    /// Indices of a palette, whose luminances are taken.
+    /// Indices into a palette, which are read as the luminance of their colours.
     Palette(Palette),
 }
 
-/// Where the bytes of a frame are: a file, and some of the fragments.
+/// Where the bytes of a frame are: a file, and a range of [`Frames::parts`].
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
     pub file: usize,
-    /// The first of its parts, and their number.
+    /// Index of the frame's first part in the list of parts; `count` is their number.
     pub first: usize,
     pub count: usize,
-    /// True if bytes stand in words and the first byte of the frame is the second one of its word.
+    /// True if the bytes are in words of 16 bits and the frame begins with the second byte of a word.
     pub odd: bool,
 }
 
-/// The frames of one or more files, in the order in which they are read.
+/// The frames of one or more DICOM files, in the order in which they are read, with all that is needed to decode them.
 #[derive(Clone, Debug)]
 pub(super) struct Frames {
     pub(super) files: Arc<[PathBuf]>,
     pub(super) places: Arc<[Place]>,
-    /// Offset and length of each fragment, or of each native frame.
+    /// Offset and length, bytes, of each fragment, or of each uncompressed frame.
     pub(super) parts: Arc<[(u64, u64)]>,
     pub(super) coding: Coding,
     pub(super) arrangement: Arrangement,
-    /// Native bytes stand in words of 16 bits with the highest byte first, so that the second byte of a word is the first pixel.
+    /// Uncompressed bytes are in big-endian words of 16 bits, so that the second byte of a word is the first pixel.
     pub(super) swapped: bool,
-    /// Columns and rows as they are stored.
+    /// Columns and rows of a stored picture.
     pub(super) stored: [usize; 2],
-    /// The part that is read: first column and row, columns and rows.
+    /// The part of each picture that is read: first column, first row, columns and rows.
     pub(super) part: [usize; 4],
-    /// Bytes of a number that is read.
+    /// Bytes of one number after decoding.
     pub(super) width: usize,
-    /// Numbers of a pixel that are read.
+    /// Numbers of a pixel after decoding.
     pub(super) channels: usize,
 }
 

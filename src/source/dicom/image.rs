@@ -20,29 +20,29 @@ const MAX_FRAME_BYTES: u64 = 1 << 30;
 const MAX_LOSSLESS_BYTES: u64 = 1 << 28;
 const MAX_JPEG_2000_BYTES: u64 = 1 << 26;
 
-/// The pixels of one file.
+/// The pixels of one DICOM file: their size, coding and location.
 pub(super) struct Image {
-    /// Columns and rows.
+    /// Columns and rows of a picture.
     pub size: [usize; 2],
     pub pixel: PixelFormat,
     pub coding: Coding,
     pub arrangement: Arrangement,
-    /// Place of each frame, in the order of the file.
+    /// Where the bytes of each frame are, in the order of the file.
     pub places: Vec<Place>,
     pub parts: Vec<(u64, u64)>,
-    /// Luminance is taken of colours that the format of the pixels does not tell.
+    /// True if the decoder turns colours into luminance, so that `pixel` shows one channel although the file has colours.
     pub from_colour: bool,
-    /// Native bytes stand in words whose highest byte comes first.
+    /// Uncompressed bytes are in big-endian words of 16 bits.
     pub swapped: bool,
-    /// Statements of the file that are not true or that are missing.
+    /// One line for each statement of the file that is wrong or missing.
     pub warnings: BTreeSet<String>,
 }
 
 impl Image {
-    /// `slices`: pictures that each stated frame may have, one after another.
+    /// Reads how the pixels of a file are stored. `slices`: number of pictures that one stated frame may consist of, one after another.
     ///
     /// # Errors
-    /// Pixels that are missing, cut short or of a kind that is not read.
+    /// The pixels are missing, cut short or of a kind that is not read.
     pub fn of(path: &Path, elements: &Elements, slices: u32) -> Result<Image, InputError> {
         let fault = |field: &str, fault: String| Err(InputError::new(path, field, fault));
         let root = &elements.root;

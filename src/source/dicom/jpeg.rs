@@ -7,14 +7,14 @@ use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 use jpeg_decoder::{ColorTransform, Decoder};
 use std::io::Cursor;
 
-/// What a decompressed frame must be.
+/// What a decompressed frame has to be; other frames are refused.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Expected {
-    /// Columns and rows.
+    /// Columns and rows of a frame.
     pub size: [usize; 2],
-    /// Numbers of a pixel.
+    /// Numbers of a pixel: 1 or 3.
     pub channels: usize,
-    /// Bytes of a number, 1 or 2.
+    /// Bytes of one number, 1 or 2.
     pub width: usize,
 }
 
@@ -42,7 +42,8 @@ fn without_padding(bytes: &[u8]) -> &[u8] {
     bytes.get(..end).unwrap_or_default()
 }
 
-/// True if the last bytes of a fragment may be the end of a frame. Nothing but padding, or the second half of the mark, may stand alone.
+/// True if a fragment with these last bytes may end a frame: they end with the end mark, padding apart. Padding alone, or the second half of the
+/// mark alone, counts too.
 pub(super) fn has_end(tail: &[u8]) -> bool {
     let tail = without_padding(tail);
     tail.is_empty() || tail == [END[1]] || tail.ends_with(&END)
@@ -74,7 +75,7 @@ fn unreadable(kind: &str, fault: impl ToString) -> String {
     format!("is no {kind} that is read: {}", escaped(&fault.to_string(), 200))
 }
 
-/// JPEG baseline and extended, 8 bits: grey, or red, green and blue.
+/// Decodes JPEG baseline or extended of 8 bits, grey or RGB, to pixels row by row.
 ///
 /// # Errors
 /// One line: what is wrong with the frame.
@@ -144,8 +145,8 @@ fn word(bytes: &[u8], at: usize) -> Option<u16> {
     bytes.get(at..at + 2).and_then(|b| b.first_chunk()).map(|b| u16::from_be_bytes(*b))
 }
 
-/// JPEG lossless with any predictor: 8 to 16 bits of grey, or 8 bits of three channels, which stay as they are stored. The decoder predicts
-/// wrongly after a restart, and numbers whose last bits are cut off (0.3.2): both are refused.
+/// Decodes lossless JPEG with any predictor: 8 to 16 bits of grey, or 8 bits of three channels, which stay as they are stored. Refused are
+/// restart markers and dropped low bits (point transform), which version 0.3.2 of the decoder gets wrong.
 ///
 /// # Errors
 /// One line: what is wrong with the frame.
@@ -280,7 +281,7 @@ fn check_coding_style(style: &[u8], pixels: u64) -> Result<(), String> {
 
 const JPEG_2000: &str = "JPEG 2000";
 
-/// JPEG 2000, lossless or not: the bare code stream that DICOM asks for, up to 16 bits without a sign, grey or three channels.
+/// Decodes JPEG 2000, lossless or not: the bare code stream that DICOM demands, up to 16 bits unsigned, grey or three channels.
 ///
 /// # Errors
 /// One line: what is wrong with the frame.

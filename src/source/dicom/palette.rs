@@ -3,7 +3,7 @@
 use super::super::pixel::LUMINANCE;
 use std::sync::Arc;
 
-/// The colours of a picture as luminances, and the stored numbers that stand for them.
+/// A colour palette, reduced to the luminance of each entry, and how the pixels that index it are stored.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Palette {
     /// At least one.
@@ -13,21 +13,21 @@ pub(super) struct Palette {
     pub numbers: Indices,
 }
 
-/// The elements of a palette, each for red, green and blue.
+/// The DICOM elements of a palette, each for red, green and blue.
 pub(super) struct Tables {
-    /// Number of entries, the number of the first one, bits of an entry.
+    /// Descriptor of each colour's table: number of entries, pixel value of the first entry, bits of an entry.
     pub about: [Vec<u16>; 3],
-    /// Either of these: an entry after the other, or segments.
+    /// The entries of each colour one after another; empty if they are given in `segmented` form.
     pub plain: [Vec<u16>; 3],
     pub segmented: [Vec<u16>; 3],
 }
 
-/// How numbers are stored.
+/// How the pixels that index a palette are stored.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Indices {
-    /// Bytes of one, 1 or 2.
+    /// Bytes of one index, 1 or 2.
     pub width: usize,
-    /// Its lowest bits that count.
+    /// Number of its lowest bits that count; the others are ignored.
     pub bits: u32,
     pub signed: bool,
     pub big_endian: bool,
@@ -50,10 +50,10 @@ impl Indices {
 }
 
 impl Palette {
-    /// The palette of a picture, and what of it is not as the file states.
+    /// Makes the palette of a picture. The second result has a warning for each statement of the file that is wrong.
     ///
     /// # Errors
-    /// One line: a palette that is missing, cut short or contradicts itself.
+    /// One line: the palette is missing, cut short or contradicts itself.
     pub fn of(tables: &Tables, numbers: Indices) -> Result<(Palette, Vec<String>), String> {
         let Tables { about, plain, segmented } = tables;
         let [count, first, bits] = about[0][..] else { return Err("is missing, or has not three numbers".into()) };
@@ -88,7 +88,7 @@ impl Palette {
         Ok((Palette { greys, first, numbers }, warnings))
     }
 
-    /// The luminance of each stored number.
+    /// The luminance, 0..=255, of each pixel. `numbers`: bytes of the stored indices.
     pub(crate) fn greys(&self, numbers: &[u8]) -> Vec<u8> {
         let last = self.greys.len() as i32 - 1;
         let grey = |bytes| {

@@ -11,24 +11,25 @@ use crate::files::InputError;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Where the frames of a file lie, and in which order they are read.
+/// The geometry and the times of the frames of a file, and the order in which they are read.
 pub(super) struct Placed {
     pub format: &'static str,
     pub geometry: StoredGeometry,
-    /// The frames of the file that are read.
+    /// Indices of the frames in the file, in the order in which they are read.
     pub order: Vec<usize>,
-    /// The part of each picture: first column and row, columns and rows.
+    /// The part of each picture that is read: first column, first row, columns and rows.
     pub part: [usize; 4],
-    /// The file states the distance of its pixels.
+    /// True if the file states the distance between its pixels.
     pub has_spacing: bool,
-    /// Time of each frame by its index in `order`, s.
+    /// Time stamp of each frame, s, by its index in `order`; no entry if it has none.
     pub times: BTreeMap<usize, f64>,
     pub remarks: Vec<(String, String)>,
-    /// Statements of the file that are not true or that are missing; one line each.
+    /// One line for each statement of the file that is wrong or missing.
     pub warnings: BTreeSet<String>,
 }
 
-/// The layout of frames. `direct`: the samples, if they stand in a file as they are read.
+/// The layout of a recording of these frames. `path`: as the user named it. `direct`: the location of the samples if they can be read from the
+/// file without decoding.
 pub(super) fn layout(
     files: Vec<PathBuf>,
     path: PathBuf,
@@ -94,7 +95,7 @@ fn warn(path: &Path, warnings: BTreeSet<String>, remarks: &mut Vec<(String, Stri
     }
 }
 
-/// All frames of a file, in its order.
+/// Indices of all frames of a file, in its order.
 pub(super) fn in_order(image: &Image) -> Vec<usize> {
     (0..image.places.len()).collect()
 }

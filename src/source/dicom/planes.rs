@@ -10,37 +10,37 @@ const SAME: f64 = 1e-4;
 /// Largest difference of two directions.
 const SAME_DIRECTION: f64 = 1e-4;
 
-/// A plane of pixels.
+/// A picture that is a slice of a volume, with its position and orientation.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Plane {
-    /// The centre of the first pixel, mm.
+    /// Position of the centre of the first pixel, mm.
     pub position: DVec3,
-    /// Directions of rising column and row.
+    /// Unit vector along a row, towards larger columns; `column` is the one towards larger rows.
     pub row: DVec3,
     pub column: DVec3,
-    /// Number of its volume in time, if it is stated.
+    /// Index in time of the volume that the plane belongs to; None if the file does not state it.
     pub index: Option<u32>,
-    /// Time stamp, s.
+    /// Time stamp, s; None if the file does not state it.
     pub time: Option<f64>,
 }
 
-/// The order in which planes are slices of volumes.
+/// The order in which planes are the slices of volumes.
 #[derive(Debug)]
 pub(super) struct Sorted {
-    /// Index of the plane of each slice, volume after volume.
+    /// For each slice the index of its plane, volume after volume.
     pub order: Vec<usize>,
     pub slices: usize,
     pub volumes: usize,
-    /// Step from slice to slice, mm. None for a single slice.
+    /// Vector from a slice to the next, mm. None for a single slice.
     pub step: Option<DVec3>,
-    /// Time of each slice by its index in `order`, s.
+    /// Time stamp of each slice, s, by its index in `order`; no entry if it has none.
     pub times: BTreeMap<usize, f64>,
 }
 
-/// Sorts planes by time, then along their normal.
+/// Sorts planes by time, and those of a volume along their normal.
 ///
 /// # Errors
-/// One line: no planes, planes that are not parallel or not evenly spaced, volumes of different slices.
+/// One line: there are no planes, they are not parallel or not evenly spaced, or the volumes have different slices.
 pub(super) fn sorted(planes: &[Plane]) -> Result<Sorted, String> {
     let Some(first) = planes.first() else { return Err("there are none".into()) };
     let finite = |p: &Plane| p.position.is_finite() && p.row.is_finite() && p.column.is_finite();

@@ -81,20 +81,20 @@ impl Region {
     }
 }
 
-/// How the pictures of a file lie in a plane.
+/// The part of a file's pictures that is read, and its position in their plane.
 pub(super) struct Flat {
-    /// The part that is read: first column and row, columns and rows.
+    /// The part of each picture that is read: first column, first row, columns and rows.
     pub part: [usize; 4],
-    /// Distance of pixels, mm. None if nothing states it.
+    /// Distance between pixels (x, y), mm. None if nothing states it.
     pub spacing: Option<[f64; 2]>,
-    /// The first pixel of the part, mm.
+    /// Position in the plane of the first pixel of the part, mm.
     pub origin: [f64; 2],
     pub remarks: Vec<(String, String)>,
-    /// Statements of the file that are not true.
+    /// One line for each statement of the file that is wrong.
     pub warnings: BTreeSet<String>,
 }
 
-/// The ultrasound region of a picture with its scale; without one the whole picture with its pixel spacing.
+/// The ultrasound region of a picture of `size` pixels, with its scale; the whole picture with its pixel spacing if there is no usable region.
 pub(super) fn flat(root: &Item, size: [usize; 2]) -> Flat {
     let (region, count) = Region::choose(root, size);
     let mut warnings = BTreeSet::new();
@@ -162,7 +162,8 @@ fn pixel_spacing(root: &Item, warnings: &mut BTreeSet<String>) -> Option<[f64; 2
     }
 }
 
-/// The plane of a picture in the patient's space: the first pixel of its part, and the directions of rising column and row.
+/// Position (mm) of the first pixel of the part, and unit vectors towards larger columns and larger rows, in the patient's space. None if the
+/// file does not state them.
 pub(super) fn in_patient(root: &Item, flat: &Flat) -> Option<(DVec3, [DVec3; 2])> {
     let at = DVec3::from(*root.decimals(tags::POSITION_PATIENT).first_chunk::<3>()?);
     let [row, column] = directions(&root.decimals(tags::ORIENTATION_PATIENT))?;
@@ -170,7 +171,10 @@ pub(super) fn in_patient(root: &Item, flat: &Flat) -> Option<(DVec3, [DVec3; 2])
     Some((at + row * dx * flat.part[0] as f64 + column * dy * flat.part[1] as f64, [row, column]))
 }
 
-/// The frames of a file as pictures in time.
+/// The frames of a file of 2D pictures as a series in time.
+///
+/// # Errors
+/// As [`of_pictures`].
 pub(super) fn pictures(path: &Path, root: &Item, image: &Image, options: &OpenOptions) -> Result<Placed, InputError> {
     let flat = flat(root, image.size);
     let frames = image.places.len();
@@ -199,7 +203,11 @@ fn slice_step(root: &Item, frames: usize) -> Option<f64> {
     (places.len() == frames && step > 0.0 && places.iter().enumerate().all(is_even)).then_some(step)
 }
 
-/// The geometry of pictures in time, each a volume of one slice; of a secondary capture that states where its slices are, a volume.
+/// The geometry of a file of pictures: each is a volume of one slice. A secondary capture that states evenly spaced positions of its slices is
+/// one volume.
+///
+/// # Errors
+/// One line that names the file: the geometry that it states is impossible.
 pub(super) fn of_pictures(
     path: &Path,
     root: &Item,
@@ -268,7 +276,7 @@ fn single_times(root: &Item, frames: usize) -> Option<BTreeMap<usize, f64>> {
     Some((0..frames).map(|n| (n, n as f64 * ms / 1e3)).collect())
 }
 
-/// A place in a plane, for users.
+/// Two lengths in mm as text for users, such as `0.2 x 0.2 mm`.
 pub(super) fn spacing_text(spacing: [f64; 2]) -> String {
     let [x, y] = spacing.map(number);
     format!("{x} x {y} mm")

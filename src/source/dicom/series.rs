@@ -46,10 +46,10 @@ struct Slice {
     elements: Elements,
 }
 
-/// Reads the files of a folder as one recording.
+/// Reads the layout of the DICOM files of a folder as one recording.
 ///
 /// # Errors
-/// Files of several series, sizes or kinds, a file that cannot be read, slices that are not evenly spaced.
+/// The files are of several series, sizes or kinds, a file cannot be read, or slices are not evenly spaced.
 pub(in super::super) fn read_series(folder: &Path, options: &OpenOptions) -> Result<Layout, InputError> {
     let fault = |fault: String| Err(InputError::new(folder, "folder", fault));
     let entries = fs::read_dir(folder).map_err(|e| InputError::unreadable(folder, &e))?;

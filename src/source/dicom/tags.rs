@@ -2,14 +2,14 @@
 
 use super::super::keys::{Aspect, Key, Row, Use};
 
-/// Group in the upper half, element in the lower one.
+/// A DICOM tag: group number in the upper 16 bits, element number in the lower 16.
 pub(super) type Tag = u32;
 
-/// What the value of an element is.
+/// How the value of an element is stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     Text,
-    /// Binary numbers of so many bytes.
+    /// Binary numbers of the given number of bytes each.
     Numbers(usize),
     Sequence,
 }
@@ -67,7 +67,8 @@ pub(super) const PALETTE_ABOUT: [Tag; 3] = [0x0028_1101, 0x0028_1102, 0x0028_110
 pub(super) const PALETTE: [Tag; 3] = [0x0028_1201, 0x0028_1202, 0x0028_1203];
 pub(super) const SEGMENTED_PALETTE: [Tag; 3] = [0x0028_1221, 0x0028_1222, 0x0028_1223];
 pub(super) const PIXEL_MEASURES: Tag = 0x0028_9110;
-/// Philips' Cartesian volumes: the creator, slices, unit and spacing of the third axis, as public readers know them.
+/// Private elements of Philips' Cartesian volumes, as public readers know them: their creator, and the number of slices, unit and spacing of the
+/// third axis.
 pub(super) const PHILIPS: Tag = 0x3001_0010;
 pub(super) const PHILIPS_SLICES: Tag = 0x3001_1001;
 pub(super) const PHILIPS_UNIT: Tag = 0x3001_1002;
@@ -82,7 +83,7 @@ pub(super) const META_SYNTAX: Tag = 0x0002_0010;
 pub(super) const ITEM: Tag = 0xfffe_e000;
 pub(super) const ITEM_END: Tag = 0xfffe_e00d;
 pub(super) const SEQUENCE_END: Tag = 0xfffe_e0dd;
-/// The group of GE's private elements that hold a Kretz file, and the creator that reserves a block of it.
+/// Group number of GE's private elements that hold a Kretz file, and the name of the creator that reserves a block of it.
 pub(super) const KRETZ_GROUP: u32 = 0x7fe1;
 pub(super) const KRETZ_CREATOR: &str = "KRETZ_US";
 
@@ -90,11 +91,11 @@ const WORDS: Kind = Kind::Numbers(2);
 const LONGS: Kind = Kind::Numbers(4);
 const REALS: Kind = Kind::Numbers(8);
 
-/// An element that is kept.
+/// An element that is kept when a file is read.
 pub(super) struct Wanted {
     pub tag: Tag,
     pub kind: Kind,
-    /// Its name is the standard's keyword.
+    /// Name (the standard's keyword) and treatment of the element.
     pub key: Key,
 }
 
@@ -102,7 +103,7 @@ const fn used(tag: Tag, kind: Kind, keyword: &'static str, aspect: Aspect) -> Wa
     Wanted { tag, kind, key: Key::new(keyword, aspect, Use::Used) }
 }
 
-/// The elements that are kept.
+/// The elements that are kept when a file is read.
 pub(super) const WANTED: &[Wanted] = &[
     used(META_LENGTH, LONGS, "FileMetaInformationGroupLength", Aspect::Storage),
     used(META_CLASS, Kind::Text, "MediaStorageSOPClassUID", Aspect::Storage),
@@ -182,7 +183,7 @@ pub(super) const WANTED: &[Wanted] = &[
     used(EXTENDED_TABLE, REALS, "ExtendedOffsetTable", Aspect::Storage),
 ];
 
-/// Elements that are not read, of those that could change a picture. All others are skipped too, and listed by their numbers.
+/// Elements that could change a picture and are not read. Elements in neither table are skipped too, and listed by their tags.
 pub(super) static NOT_READ: [(Tag, Key); 16] = [
     (0x0018_0040, Key::new("CineRate", Aspect::Time, Use::Listed)),
     (0x0018_1066, Key::new("FrameDelay", Aspect::Time, Use::Listed)),
@@ -201,7 +202,7 @@ pub(super) static NOT_READ: [(Tag, Key); 16] = [
     (0x2050_0020, Key::new("PresentationLUTShape", Aspect::Value, Use::Warned(&["IDENTITY"]))),
     (0x6000_3000, Key::new("OverlayData", Aspect::About, Use::Listed)),
 ];
-/// The elements that matter, with their numbers.
+/// The rows of docs/formats.md about DICOM: the elements of both tables and the pixel data, with their tags.
 pub(in super::super) fn rows() -> Vec<Row> {
     let shown =
         |tag: Tag, key: &Key| Row { name: format!("{} {}", key.name, name(tag)), aspect: key.aspect, done: key.done };
@@ -210,12 +211,12 @@ pub(in super::super) fn rows() -> Vec<Row> {
     read.chain([shown(PIXEL_DATA, &pixels)]).chain(NOT_READ.iter().map(|(tag, key)| shown(*tag, key))).collect()
 }
 
-/// A tag as the standard writes it.
+/// A tag as the standard writes it: `(0028,0010)`.
 pub(super) fn name(tag: Tag) -> String {
     format!("({:04X},{:04X})", tag >> 16, tag & 0xffff)
 }
 
-/// A tag, with its keyword if it is in a table here.
+/// A tag as text, with its keyword if one of the two tables has it.
 pub(super) fn shown_name(tag: Tag) -> String {
     let read = WANTED.iter().map(|wanted| (wanted.tag, &wanted.key));
     let known = read.chain(NOT_READ.iter().map(|(tag, key)| (*tag, key))).find(|(other, _)| *other == tag);

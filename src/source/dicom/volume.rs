@@ -43,7 +43,7 @@ impl<'a> Groups<'a> {
     }
 }
 
-/// Two unit directions of six numbers.
+/// Two vectors of three numbers each, scaled to unit length. None without six numbers, or if one has no length.
 pub(super) fn directions(numbers: &[f64]) -> Option<[DVec3; 2]> {
     let [a, b, c, d, e, f] = *numbers.first_chunk::<6>()?;
     let unit = [DVec3::new(a, b, c), DVec3::new(d, e, f)].map(DVec3::normalize_or_zero);
@@ -166,7 +166,11 @@ fn transducer_order(matrix: &[f64], in_volume: Option<[DVec3; 2]>) -> AxisOrder 
     if each == [0, 1, 2] { order } else { AxisOrder::STORED }
 }
 
-/// Volumes as QLAB exports them: one a frame, slices one after another, the third axis in private elements.
+/// Geometry and times of volumes as Philips' QLAB exports them: each frame is one volume with its slices one after another, and private elements
+/// state the third axis.
+///
+/// # Errors
+/// One line that names the file: an element is missing or impossible.
 pub(super) fn philips(path: &Path, elements: &Elements, image: &Image) -> Result<Placed, InputError> {
     let fault = |field: &str, fault: &str| InputError::new(path, field, fault);
     let root = &elements.root;

@@ -23,19 +23,19 @@ const NAME: &str = "Echolume";
 const META_LENGTH_AT: usize = 140;
 const META_BEGIN: usize = 144;
 const PIXEL_DATA: Tag = 0x7fe0_0010;
-/// Most bytes of pixels that a length of 32 bits can state, without the one that means "not stated".
+/// Largest number of bytes of pixels in a file: the largest even length of 32 bits, of which the value of all ones means "not stated".
 pub(in super::super) const MOST_BYTES: u64 = 0xffff_fffe;
 
-/// What is written.
+/// The kind of DICOM file that is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in super::super) struct Form {
-    /// A secondary capture, not an Enhanced US Volume.
+    /// True for a secondary capture, false for an Enhanced US Volume.
     pub capture: bool,
     /// Bytes of a sample: 1 or 2.
     pub width: usize,
 }
 
-/// A file that is being written.
+/// A DICOM file that is being written: a header first, then the samples.
 pub(in super::super) struct DicomWriter {
     file: Unfinished,
     digest: Sha256,
@@ -68,7 +68,10 @@ impl Identifier {
 }
 
 impl DicomWriter {
-    /// Begins a file: all elements before the samples.
+    /// Writes all elements before the samples. `size`: columns, rows, slices.
+    ///
+    /// # Errors
+    /// Those of writing.
     pub fn create(file: Unfinished, size: [usize; 3], world: &World, form: Form) -> io::Result<DicomWriter> {
         let header = Header::new(size, world, form);
         let mut writer = DicomWriter { file, digest: Sha256::new(), identifiers: header.identifiers, bytes: 0 };
@@ -77,7 +80,10 @@ impl DicomWriter {
         Ok(writer)
     }
 
-    /// Puts the identifiers in their places, and the complete file in its own.
+    /// Writes the unique identifiers, which depend on the content, into the header, and renames the complete file to its target.
+    ///
+    /// # Errors
+    /// Those of writing.
     pub fn finish(mut self) -> io::Result<()> {
         if !self.bytes.is_multiple_of(2) {
             self.write_all(&[0])?;

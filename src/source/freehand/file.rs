@@ -9,17 +9,19 @@ use crate::probe::{Geometry, World};
 use crate::{SampleType, StoredType};
 use std::path::{Path, PathBuf};
 
-/// A picture's place, if it is known, and its samples.
+/// A picture's pose, None if it is not known, and its samples.
 pub(crate) type PlacedPicture = (Option<Pose>, Vec<u8>);
 
-/// Pictures and their places. They can be read again from the first on.
+/// A sequence of pictures with poses that can be read again from the start.
 pub(crate) trait PlacedPictures: Send {
-    /// The pictures themselves.
+    /// The source that the pictures are read from.
     fn pictures(&self) -> &dyn Source;
+    /// Moves back to the first picture.
+    ///
     /// # Errors
     /// Data that cannot be read.
     fn rewind(&mut self) -> Result<(), InputError>;
-    /// The next picture, and where it is if that is known. None after the last.
+    /// The next picture and its pose, if that is known. None after the last picture.
     ///
     /// # Errors
     /// Data that cannot be read.
@@ -30,7 +32,7 @@ pub(crate) trait PlacedPictures: Send {
     }
 }
 
-/// A freehand volume. Its pictures are compounded when the first slice is read.
+/// A source of one volume, compounded from freehand pictures when the first slice is read.
 ///
 /// Memory: that of a [`Compounder`], from the first slice on.
 pub(crate) struct FreehandFile<P> {
@@ -46,10 +48,10 @@ pub(crate) struct FreehandFile<P> {
 }
 
 impl<P: PlacedPictures> FreehandFile<P> {
-    /// A volume around these places of the pictures; None where one is not known. It says how many are left out.
+    /// A volume whose lattice contains the pictures at `poses`, one for each picture; None if it is not known. Logs how many pictures have none.
     ///
     /// # Errors
-    /// No picture with a place; a volume that is too large.
+    /// No picture has a pose, or the volume is too large.
     pub fn around(
         path: &Path,
         placed: P,
@@ -84,8 +86,8 @@ impl<P: PlacedPictures> FreehandFile<P> {
         &self.placed
     }
 
-    /// A description for users: pairs of title and value. `format`: of the pictures; `placed`: by what they are placed; `space`: where they then
-    /// are.
+    /// A description for users: pairs of title and value. `format`: of the pictures; `placed`: rows about the origin of their poses; `space`:
+    /// name of the coordinates that the volume lies in.
     pub fn describe(&self, format: &str, placed: Vec<(String, String)>, space: &str) -> Vec<(String, String)> {
         let [all, valid] = self.counts;
         let mut rows = Vec::new();

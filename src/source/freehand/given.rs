@@ -7,20 +7,20 @@ use std::path::Path;
 /// Options of a freehand volume that a user gives. None: the value that the file states, otherwise the default.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FreehandArguments {
-    /// As [`CompoundingOptions::clip`].
+    /// See [`CompoundingOptions::clip`].
     pub clip: Option<[usize; 4]>,
-    /// As [`CompoundingOptions::spacing`], mm.
+    /// See [`CompoundingOptions::spacing`], mm.
     pub spacing: Option<f64>,
-    /// As [`CompoundingOptions::max_hole`], mm.
+    /// See [`CompoundingOptions::max_hole`], mm.
     pub max_hole: Option<f64>,
-    /// As [`CompoundingOptions::extent`], mm.
+    /// See [`CompoundingOptions::extent`], mm.
     pub extent: Option<f64>,
-    /// As [`CompoundingOptions::max_voxels`].
+    /// See [`CompoundingOptions::max_voxels`].
     pub max_voxels: Option<usize>,
 }
 
 impl FreehandArguments {
-    /// Returns `options` with the values that the user gave.
+    /// `options` with those values replaced that the user gave.
     pub fn over(&self, options: CompoundingOptions) -> CompoundingOptions {
         CompoundingOptions {
             clip: self.clip.or(options.clip),
@@ -32,16 +32,16 @@ impl FreehandArguments {
         }
     }
 
-    /// Refuses the options for a file that is not a freehand volume.
+    /// Checks that no option is set, for a file that is not a freehand volume.
     ///
     /// # Errors
-    /// Any option is set.
+    /// An option is set.
     pub fn refused(&self, path: &Path) -> Result<(), InputError> {
         let fault = "is for pictures with poses that differ, which become a freehand volume";
         self.flag().map_or(Ok(()), |flag| Err(InputError::new(path, flag, fault)))
     }
 
-    /// The command-line flag of the first option that is set.
+    /// The command-line flag of the first option that is set; None if none is.
     pub fn flag(&self) -> Option<&'static str> {
         let FreehandArguments { clip, spacing, max_hole, extent, max_voxels } = self;
         let said = [

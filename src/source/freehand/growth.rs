@@ -13,10 +13,10 @@ const COARSER: f64 = 1.26;
 const MAX_COARSENING: f64 = 2.01;
 
 impl Compounder {
-    /// Lets the volume grow so that a picture lies in it. False if it does not, because the volume would have more voxels than its options
-    /// allow at twice the spacing that it began with, or more than 2048 along an edge.
+    /// Enlarges the volume until it contains a picture of this pose. Returns false, without a change, if the volume would have more than 2048
+    /// voxels along an edge, or more voxels than its options allow even at twice its first spacing.
     ///
-    /// Memory: that of both volumes while the one becomes the other.
+    /// Memory: that of both volumes while the old one is copied to the new one.
     pub(crate) fn grow_around(&mut self, pose: &Pose) -> bool {
         let Some([low, high]) = self.reach_of(pose) else { return true };
         let last = DVec3::from(self.lattice.grid.size.map(|n| n as f64 - 1.0));
@@ -91,7 +91,7 @@ impl Compounder {
 }
 
 impl Lattice {
-    /// A place in the tracker's space, in voxels.
+    /// The fractional voxel index of a position in the tracker's space, mm.
     pub(super) fn index_of(&self, place: DVec3) -> DVec3 {
         (self.to_volume.transform_point3(place) - DVec3::from(self.grid.origin)) / DVec3::from(self.grid.spacing)
     }

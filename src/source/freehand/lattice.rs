@@ -4,24 +4,24 @@ use super::{CompoundingOptions, PixelRange, Pose};
 use crate::probe::{Grid, World};
 use glam::{DAffine3, DMat3, DVec3};
 
-/// Most voxels along an edge: the limit of 3D textures on most devices.
+/// Largest number of voxels along an edge: the limit of 3D textures on most devices.
 pub(super) const MAX_EDGE: f64 = 2048.0;
 /// Most steps of making the spacing coarser. Each step removes most of the excess.
 const COARSENING_STEPS: usize = 64;
 
-/// The grid of a volume, and its position in the space of the tracker.
+/// The grid of a freehand volume, and its pose in the space of the tracker.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lattice {
     pub grid: Grid,
-    /// From the space of the tracker to that of the volume, mm: a rotation and a translation.
+    /// Map from the tracker's space to the volume's coordinates, mm: a rotation and a translation.
     pub to_volume: DAffine3,
 }
 
 impl Lattice {
-    /// Where the voxels are in the space of the tracker.
+    /// Map from the voxels to the tracker's space.
     ///
     /// # Errors
-    /// One line: a lattice that has no place.
+    /// One line: the map is not rigid.
     pub fn world(&self) -> Result<World, String> {
         let back = self.to_volume.inverse();
         let (spacing, origin) = (self.grid.spacing, self.grid.origin.into());
@@ -30,18 +30,18 @@ impl Lattice {
         World::new(axes, back.transform_point3(origin))
     }
 
-    /// A lattice along the axes of the tracker.
+    /// A lattice whose axes are those of the tracker.
     pub fn straight(grid: Grid) -> Lattice {
         Lattice { grid, to_volume: DAffine3::IDENTITY }
     }
 
-    /// The lattice that contains the frames, with a margin of `options.margin`.
+    /// The lattice that contains the clipped part of the frames with these poses, and a margin of `options.margin`. Invalid poses are ignored.
     ///
-    /// Its axes are the mean of theirs: lateral along the rows, depth along the columns and perpendicular to lateral, elevation along the
-    /// normal (lateral x depth). It is as long as `options.extent` at least. The origin is the mean of the centres of their first rows, as if that were the face of the probe. Only the
-    /// clipped part of the frames is used. The spacing is that of the options, otherwise that of the pixels along rows and columns, and the
-    /// larger of both along the normal. It is made coarser until there are at most `options.max_voxels`, and at most 2048 along an edge.
-    /// Poses that are not valid are left out.
+    /// Its axes are the mean of the frames' axes: lateral along the rows, depth along the columns and perpendicular to lateral, elevation along
+    /// the normal (lateral x depth). Along the normal it is at least `options.extent` long. Its origin is the mean of the centres of the frames'
+    /// first rows, as if that were the face of the probe. The spacing is that of the options, otherwise the distance of pixels along rows and
+    /// columns, and the larger of both along the normal. It is made coarser until there are at most `options.max_voxels` voxels, and at most
+    /// 2048 along an edge.
     ///
     /// # Errors
     /// One line: no valid pose, an option out of its range, or no spacing that is coarse enough.
@@ -111,7 +111,10 @@ fn axes(right: DVec3, down: DVec3) -> Option<DMat3> {
     Some(DMat3::from_cols(x, y, x.cross(y)))
 }
 
-/// The grid from `low` to `high`, with the finest spacing of at most `most` voxels.
+/// The grid from corner `low` to corner `high`, mm, with `spacing` made coarser until there are at most `most` voxels.
+///
+/// # Errors
+/// One line: no spacing is coarse enough.
 pub(super) fn grid(low: DVec3, high: DVec3, mut spacing: DVec3, most: usize) -> Result<Grid, String> {
     let most = most.max(1) as f64;
     for _ in 0..COARSENING_STEPS {

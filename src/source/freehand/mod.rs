@@ -23,7 +23,7 @@ use crate::probe::StoredType;
 use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
 
-/// Why pictures are not in a volume, for users.
+/// Text for users: why pictures outside the volume are left out, and what to do.
 pub(super) const AT_ITS_LIMIT: &str = "it may not grow further; a larger --freehand-size or --spacing lets it";
 
 /// Default limit of the voxels of a volume: 2^25, about 320 along each edge.
@@ -40,25 +40,25 @@ const MIN_WEIGHT: f64 = 1e-6;
 /// Least weight of a pixel that counts for the maximum of a voxel. One of the eight voxels around a pixel always has it.
 const MIN_MAXIMUM_WEIGHT: f32 = 0.125;
 
-/// The voxels that a pixel is added to.
+/// To which voxels the value of a pixel is added.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Splat {
-    /// The nearest one.
+    /// To the nearest voxel.
     Nearest,
-    /// The eight around it, with the weights of trilinear interpolation.
+    /// To the eight voxels around it, with the weights of trilinear interpolation.
     #[default]
     Trilinear,
 }
 
-/// The value of a voxel with several pixels.
+/// How the value of a voxel is computed from several pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Overlap {
-    /// Their weighted mean, independent of their order up to rounding.
+    /// The weighted mean of all pixels, independent of their order up to rounding.
     #[default]
     Mean,
-    /// The weighted mean of those of the last frame.
+    /// The weighted mean of the pixels of the last frame that reached the voxel.
     Latest,
-    /// The largest of those with a weight of at least an eighth.
+    /// The largest of the pixels with a weight of at least 1/8.
     Maximum,
 }
 
@@ -67,17 +67,18 @@ pub enum Overlap {
 pub struct CompoundingOptions {
     pub splat: Splat,
     pub overlap: Overlap,
-    /// Widest hole that is filled, mm; at most 64 voxels. 0: none.
+    /// Widest gap between pictures that is filled, mm; at most 64 voxels. 0 fills none.
     pub max_hole: f64,
-    /// The ultrasound region of each frame: first column, first row, columns, rows. `None`: all of it.
+    /// The part of each frame that is used: first column, first row, columns, rows. `None`: the whole frame.
     pub clip: Option<[usize; 4]>,
-    /// Distance between voxels along each axis, mm. `None`: that of the frames' pixels.
+    /// Distance between voxels along each axis, mm. `None`: the distance between the frames' pixels.
     pub spacing: Option<f64>,
-    /// Margin of the volume around the frames that it is placed around, mm.
+    /// Distance that the volume extends beyond the frames around which it is placed, on all sides, mm.
     pub margin: f64,
-    /// Least length of the volume along the normal of the frames, mm, from the first of them in the direction in which they move.
+    /// Least length of the volume along the normal of the frames, mm, counted from the first frame in the direction in which they move. `None`:
+    /// no longer than the frames need.
     pub extent: Option<f64>,
-    /// Most voxels of the volume.
+    /// Largest number of voxels of the volume.
     pub max_voxels: usize,
 }
 
@@ -96,22 +97,22 @@ impl Default for CompoundingOptions {
     }
 }
 
-/// Counts of frames and pixels.
+/// Numbers of frames and pixels that a [`Compounder`] has processed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CompoundingCounts {
-    /// Compounded frames.
+    /// Number of compounded frames.
     pub frames: u64,
-    /// Compounded frames without a pixel in the volume.
+    /// Number of compounded frames that have no pixel in the volume.
     pub outside: u64,
-    /// Frames without a valid pose, or with the wrong number of samples.
+    /// Number of frames that were refused: without a valid pose, or with a wrong number of samples.
     pub refused: u64,
-    /// Pixels left out because they were not finite, or beyond 1e30.
+    /// Number of pixels that were left out: not finite, or beyond 1e30.
     pub pixels: u64,
 }
 
-/// Compounds tracked frames into a volume.
+/// Compounds tracked 2D frames into a volume.
 ///
-/// Memory: 8 bytes a voxel, 4 more with [`Overlap::Latest`], and those of the stored type for each slice near a frame.
+/// Memory: 8 bytes a voxel, 4 more with [`Overlap::Latest`], and the stored samples of each slice near a frame.
 pub struct Compounder {
     lattice: Lattice,
     stored: StoredType,
@@ -129,7 +130,7 @@ pub struct Compounder {
 }
 
 impl Compounder {
-    /// An empty volume with voxels of type `stored`. Frames may have any type; their values are not scaled.
+    /// An empty volume with voxels of type `stored`. Frames may have samples of any type; their values are not scaled.
     ///
     /// # Errors
     /// One line: a lattice or options that are not valid, or more voxels than the options allow. Nothing is allocated then.
@@ -180,7 +181,7 @@ impl Compounder {
         self.counts
     }
 
-    /// Compounds a frame. Returns the number of its pixels in the volume.
+    /// Compounds a frame into the volume. Returns the number of its pixels that are in the volume.
     ///
     /// # Errors
     /// One line: why the frame is refused. It is counted, and the volume is not changed.
@@ -216,7 +217,7 @@ impl Compounder {
         Ok(inside)
     }
 
-    /// Fills the slices near new pixels again, and returns their indices in rising order.
+    /// Recomputes the samples of the slices that new pixels have changed, and returns the indices of these slices in rising order.
     pub fn changed_slices(&mut self) -> Vec<usize> {
         let (reach, last) = (self.sticks.reach(), self.touched.len());
         let near = |k: usize| self.touched[k.saturating_sub(reach)..(k + reach + 1).min(last)].contains(&true);
@@ -230,8 +231,8 @@ impl Compounder {
         changed
     }
 
-    /// Slice `k` as of the last [`Compounder::changed_slices`]: the lattice's rows x columns voxels, rows of depth, lateral fastest, each of the
-    /// type [`Compounder::stored`], little-endian. Zero where there are no pixels. `None` beyond the last slice.
+    /// Samples of slice `k` as of the last [`Compounder::changed_slices`]: lateral fastest, rows along depth, each of the type
+    /// [`Compounder::stored`], little-endian. 0 where there are no pixels. `None` beyond the last slice.
     pub fn slice(&self, k: usize) -> Option<&[u8]> {
         self.slices.get(k).map(|slice| if slice.is_empty() { &self.zero[..] } else { &slice[..] })
     }
@@ -247,26 +248,26 @@ const MAX_PIXELS: usize = 1 << 16;
 /// Ranges of columns and rows: first, and one past the last.
 type PixelRange = [(usize, usize); 2];
 
-/// Position and orientation of a frame.
+/// Position, orientation and size of a 2D frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
-    /// From (column, row, 0) of a pixel's centre, from 0, to the space of the tracker, mm. The third axis is not used.
+    /// Map from (column, row, 0) of a pixel's centre, counted from 0, to the space of the tracker, mm. The third axis is not used.
     pub to_space: DAffine3,
-    /// Columns and rows.
+    /// Columns and rows of the frame.
     pub size: [usize; 2],
 }
 
-/// A frame and its pose.
+/// The samples of a 2D frame, and its pose in the tracker's space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrackedFrame<'a> {
     pub pose: Pose,
     pub stored: StoredType,
-    /// Samples row by row, little-endian.
+    /// Samples of the frame, row by row, little-endian.
     pub bytes: &'a [u8],
 }
 
 impl Pose {
-    /// The position of a pixel, mm.
+    /// The position in the space of the tracker of a fractional column and row, mm.
     pub fn place(&self, column: f64, row: f64) -> DVec3 {
         self.to_space.transform_point3(DVec3::new(column, row, 0.0))
     }
@@ -318,7 +319,7 @@ impl Pose {
 }
 
 impl TrackedFrame<'_> {
-    /// Checks pose and samples.
+    /// Checks the pose and the number of samples.
     ///
     /// # Errors
     /// As [`Pose::check`], and a number of samples that is not that of the pixels.

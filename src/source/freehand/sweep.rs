@@ -9,16 +9,16 @@ use std::time::{Duration, Instant};
 const MAX_FIRST_WAIT: Duration = Duration::from_secs(10);
 const MAX_FIRST_BYTES: usize = 256 << 20;
 
-/// When the volume of a [`Sweep`] is placed and emitted.
+/// When the volume of a [`Sweep`] is placed, and when it is emitted.
 #[derive(Clone, Debug)]
 pub struct Schedule {
-    /// The volume is placed around this number of first pictures, or around those of ten seconds or of 256 MiB, ...
+    /// Number of pictures after which the volume is placed around them. It is placed earlier after ten seconds, 256 MiB or `silence`.
     pub first: usize,
-    /// ... or earlier, when no picture arrived for this time.
+    /// Time without a new picture after which the volume is placed around those that arrived.
     pub silence: Duration,
-    /// The volume is emitted at this interval while pictures arrive ...
+    /// Longest time from a new picture until the volume is emitted.
     pub interval: Duration,
-    /// ... or after this number of pictures.
+    /// Number of new pictures after which the volume is emitted, even before `interval` is over.
     pub pictures: usize,
 }
 
@@ -28,18 +28,18 @@ impl Default for Schedule {
     }
 }
 
-/// Why one picture, or all pictures, are in no volume.
+/// Why one picture, or all pictures, are not in the volume.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Refusal {
-    /// The picture does not lie wholly in the volume, which may not grow further.
+    /// The picture is not wholly inside the volume, which may not grow further.
     Outside,
-    /// The picture cannot be compounded, in words.
+    /// The picture cannot be compounded, for the given reason.
     Picture(String),
-    /// No volume can be placed around the first pictures, in words.
+    /// No volume can be placed around the first pictures, for the given reason.
     Volume(String),
 }
 
-/// Compounds pictures as they arrive.
+/// Compounds freehand pictures into a volume as they arrive.
 ///
 /// Memory: the first pictures (256 MiB), then that of a [`Compounder`].
 pub struct Sweep {
@@ -78,15 +78,15 @@ impl Sweep {
         self.stored
     }
 
-    /// True once the volume has its place.
+    /// True once the volume was placed around the first pictures.
     pub(crate) fn is_placed(&self) -> bool {
         self.compounder.is_some()
     }
 
-    /// Adds a picture: one sample a pixel, column fastest.
+    /// Adds a picture of one sample a pixel, column fastest.
     ///
     /// # Errors
-    /// The reason why the picture is in no volume.
+    /// The reason why the picture is not in the volume.
     pub fn push(&mut self, pose: Pose, bytes: Vec<u8>) -> Result<(), Refusal> {
         self.last = Some(Instant::now());
         if bytes.len() != pose.size[0] * pose.size[1] * self.stored.bytes() {
@@ -105,8 +105,9 @@ impl Sweep {
         }
     }
 
-    /// None while the volume is not due to be emitted. Otherwise true if a slice changed. A volume that has no place yet is placed first,
-    /// and a fault of that goes to `refuse`. `at_once`: no more pictures follow, so that the volume is due now.
+    /// Brings the volume up to date if its [`Schedule`] says that it is to be emitted. None if it is not. Otherwise true if a slice changed. A
+    /// volume that was not placed yet is placed first, and what is refused then is passed to `refuse`. `at_once`: emit now, because no more
+    /// pictures follow.
     pub fn update(&mut self, at_once: bool, mut refuse: impl FnMut(Refusal)) -> Option<bool> {
         let waited = self.since?.elapsed();
         let is_placed = self.is_placed();
@@ -146,17 +147,17 @@ impl Sweep {
         Ok(())
     }
 
-    /// Pictures so far that are in no volume, or not wholly.
+    /// Number of pictures so far that are not, or not wholly, in the volume.
     pub(crate) fn left_out(&self) -> u64 {
         self.left_out
     }
 
-    /// The lattice of the volume. None before the volume is placed.
+    /// The lattice of the volume. None before it was placed.
     pub fn lattice(&self) -> Option<&Lattice> {
         Some(self.compounder.as_ref()?.lattice())
     }
 
-    /// A slice; None beyond the last.
+    /// Samples of slice `k` of the volume. None beyond the last slice, and before the volume was placed.
     pub fn slice(&self, k: usize) -> Option<&[u8]> {
         self.compounder.as_ref()?.slice(k)
     }

@@ -2,12 +2,12 @@
 
 use std::time::{Duration, Instant};
 
-/// When the first byte of a message came that has not ended.
+/// Time at which the message that is being received began; None between messages.
 #[derive(Default)]
 pub(super) struct Begun(Option<Instant>);
 
 impl Begun {
-    /// True if the message takes longer than it may. `has_begun`: bytes of it are there.
+    /// True if the message that is being received takes longer than `most`. `has_begun`: bytes of it have arrived.
     pub(super) fn is_late(&mut self, has_begun: bool, now: Instant, most: Duration) -> bool {
         self.0 = self.0.or(Some(now)).filter(|_| has_begun);
         self.0.is_some_and(|since| now.saturating_duration_since(since) > most)

@@ -12,7 +12,7 @@ use std::ops::Range;
 /// Relative difference of spacings that count as equal: the spacing of a rotated volume is computed again in f32.
 const SPACING_TOLERANCE: f64 = 1e-5;
 
-/// A Cartesian volume, as of the last message.
+/// A Cartesian volume that is assembled from images of an OpenIGTLink server.
 pub(super) struct CartesianVolume {
     scalar: Scalar,
     components: u8,
@@ -20,7 +20,7 @@ pub(super) struct CartesianVolume {
     grid: Grid,
     /// The image's axes are left-handed: its rows are read from last pixel to first, so that it is not shown mirrored.
     mirrored: bool,
-    /// Where the volume is as of the last message; None if its axes are not perpendicular.
+    /// Pose of the volume according to the last message; None if its axes are not perpendicular.
     pub(super) pose: Option<DAffine3>,
     range: [f64; 2],
     bytes: Vec<u8>,
@@ -30,26 +30,27 @@ pub(super) struct CartesianVolume {
     was_whole: bool,
 }
 
-/// What an image did to the volume.
+/// The effect of an image on the volume.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Taken {
-    /// Samples that read as 0 because they are not finite or denormal.
+    /// Number of samples that were replaced by 0 because they are not finite or denormal.
     pub(super) replaced: u64,
-    /// All slices are there.
+    /// True if all slices of the volume have arrived.
     pub(super) is_whole: bool,
-    /// Slices that lacked when one came again: that volume is left out.
+    /// Number of slices that were missing when one arrived a second time. The incomplete volume is then dropped; 0 if none was.
     pub(super) missing: usize,
 }
 
 impl CartesianVolume {
-    /// Stores the slices of an image. If it does not belong to the present volume, a new one is begun. A volume that comes in parts is whole when all of its
-    /// slices came.
+    /// Stores the slices of an image. If the image does not fit the present volume, a new volume begins. A volume that is sent in parts is
+    /// complete when all of its slices have arrived.
     ///
-    /// Lateral is the image's i, depth its j, elevation its k. Lateral and elevation are centred, depth begins at 0. Of the matrix the
-    /// handedness is used: rows of a left-handed image are reversed. The values shown as 0 and 1 are 0 and 255 for 8 bits, otherwise the smallest and largest of the first message.
+    /// The image's i is lateral, j depth, k elevation. Lateral and elevation are centred on 0, depth begins at 0. The rows of a left-handed
+    /// image are reversed. The values that are displayed as 0 and 1 are 0 and 255 for 8 bits, otherwise the smallest and largest of the first
+    /// message.
     ///
     /// # Errors
-    /// One line: an image that cannot be used. The volume is not changed.
+    /// One line: the image cannot be used, for example because the volume has more than `max_bytes` bytes. The volume is not changed.
     pub(super) fn take(volume: &mut Option<CartesianVolume>, image: Image, max_bytes: usize) -> Result<Taken, String> {
         let [i, j, _] = image.size;
         let ([x, y, first], [columns, rows, slices]) = (image.region.offset, image.region.size);
@@ -149,14 +150,14 @@ impl CartesianVolume {
         }
     }
 
-    /// A slice; None beyond the last.
+    /// Samples of slice `k`; None beyond the last slice.
     pub(super) fn slice(&self, k: usize) -> Option<&[u8]> {
         let [x, y, _] = self.grid.size;
         self.bytes.chunks_exact(x * y * self.stored.bytes()).nth(k)
     }
 }
 
-/// From RAS to LPS, and back.
+/// The map from RAS to LPS coordinates, which is also its own inverse.
 pub(super) fn other_coordinates() -> DAffine3 {
     DAffine3::from_scale(DVec3::new(-1.0, -1.0, 1.0))
 }

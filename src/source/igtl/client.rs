@@ -11,7 +11,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-/// Prefix of addresses that users give.
+/// Prefix of the addresses of OpenIGTLink servers, as users write them.
 pub const SCHEME: &str = "igtl://";
 /// Default TCP port of OpenIGTLink servers.
 pub const PORT: u16 = 18944;
@@ -30,29 +30,29 @@ const LEAST_RATE: f64 = 1e6;
 /// Longest description of an error, characters.
 const MAX_ERROR_CHARACTERS: usize = 600;
 
-/// Options of a [`Client`]. All values are safe: attempts take at least 10 ms and are at least 10 ms apart.
+/// Options of a [`Client`]. No value can do harm: attempts to connect take at least 10 ms and are at least 10 ms apart.
 #[derive(Clone, Debug)]
 pub struct ClientOptions {
-    /// Time-out of a connection to one address.
+    /// Longest time for connecting to one address.
     pub connect_timeout: Duration,
-    /// Longest pause within a message before the connection is closed.
+    /// Longest time without a byte within a message, after which the connection is closed.
     pub stall_timeout: Duration,
-    /// Longest time from the first byte of a message to its last, plus a second for each megabyte of the message. It ends connections to
-    /// peers that send a byte now and then.
+    /// Longest time from the first byte of a message to its last, to which a second is added for each megabyte of the message. After it the
+    /// connection is closed, so that a peer that sends a byte now and then does not keep it.
     pub message_timeout: Duration,
-    /// Longest time without a message before the connection is closed. A peer that lost power does not close it.
+    /// Longest time without a message, after which the connection is closed: a peer that lost power does not close it.
     pub silence_timeout: Duration,
-    /// Wait before the first reconnection. Doubled with every connection that brings no message.
+    /// Wait before the first attempt to reconnect. It doubles with every connection that brings no message.
     pub first_wait: Duration,
-    /// Longest wait before a reconnection.
+    /// Longest wait before an attempt to reconnect.
     pub longest_wait: Duration,
-    /// Largest body of a message, bytes.
+    /// Largest body of a message, bytes; larger messages are refused.
     pub body_limit: usize,
-    /// Most messages in the queue; at least one is always kept.
+    /// Largest number of messages in the queue; at least the newest is always kept.
     pub queue_messages: usize,
-    /// Most memory of the queued messages, bytes. A single larger one is still kept.
+    /// Largest memory of the queued messages, bytes. The newest message is kept even if it alone is larger.
     pub queue_bytes: usize,
-    /// Accept messages with a checksum of 0 without a check.
+    /// Accept messages whose checksum is 0 without verifying it: some senders compute none.
     pub takes_no_checksum: bool,
 }
 
@@ -73,32 +73,32 @@ impl Default for ClientOptions {
     }
 }
 
-/// Counts since the client was created.
+/// Counts since the client was created, and whether it is connected.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ClientStatistics {
-    /// Connected at the moment.
+    /// True while a connection exists.
     pub connected: bool,
-    /// Decoded messages of all types.
+    /// Number of decoded messages of all types.
     pub messages: u64,
-    /// Received bytes.
+    /// Number of bytes received.
     pub bytes: u64,
-    /// Messages skipped because of a wrong checksum.
+    /// Number of messages that were skipped because of a wrong checksum.
     pub checksum_failures: u64,
-    /// Messages skipped because their body is invalid for their type.
+    /// Number of messages that were skipped because their body is invalid for their type.
     pub malformed: u64,
-    /// Decoded messages of types that are not used.
+    /// Number of decoded messages of types that the program does not use.
     pub skipped: u64,
-    /// Decoded messages that were dropped from the queue for newer ones.
+    /// Number of decoded messages that were dropped from the queue in favour of newer ones.
     pub dropped: u64,
-    /// Connections that ended within a message.
+    /// Number of connections that ended within a message.
     pub cut_short: u64,
-    /// Connections closed because a header was expected and not found.
+    /// Number of connections that were closed because bytes were no header where one had to be.
     pub lost_framing: u64,
-    /// Connections after the first.
+    /// Number of connections after the first.
     pub reconnects: u64,
 }
 
-/// A connection to an OpenIGTLink server that is renewed whenever it breaks. Dropping the client ends it within a second.
+/// A client of an OpenIGTLink server, which reconnects whenever the connection breaks. Dropping it ends the connection within a second.
 ///
 /// Memory: at most the queue's bytes or its newest message, and three times the body of a message while it is decoded.
 pub struct Client {
@@ -130,7 +130,7 @@ struct ConnectionEnd {
 
 impl Client {
     /// Starts to connect to `address`: a name or a number, followed by a colon and the port unless it is [`PORT`]. If the server cannot be
-    /// reached, the client keeps trying; [`last_error`](Client::last_error) is the reason.
+    /// reached, the client keeps trying, and [`last_error`](Client::last_error) says why.
     ///
     /// # Errors
     /// The thread cannot be started.
@@ -150,12 +150,12 @@ impl Client {
         Ok(Client { shared, thread: Some(thread) })
     }
 
-    /// The oldest queued message, if any.
+    /// Takes the oldest message from the queue; None if the queue is empty.
     pub fn try_next(&self) -> Option<Received> {
         self.shared.lock().queue.pop()
     }
 
-    /// The oldest queued message. If there is none, waits for one for at most `timeout`.
+    /// Takes the oldest message from the queue. If the queue is empty, waits for a message for at most `timeout`; None if none arrives.
     pub fn next(&self, timeout: Duration) -> Option<Received> {
         let started = Instant::now();
         let mut state = self.shared.lock();
@@ -176,7 +176,7 @@ impl Client {
         self.shared.lock().statistics.clone()
     }
 
-    /// The last error, on one line.
+    /// The last error of the connection, on one line; None if there was none.
     pub fn last_error(&self) -> Option<String> {
         self.shared.lock().last_error.clone()
     }
@@ -367,7 +367,7 @@ fn clear(bytes: &mut Vec<u8>) {
     bytes.shrink_to(MAX_KEPT_BYTES);
 }
 
-/// The address, with [`PORT`] if it has no port.
+/// The address with its port: [`PORT`] is added if there is none.
 pub fn with_port(address: &str) -> String {
     match address.parse::<IpAddr>() {
         Ok(IpAddr::V6(number)) => format!("[{number}]:{PORT}"),
@@ -376,16 +376,16 @@ pub fn with_port(address: &str) -> String {
     }
 }
 
-/// The port of an address, [`PORT`] if it has none. None: it is no number that a port can have.
+/// The port of an address, [`PORT`] if it has none. None if what follows the colon is not a port number.
 pub fn port(address: &str) -> Option<u16> {
     with_port(address).rsplit(':').next()?.parse().ok()
 }
 
-/// A message, and when it arrived.
+/// A message and the time of its arrival.
 #[derive(Clone, Debug)]
 pub struct Received {
     pub message: Message,
-    /// When its last byte was received.
+    /// When the last byte of the message was received.
     pub arrived: Instant,
 }
 

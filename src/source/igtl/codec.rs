@@ -7,25 +7,25 @@ use super::message::{
 use crate::files::{escaped, quoted};
 use crc::{CRC_64_ECMA_182, Crc, Table};
 
-/// Default limit of the body, bytes.
+/// Default of the largest body of a message, bytes.
 pub const BODY_LIMIT: usize = 256 << 20;
 /// Length of a tool in TDATA, bytes.
 const TOOL_BYTES: usize = 70;
 /// IANA's number of ISO-8859-1, a STRING's encoding.
 const LATIN_1: u16 = 4;
 
-/// The result of decoding.
+/// What the bytes at the start of a buffer are.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Decoded {
-    /// At least so many bytes are missing, 1 or more.
+    /// The beginning of a message, of which at least this number of bytes is missing (1 or more).
     Need(usize),
-    /// A message; the next one begins after `length` bytes.
+    /// A complete message of `length` bytes, after which the next one begins.
     Message { message: Message, length: usize },
 }
 
 /// Decodes the message at the start of `bytes`.
 ///
-/// `limit`: the largest body, bytes. A larger one is refused as soon as its header is complete. Nothing is allocated before the whole
+/// `limit`: the largest accepted body, bytes. A larger one is refused as soon as its header is complete. Memory is allocated only when the whole
 /// body is available, and never more than its bytes.
 ///
 /// # Errors
@@ -34,7 +34,7 @@ pub fn decode(bytes: &[u8], limit: usize) -> Result<Decoded, DecodeError> {
     decode_with(bytes, limit, false)
 }
 
-/// As [`decode`]. `takes_zero`: messages with the checksum 0 are accepted, as some senders compute none.
+/// As [`decode`]. `takes_zero`: accept messages with the checksum 0 without verifying it, as some senders compute none.
 pub(super) fn decode_with(bytes: &[u8], limit: usize, takes_zero: bool) -> Result<Decoded, DecodeError> {
     let Some(head) = bytes.first_chunk::<HEADER>() else { return Ok(Decoded::Need(HEADER - bytes.len())) };
     let framing =
@@ -114,12 +114,12 @@ fn expect_end(fields: &Fields, content: &[u8]) -> Result<(), Fault> {
     }
 }
 
-/// Version of the header.
+/// Version of the OpenIGTLink header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Version {
-    /// Every peer reads it.
+    /// Version 1, which every peer can read.
     V1,
-    /// With an extended header and empty metadata.
+    /// Version 2, with an extended header and empty metadata.
     V2,
 }
 
@@ -140,7 +140,7 @@ pub fn encode(message: &Message, version: Version) -> Result<Vec<u8>, MessageErr
     Ok(bytes)
 }
 
-/// A message of any kind and body, in version 1.
+/// Encodes a message of any type and body, in version 1. `kind`: name of the type; `time`: s since 1970.
 ///
 /// # Errors
 /// As for [`encode`].
@@ -511,7 +511,7 @@ pub fn crc64(body: &[u8]) -> u64 {
 /// Longest part of an error, characters.
 const MAX_PART: usize = 300;
 
-/// An error of a message: one line with the message, the field, its value and what is allowed.
+/// What is wrong with a message, as one line: the message, the field, its value and what is allowed.
 ///
 /// Everything that comes from the peer is escaped and shortened, so that it cannot send control characters to a terminal.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -546,8 +546,8 @@ pub enum DecodeError {
     /// The body is invalid for its type. The next message begins after `length` bytes.
     #[error("{error}")]
     Content { length: usize, error: MessageError },
-    /// These bytes are no header. The format has no marks of message boundaries, so the stream cannot be re-synchronised and the
-    /// connection has to be renewed.
+    /// The bytes are no header. The format has no marks of message boundaries, so that the stream cannot be resynchronised and the connection
+    /// has to be renewed.
     #[error("{error}; the stream cannot be re-synchronised")]
     Framing { error: MessageError },
 }

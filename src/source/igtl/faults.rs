@@ -8,7 +8,7 @@ const REPORT_INTERVAL: Duration = Duration::from_secs(1);
 /// Longest reason, characters.
 const MAX_REASON: usize = 400;
 
-/// The kinds of faults.
+/// The kinds of faults of an OpenIGTLink source, which are counted and reported separately.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum FaultKind {
     Unreachable,
@@ -17,19 +17,19 @@ pub(super) enum FaultKind {
     Checksum,
     Malformed,
     Dropped,
-    /// An image that is neither a volume nor a frame.
+    /// An image is neither a volume nor a frame.
     Image,
-    /// Images of several devices, which show different things.
+    /// Images come from several devices, which show different things.
     Devices,
     Samples,
-    /// A frame without a pose.
+    /// A frame has no pose.
     Unpaired,
-    /// 2D images whose place is not known, or does not change.
+    /// 2D images have no pose, or all the same one.
     Untracked,
     Pose,
     Outside,
     Volume,
-    /// A volume in parts, of which a slice came again before all did.
+    /// A volume that is sent in parts was incomplete when one of its slices arrived again.
     Incomplete,
 }
 
@@ -78,7 +78,8 @@ impl Faults {
         }
     }
 
-    /// A fault whose kind was not reported within the last second.
+    /// Takes a fault that is due for a report: one line with its count since the last report. None if each kind has no new fault or was reported
+    /// within the last second.
     pub(super) fn due(&mut self) -> Option<String> {
         let waited = |fault: &Fault| fault.reported.is_none_or(|reported| reported.elapsed() >= REPORT_INTERVAL);
         let mut faults = self.faults.iter_mut().zip(KINDS);

@@ -13,14 +13,14 @@ pub enum Message {
     Other(Other),
 }
 
-/// TRANSFORM: one pose.
+/// TRANSFORM: a pose.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Transform {
-    /// Name of the device, at most 20 bytes on the wire.
+    /// Name of the sending device, at most 20 bytes on the wire.
     pub device: String,
-    /// Time stamp, s since 1970; 0: none.
+    /// Time stamp, s since 1970; 0 if it has none.
     pub time: f64,
-    /// Upper three rows of the 4 x 4 matrix; the last column in mm. Finite.
+    /// Upper three rows of the 4 x 4 matrix, all finite. Its last column is a translation in mm.
     pub matrix: [[f32; 4]; 3],
 }
 
@@ -28,19 +28,19 @@ pub struct Transform {
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrackingData {
     pub device: String,
-    /// Time stamp, s since 1970; 0: none.
+    /// Time stamp, s since 1970; 0 if it has none.
     pub time: f64,
-    /// The tools that are visible at the moment; may be empty.
+    /// The tools that the tracker sees at that time; may be empty.
     pub tools: Vec<Tool>,
 }
 
-/// One tool of a [`TrackingData`].
+/// A tool of a [`TrackingData`] and its pose.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tool {
     /// Name of the tool, at most 20 bytes on the wire.
     pub name: String,
     pub kind: ToolKind,
-    /// As in [`Transform`].
+    /// Pose of the tool, see [`Transform::matrix`].
     pub matrix: [[f32; 4]; 3],
 }
 
@@ -61,34 +61,34 @@ pub enum ToolKind {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Status {
     pub device: String,
-    /// Time stamp, s since 1970; 0: none.
+    /// Time stamp, s since 1970; 0 if it has none.
     pub time: f64,
-    /// 1 is OK, 2 to 19 are faults that status.md lists.
+    /// Status code: 1 is OK, 2 to 19 are the faults that status.md lists.
     pub code: u16,
-    /// Defined by the device.
+    /// Code whose meaning the device defines.
     pub subcode: i64,
     /// Name of the fault, at most 20 bytes on the wire.
     pub name: String,
     pub text: String,
 }
 
-/// STRING.
+/// STRING: a text.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Text {
     pub device: String,
-    /// Time stamp, s since 1970; 0: none.
+    /// Time stamp, s since 1970; 0 if it has none.
     pub time: f64,
-    /// Decoded from Latin-1 if the message says so, otherwise from UTF-8. At most 65535 bytes on the wire.
+    /// The text, decoded from Latin-1 if the message says so, otherwise from UTF-8. At most 65535 bytes on the wire.
     pub text: String,
 }
 
-/// A message of a type that is not used. The checksum of its body was verified.
+/// A message of a type that the program does not use. The checksum of its body was verified.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Other {
     pub device: String,
-    /// Time stamp, s since 1970; 0: none.
+    /// Time stamp, s since 1970; 0 if it has none.
     pub time: f64,
-    /// Name of the type, at most 12 bytes on the wire.
+    /// Name of the message type, at most 12 bytes on the wire.
     pub kind: String,
     /// Length of the body, bytes.
     pub bytes: usize,
@@ -106,7 +106,7 @@ impl Message {
         }
     }
 
-    /// Time stamp, s since 1970; 0: none.
+    /// Time stamp of the message, s since 1970; 0 if it has none.
     pub fn time(&self) -> f64 {
         match self {
             Message::Transform(m) => m.time,
@@ -118,7 +118,7 @@ impl Message {
         }
     }
 
-    /// Name of the type on the wire.
+    /// Name of the message type on the wire, such as IMAGE.
     pub fn kind(&self) -> &str {
         match self {
             Message::Transform(_) => "TRANSFORM",
@@ -130,7 +130,7 @@ impl Message {
         }
     }
 
-    /// Approximate memory, bytes.
+    /// Memory that the message takes, approximately, bytes.
     pub(super) fn weight(&self) -> usize {
         let held = match self {
             Message::TrackingData(m) => m.tools.iter().map(|t| size_of::<Tool>() + t.name.len()).sum(),
@@ -148,18 +148,18 @@ impl Message {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Image {
     pub device: String,
-    /// Time stamp, s since 1970; 0: none.
+    /// Time stamp, s since 1970; 0 if it has none.
     pub time: f64,
     /// Pixels of the whole image along i (fastest), j and k, each at least 1.
     pub size: [u16; 3],
     /// The part of the image that this message contains; usually all of it.
     pub region: Region,
     pub scalar: Scalar,
-    /// Values of a pixel, interleaved; at least 1.
+    /// Number of values of a pixel, which are interleaved; at least 1.
     pub components: u8,
     /// Coordinate system of `axes` and `centre`.
     pub coordinates: Coordinates,
-    /// One step along i, j and k, mm: direction times spacing. Finite; may be 0 for an axis of one pixel.
+    /// Vectors from a pixel to the next along i, j and k, mm. Finite; 0 is possible for an axis of one pixel.
     pub axes: [[f32; 3]; 3],
     /// Centre of the whole image, mm. Finite.
     pub centre: [f32; 3],
@@ -170,12 +170,12 @@ pub struct Image {
 /// A rectangular part of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Region {
-    /// The first pixel.
+    /// Index (i, j, k) of the first pixel in the whole image, from 0.
     pub offset: [u16; 3],
     pub size: [u16; 3],
 }
 
-/// Type of a sample.
+/// Number type of an image's samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scalar {
     I8,
@@ -209,9 +209,9 @@ impl Scalar {
 }
 
 impl Image {
-    /// The transformation from pixel index (of the pixel's centre, from 0, in the whole image) to mm in the given coordinate system.
+    /// The map from a pixel's index (of its centre, from 0, in the whole image) to its position in mm in the given coordinate system.
     ///
-    /// The position in the message is the centre of the image (image.md, note of 2011), that is index (size - 1) / 2.
+    /// The position that the message states is the centre of the image (image.md, note of 2011), which is index (size - 1) / 2.
     pub fn index_to_mm(&self, coordinates: Coordinates) -> DMat4 {
         let axes = self.axes.map(|a| DVec3::from(a.map(f64::from)));
         let middle = self.size.map(|n| (f64::from(n) - 1.0) / 2.0);

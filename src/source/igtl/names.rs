@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 /// Most names that are kept, besides the selected one.
 const MAX_NAMES: usize = 16;
 
-/// Names that came. The selected one is always kept: whether it came decides what is said.
+/// Names of devices or tools from which messages arrived. Only some are kept, but always the one that the user selected.
 pub(super) struct Names {
     selected: Option<String>,
     seen: BTreeSet<String>,
@@ -17,7 +17,7 @@ impl Names {
         Names { selected, seen: BTreeSet::new() }
     }
 
-    /// Adds a name. True if it is new and was kept.
+    /// Adds a name. Returns true if it is new and was kept.
     pub fn add(&mut self, name: &str) -> bool {
         let is_kept = self.seen.len() < MAX_NAMES || self.selected.as_deref() == Some(name);
         is_kept && !self.seen.contains(name) && self.seen.insert(name.to_string())
@@ -31,7 +31,7 @@ impl Names {
         self.seen.contains(name)
     }
 
-    /// In quotation marks, with commas between them.
+    /// The kept names in quotation marks, separated by commas.
     pub fn list(&self) -> String {
         self.seen.iter().map(|name| quoted(name)).collect::<Vec<_>>().join(", ")
     }

@@ -23,12 +23,12 @@ use glam::DAffine3;
 use std::io;
 use std::time::{Duration, Instant};
 
-/// The origin of the poses of 2D frames.
+/// Where the poses of 2D frames come from.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Poses {
-    /// TRANSFORM and TDATA messages, selected as [`Pairing::new`] documents: device, tolerance and patience in s.
+    /// From TRANSFORM and TDATA messages. The fields are arguments of [`Pairing::new`]; `tolerance` and `patience` are in s.
     Messages { device: Option<String>, tolerance: f64, patience: f64 },
-    /// The image's own matrix.
+    /// From the matrix of each image.
     Image,
 }
 
@@ -36,13 +36,13 @@ pub enum Poses {
 #[derive(Clone, Debug)]
 pub struct NetworkOptions {
     pub client: ClientOptions,
-    /// The device whose images are taken; None: all.
+    /// Name of the device whose images are used; None: images of all devices.
     pub device: Option<String>,
     pub poses: Poses,
     pub freehand: CompoundingOptions,
-    /// When the volume of a sweep is placed and emitted.
+    /// When the volume of a freehand sweep is placed, and when it is emitted.
     pub schedule: Schedule,
-    /// Largest Cartesian volume, bytes of stored samples.
+    /// Largest Cartesian volume that is accepted, bytes of stored samples.
     pub volume_bytes: usize,
 }
 
@@ -111,7 +111,7 @@ struct VolumeOutput {
 }
 
 impl Network {
-    /// Starts to connect, as [`Client::connect`].
+    /// Starts to connect to a server, see [`Client::connect`].
     ///
     /// # Errors
     /// The thread cannot be started.
@@ -134,7 +134,7 @@ impl Network {
         })
     }
 
-    /// Statistics of the connection.
+    /// Counts and state of the connection.
     pub fn statistics(&self) -> ClientStatistics {
         self.client.statistics()
     }

@@ -14,11 +14,11 @@ const MAX_FRAME_BYTES: usize = 256 << 20;
 /// Largest entry of R^T R - 1 for which a matrix counts as a rotation, so that it can be interpolated.
 const ROTATION_TOLERANCE: f64 = 1e-3;
 
-/// Gives every 2D frame (IMAGE of depth 1) a pose, in order of arrival. Pure: its clock is the time stamps.
+/// Assigns a pose to every 2D frame (IMAGE of depth 1), in order of arrival. It uses no clock but the time stamps of the messages.
 ///
-/// With poses on both sides within the tolerance, the translation is interpolated linearly and the rotation along the
-/// shorter arc; between different devices, or if a matrix is not a rotation, the nearer pose is used. A frame waits for a
-/// later pose until one has arrived, or until frames are `patience` ahead, or until 64 frames or 256 MiB wait.
+/// With poses on both sides within the tolerance, the translation is interpolated linearly and the rotation along the shorter arc; between
+/// different devices, or if a matrix is not a rotation, the nearer pose is used. A frame waits for a later pose until one has arrived, or until
+/// frames are `patience` ahead, or until 64 frames or 256 MiB wait.
 pub struct Pairing {
     device: Option<String>,
     tolerance: f64,
@@ -31,27 +31,27 @@ pub struct Pairing {
     seen: Names,
 }
 
-/// A frame and its pose.
+/// A 2D frame with the pose that was assigned to it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PairedFrame {
     pub image: Image,
-    /// The TRANSFORM at the frame's time, mm. It is applied after the image's own matrix.
+    /// The tracked pose at the frame's time, mm. It is applied after the image's own matrix.
     pub pose: DAffine3,
-    /// Device of the nearest pose.
+    /// Name of the device whose pose is nearest in time.
     pub device: String,
-    /// Time of the frame minus that of the nearest pose, s.
+    /// Time of the frame minus time of the nearest pose, s.
     pub lag: f64,
-    /// Interpolated between two poses.
+    /// True if the pose was interpolated between two.
     pub interpolated: bool,
 }
 
-/// Counts of images.
+/// Numbers of images that were and were not paired.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct PairingCounts {
     pub paired: u64,
-    /// Frames without a pose within the tolerance.
+    /// Number of frames that were dropped because no pose was within the tolerance.
     pub dropped: u64,
-    /// Images that are not 2D frames: skipped.
+    /// Number of images that were skipped because they are not 2D frames.
     pub volumes: u64,
 }
 
@@ -63,9 +63,9 @@ struct Pose {
 }
 
 impl Pairing {
-    /// `device`: device of the TRANSFORM, or name of the tool in TDATA. None: the nearest TRANSFORM, the last one of several. `tolerance`:
-    /// largest difference between the time stamps of a frame and its pose, s. `patience`: largest time by which frames may be ahead of the
-    /// poses, s. Negative values and NaN count as 0.
+    /// `device`: name of the TRANSFORM's device or of the TDATA's tool whose poses are used. None: any TRANSFORM, the nearest in time, and of
+    /// several at the same time the last. `tolerance`: largest difference between the time stamps of a frame and its pose, s. `patience`:
+    /// largest time by which frames may be ahead of the poses, s. Negative values and NaN count as 0.
     pub fn new(device: Option<String>, tolerance: f64, patience: f64) -> Pairing {
         Pairing {
             seen: Names::new(device.clone()),
@@ -79,7 +79,7 @@ impl Pairing {
         }
     }
 
-    /// Takes a message and returns the frames that are paired by it, possibly none.
+    /// Takes a message and returns the frames that can be paired now, possibly none.
     pub fn push(&mut self, message: Message) -> Vec<PairedFrame> {
         let selected = self.device.clone();
         self.note(&message);
@@ -101,7 +101,7 @@ impl Pairing {
         self.settle(false)
     }
 
-    /// Pairs the waiting frames with the poses so far.
+    /// Pairs the frames that still wait with the poses that have arrived.
     pub fn finish(&mut self) -> Vec<PairedFrame> {
         self.settle(true)
     }
@@ -115,12 +115,12 @@ impl Pairing {
         }
     }
 
-    /// True once a TRANSFORM or a tool of TDATA came, also one that is not selected.
+    /// True once a TRANSFORM or a tool of a TDATA message has arrived, whether it is selected or not.
     pub(crate) fn has_transforms(&self) -> bool {
         self.seen.count() > 0
     }
 
-    /// Why frames get no pose, for users: which transforms came.
+    /// The reason for users why frames get no pose, with the names of the transforms that have arrived.
     pub(crate) fn why_unpaired(&self) -> String {
         if self.seen.count() == 0 {
             return "no transform came; --tool image takes the matrix of each image".into();
@@ -138,7 +138,7 @@ impl Pairing {
         }
     }
 
-    /// Counts so far.
+    /// Numbers of images so far.
     pub fn counts(&self) -> PairingCounts {
         self.counts.clone()
     }

@@ -9,7 +9,7 @@ use crate::{SampleType, StoredType};
 /// Added to an i8 to store it as u8.
 const I8_SHIFT: f64 = 128.0;
 
-/// The stored type of a scalar: 8 and 16 bits unchanged, signed ones shifted to begin at 0, all others f32.
+/// The type in which samples of an image are stored: unsigned 8 and 16 bits unchanged, signed ones shifted to begin at 0, all others as f32.
 pub(super) fn stored(scalar: Scalar) -> StoredType {
     match scalar {
         Scalar::I8 | Scalar::U8 => StoredType::U8,
@@ -18,12 +18,13 @@ pub(super) fn stored(scalar: Scalar) -> StoredType {
     }
 }
 
-/// One sample a pixel, little-endian, in the order of the image, and the number of samples that were replaced by 0.
+/// Converts an image to one little-endian sample a pixel, in the order of the image. The second result is the number of samples that were
+/// replaced by 0.
 ///
 /// Pixels of 3 or 4 components (red, green, blue, and any fourth) become their luminance.
 ///
 /// # Errors
-/// Pixels with another number of components.
+/// Pixels have another number of components.
 pub(super) fn samples(mut image: Image) -> Result<(Vec<u8>, u64), String> {
     let scalar = image.scalar;
     let mut bytes = match (image.components, scalar) {
@@ -83,7 +84,7 @@ fn put(bytes: &mut Vec<u8>, scalar: Scalar, value: f64) {
     }
 }
 
-/// The values that become 0 and 1: all that 8 bits hold, or those of the first samples that came.
+/// The values that are displayed as 0 and 1: 0 and 255 for u8, otherwise the range of the samples collected in `values`.
 pub(super) fn range_of(stored: StoredType, values: ValueRange) -> [f64; 2] {
     if stored == StoredType::U8 {
         return [0.0, 255.0];

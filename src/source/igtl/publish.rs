@@ -15,7 +15,7 @@ use std::net::SocketAddr;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 
-/// Names of the devices in the messages.
+/// Names of the devices in the messages: of pictures and of volumes.
 pub const PICTURE: &str = "EcholumePicture";
 pub const VOLUME: &str = "EcholumeVolume";
 /// Most voxels of a volume, one byte each: 255 MiB. Clients take 256 MiB in one message, with its headers.
@@ -23,20 +23,20 @@ const MAX_VOXELS: f64 = (255u64 << 20) as f64;
 /// Longest axis of an image on the wire.
 const MAX_EDGE: usize = 65_535;
 
-/// Counts since the publisher was started.
+/// Counts since the publisher was started, and its last fault.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct PublisherStatistics {
     pub server: ServerStatistics,
-    /// Number of pictures that were handed to the server. `volumes` counts volumes.
+    /// Number of pictures that were passed to the server; `volumes` is the number of volumes.
     pub pictures: u64,
     pub volumes: u64,
-    /// Number of pictures and volumes that newer ones replaced before they were converted.
+    /// Number of pictures and volumes that were not sent because a newer one came before they were converted.
     pub replaced: u64,
-    /// The last reason why a picture or a volume could not be sent.
+    /// Why the last picture or volume that failed could not be sent; None if none failed.
     pub fault: Option<String>,
 }
 
-/// Sends pictures and volumes. Dropping it sends what still waits in the server, and ends all connections.
+/// Sends pictures and volumes to the clients of an OpenIGTLink server of its own. Dropping it sends what still waits, and ends all connections.
 ///
 /// Memory: the volume that is collected, one that waits, one that is converted, its voxels, and that of the [`Server`].
 pub struct Publisher {
@@ -94,8 +94,8 @@ struct Whole {
 }
 
 impl Publisher {
-    /// Listens as [`Server::bind`]. `spacing`: distance of the voxels that are sent, mm; None: those of a Cartesian volume, and 1 mm for
-    /// a sweep.
+    /// Starts a server that listens at `address`, see [`Server::bind`]. `spacing`: voxel spacing of the volumes that are sent, mm; None: for a
+    /// Cartesian volume its own, for a sweep 1 mm.
     ///
     /// # Errors
     /// As for [`Server::bind`].
@@ -107,7 +107,7 @@ impl Publisher {
         Ok(Publisher { shared, server, thread: Some(thread) })
     }
 
-    /// The address that it listens at.
+    /// The address and port at which the server listens.
     pub fn address(&self) -> SocketAddr {
         self.server.address()
     }
@@ -120,7 +120,7 @@ impl Publisher {
         PublisherStatistics { server: self.server.statistics(), pictures, volumes, replaced, fault }
     }
 
-    /// Hands over a picture of 8-bit red, green, blue, alpha, rows from the top.
+    /// Queues a picture of 8-bit red, green, blue, alpha, rows from the top. `size`: width and height.
     pub fn picture(&self, size: [u32; 2], pixels: Vec<u8>) {
         if self.server.has_clients() {
             let mut mail = self.shared.lock();
@@ -145,7 +145,7 @@ impl Publisher {
         }
     }
 
-    /// A function that has to see every event of a source. It hands complete volumes to the publisher.
+    /// A function to be called with every event of a source. It collects frames and queues each complete volume.
     pub fn listener(&self) -> impl FnMut(&Event) + Send + use<> {
         let (shared, server) = (self.shared.clone(), self.server.clone());
         let mut listener = Listener { shared, server, header: None, filling: None };

@@ -28,17 +28,17 @@ const ERROR: u8 = 1;
 pub struct ServerOptions {
     /// Largest number of clients at a time. Further ones are disconnected at once.
     pub clients: usize,
-    /// Most messages of each device that wait for a client; the oldest are dropped for newer ones.
+    /// Largest number of messages of each device that wait for a client; the oldest are dropped in favour of newer ones.
     pub queue_messages: usize,
-    /// Most bytes that wait for a client. The newest message is always kept.
+    /// Largest number of bytes that wait for a client. The newest message is always kept.
     pub queue_bytes: usize,
-    /// A client that reads nothing for this time is disconnected.
+    /// Time without reading anything after which a client is disconnected.
     pub stall_timeout: Duration,
-    /// A client whose message takes this time from its first byte to its last is disconnected, however many bytes arrive meanwhile.
+    /// Longest time for sending one message to a client; after it the client is disconnected, however many bytes it still reads.
     pub message_timeout: Duration,
-    /// Longest time for which dropping the server waits until its last messages are sent.
+    /// Longest time that dropping the server waits until its last messages are sent.
     pub last: Duration,
-    /// Device name in answers to status queries, and text of the server's STRING.
+    /// Name of the server: device name in answers to status queries, and text of its STRING message.
     pub name: String,
 }
 
@@ -56,20 +56,20 @@ impl Default for ServerOptions {
     }
 }
 
-/// Counts since the server was started.
+/// Counts since the server was started, and the number of clients.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ServerStatistics {
-    /// Clients that are connected.
+    /// Number of clients that are connected now.
     pub clients: usize,
     /// Number of clients that have connected so far.
     pub connections: u64,
-    /// Clients that were disconnected at once because the largest number was reached.
+    /// Number of clients that were disconnected at once because the largest number was reached.
     pub refused: u64,
-    /// Messages that were sent whole, to all clients.
+    /// Number of messages that were sent completely, over all clients.
     pub sent: u64,
-    /// Messages that were dropped from a client's queue for newer ones.
+    /// Number of messages that were dropped from a client's queue in favour of newer ones.
     pub dropped: u64,
-    /// Clients that were disconnected because they read nothing or sent something that is not a message.
+    /// Number of clients that were disconnected because they read nothing or sent something that is not a message.
     pub disconnected: u64,
 }
 
@@ -174,12 +174,12 @@ impl Server {
         Ok(Server { shared, address, thread: Mutex::new(Some(thread)) })
     }
 
-    /// The address that it listens at.
+    /// The address and port at which the server listens.
     pub fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// True if someone would get a message.
+    /// True if at least one client is connected.
     pub(crate) fn has_clients(&self) -> bool {
         self.shared.lock().statistics.clients > 0
     }
@@ -210,7 +210,7 @@ impl Server {
 }
 
 impl Server {
-    /// Sends the waiting messages, for [`ServerOptions::last`] at most, and ends all connections. The counts stay.
+    /// Sends the waiting messages, for [`ServerOptions::last`] at most, and ends all connections. The statistics remain available.
     pub fn finish(&self) {
         let mut state = self.shared.lock();
         state.stop = true;
@@ -468,7 +468,7 @@ impl Shared {
     }
 }
 
-/// The time, s since 1970, for a stamp; 0, which is none, for a clock before that.
+/// The current time as a time stamp, s since 1970; 0, which means none, if the clock is before that.
 pub(super) fn now() -> f64 {
     std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).map_or(0.0, |t| t.as_secs_f64())
 }

@@ -37,25 +37,25 @@ const POLL_WAITING: Duration = Duration::from_millis(4);
 /// Shortest time between two faults that are reported.
 const REPORT_INTERVAL: Duration = Duration::from_secs(1);
 
-/// How the time of a frame's first line is determined.
+/// How the time is determined at which the first line of a frame was acquired.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Clock {
-    /// From its arrival, less the time that sound needs for it, and less `delay` s from its last line to its arrival.
+    /// From the frame's arrival, minus the time that sound needs for all its lines, minus `delay` s, the time from the last line to the arrival.
     Arrival { delay: f64 },
-    /// From its time stamp, s since 1970 on this machine's clock. A frame without one is left out.
+    /// From the frame's time stamp, s since 1970 on this machine's clock. A frame without one is left out.
     Stamp,
 }
 
-/// How frames are placed.
+/// How frames are assigned to the slices of a volume by the motor's position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotorTrackingOptions {
     pub clock: Clock,
-    /// Do not ask the source for frames before the array sweeps, which suits a file. A source with its own clock is read from the start,
-    /// because frames that had waited would be taken for new ones.
+    /// Read the source only once the array sweeps, which suits a file. A source with its own clock has to be read from the start, because frames
+    /// that had waited would be taken for new ones.
     pub holds: bool,
 }
 
-/// A live source: the frames of a free-running source, placed by the motor's position.
+/// A live source that assigns the frames of a free-running probe to slices by the motor's position.
 ///
 /// Memory: 32 frames that wait for a position, two that may be the nearest to their slice, and copies for missing slices.
 pub struct MotorTracked {
@@ -82,7 +82,7 @@ struct Tracking {
 }
 
 impl MotorTracked {
-    /// Places the frames of `source` by the positions of `motor`.
+    /// Assigns the frames of `source` to slices by the positions of `motor`.
     pub fn new(source: Box<dyn Live>, motor: BackgroundSweep, options: MotorTrackingOptions) -> MotorTracked {
         MotorTracked {
             source: WholeFrames::new(source),
@@ -99,7 +99,7 @@ impl MotorTracked {
         }
     }
 
-    /// Counts of the frames so far.
+    /// Numbers of frames so far that were assigned and that were left out.
     pub fn counts(&self) -> TrackingCounts {
         self.counts
     }
@@ -282,8 +282,8 @@ pub struct FreeRunning {
 }
 
 impl FreeRunning {
-    /// The phantom for an array that moves at `speed` deg/s: swept in both directions, with as many lines as sound has time for, and with
-    /// the motor's travel during a frame.
+    /// The phantom for an array that a motor moves at `speed` deg/s: swept in both directions, with at most as many lines as the speed of sound
+    /// allows, and with the motor's travel during each frame.
     ///
     /// # Errors
     /// As [`Phantom::new`].
@@ -301,7 +301,7 @@ impl FreeRunning {
         Phantom::new(PhantomOptions { speed_ratio, ..options })
     }
 
-    /// Computes the phantom's volumes. `positions`: of the motor that sweeps the array.
+    /// Computes the phantom's volumes. `positions`: those of the motor that sweeps the array.
     pub fn new(phantom: Phantom, positions: PositionLog) -> FreeRunning {
         let mut volumes: Vec<Vec<Frame>> = (0..phantom.volumes()).map(|v| phantom.volume(v)).collect();
         volumes.iter_mut().for_each(|volume| volume.sort_by_key(|frame| frame.slice));

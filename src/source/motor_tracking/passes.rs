@@ -6,10 +6,10 @@ use crate::probe::Axis;
 use crate::probe::motor::{ArrayState, Direction};
 use std::collections::VecDeque;
 
-/// Most consecutive missing slices that are filled.
+/// Largest number of consecutive missing slices that are filled with copies of neighbours.
 pub(super) const MAX_FILLED: usize = 2;
 
-/// The passes over a slice axis, in order of time.
+/// Sorts frames of known array angle into the slices of one pass after another.
 pub(super) struct Passes {
     /// rad.
     slices: Axis,
@@ -39,7 +39,7 @@ struct Candidate {
 }
 
 impl Passes {
-    /// `slices`: rad, at least two.
+    /// `slices`: angles of the slices, rad, at least two.
     pub fn new(slices: Axis) -> Passes {
         Passes { slices, current: None, over: None }
     }
@@ -50,7 +50,7 @@ impl Passes {
         if direction == Direction::Forward { index } else { self.slices.len() as f64 - 1.0 - index }
     }
 
-    /// Adds a frame and the state of the array at its first line. Slices that are final are appended to `out`.
+    /// Adds a frame and the state of the array when its first line was acquired. Slices that later frames cannot change are appended to `out`.
     pub fn frame(&mut self, frame: Frame, place: ArrayState, counts: &mut TrackingCounts, out: &mut VecDeque<Event>) {
         let last = self.slices.len() as f64 - 1.0;
         match place {
@@ -116,7 +116,7 @@ impl Passes {
         }
     }
 
-    /// Ends the current pass, if any.
+    /// Ends the current pass, if there is one, and appends its last slices to `out`.
     pub fn end(&mut self, counts: &mut TrackingCounts, out: &mut VecDeque<Event>) {
         let Some(mut current) = self.current.take() else { return };
         if let Some(nearest) = current.nearest.take() {
@@ -178,33 +178,34 @@ impl Passes {
     }
 }
 
-/// Counts of frames, unless a field states otherwise.
+/// Numbers of frames, of slices and of passes in motor tracking.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TrackingCounts {
-    /// Placed in a slice.
+    /// Number of frames that became a slice.
     pub placed: u64,
-    /// Left out: before the sweep had begun.
+    /// Number of frames that were left out because the sweep had not begun.
     pub early: u64,
-    /// Left out: near a reversal, where the direction is not known.
+    /// Number of frames that were left out near a reversal, where the direction is not known.
     pub turning: u64,
-    /// Left out: more than half a pitch beyond the first or last slice.
+    /// Number of frames that were left out more than half a slice pitch beyond the first or last slice.
     pub beyond: u64,
-    /// Left out: another frame of the pass was nearer to the slice.
+    /// Number of frames that were left out because another one of the same pass was nearer to the slice.
     pub farther: u64,
-    /// Left out: no time stamp, or the motor's position at that time was not known in time.
+    /// Number of frames that were left out because they had no time stamp, or the motor's position at their time did not become known soon
+    /// enough.
     pub unknown: u64,
-    /// Left out: of an earlier pass or slice than the newest.
+    /// Number of frames that were left out because a later pass or slice had begun.
     pub late: u64,
-    /// Slices without a frame of their own, filled with a neighbour's.
+    /// Number of slices without a frame of their own that were filled with a neighbour's.
     pub filled: u64,
-    /// Passes that became complete volumes.
+    /// Number of passes that became complete volumes.
     pub whole: u64,
-    /// Passes with more slices missing than are filled.
+    /// Number of passes that stayed incomplete because more slices in a row were missing than are filled.
     pub incomplete: u64,
 }
 
 impl TrackingCounts {
-    /// The difference to earlier counts.
+    /// The counts minus earlier counts.
     pub fn since(&self, before: &TrackingCounts) -> TrackingCounts {
         TrackingCounts {
             placed: self.placed - before.placed,
@@ -220,8 +221,8 @@ impl TrackingCounts {
         }
     }
 
-    /// One line on the counts that need a report. None if there is nothing to report: frames that were left out because there were more
-    /// than needed are normal.
+    /// A line for users on slices and frames that were lost. None if there is nothing to report: it is normal that some frames are left out
+    /// because there are more than slices.
     pub fn fault(&self) -> Option<String> {
         let parts = [
             (self.filled, "slices had no frame of their own and were given a neighbour's"),

@@ -136,7 +136,7 @@ impl Axis {
     }
 }
 
-/// What the axes of a file are.
+/// Which axes of an NRRD file are colour, space and time, and their sizes.
 pub(super) struct Axes {
     all: Vec<Axis>,
     /// Places among all: of the axes in space, 2 or 3, and of time.
@@ -145,7 +145,7 @@ pub(super) struct Axes {
     pub channels: usize,
     pub size: [usize; 3],
     pub volumes: usize,
-    /// How samples are reordered; `None` if the axes are colours, space and time already, the fastest first.
+    /// How samples are reordered; `None` if the stored axes are colour, space and time in this order already, fastest first.
     pub reorder: Option<StoredOrder>,
 }
 
@@ -180,7 +180,10 @@ impl Axes {
         Ok(Axes { all, space, time: time.first().copied(), channels, size, volumes, reorder })
     }
 
-    /// Where the voxels are.
+    /// Map from the voxels to the world.
+    ///
+    /// # Errors
+    /// One line that names the file and the field: the axes or the origin are impossible.
     pub(super) fn world(&self, header: &Header, remarks: &mut Remarks) -> Result<World, InputError> {
         let sign = sign(header)?;
         let mut axes = [DVec3::X, DVec3::Y, DVec3::Z];
@@ -357,7 +360,7 @@ impl Axes {
         Ok(words.iter().any(|word| !word.is_empty()).then_some(words))
     }
 
-    /// Time stamps by frame, s. What is not in a known unit of time is no time stamp, and a remark says so.
+    /// Time stamp of each frame, s, by its index in the file. Empty, with a remark, if the times are in no known unit of time.
     pub(super) fn times(&self, header: &Header, remarks: &mut Remarks) -> Result<BTreeMap<usize, f64>, InputError> {
         let (slices, frames) = (self.size[2], self.size[2] * self.volumes);
         let beside = self.values_beside_colours(header);

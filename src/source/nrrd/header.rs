@@ -15,7 +15,7 @@ const MAX_HEADER_LINES: usize = 500_000;
 /// Most vectors of a field.
 const MAX_VECTORS: usize = 8;
 
-/// The fields of the format, and the keys of programs that are read.
+/// The fields of NRRD, and the keys of other programs that are read, with how they are treated.
 pub(in super::super) static KEYS: [Key; 36] = [
     Key::new("type", Aspect::Storage, Use::Used),
     Key::new("dimension", Aspect::Geometry, Use::Used),
@@ -69,14 +69,14 @@ const SPELLINGS: [(&str, &str); 10] = [
     ("sampleunits", "sample units"),
 ];
 
-/// The keys of PLUS for a whole sequence.
+/// Keys in which PLUS states properties of a whole sequence: its orientation and its type.
 pub(super) const ORIENTATION: &str = "ultrasound image orientation";
 pub(super) const IMAGE_TYPE: &str = "ultrasound image type";
 
 /// The start of the keys of a segment, before its number.
 const SEGMENT: &str = "segment";
 
-/// A vector of numbers that are written in brackets.
+/// The numbers of a vector that a header writes in brackets.
 pub(super) type Vector = Vec<f64>;
 
 pub(super) struct Header<'a> {
@@ -87,11 +87,11 @@ pub(super) struct Header<'a> {
     /// It has keys of segments.
     /// Keys of segments, in lower case, with their values.
     segments: HashMap<String, String>,
-    /// What PLUS says of the frames.
+    /// What keys of PLUS state of single frames.
     pub frames: PlusFrames,
-    /// The lines behind `data file: LIST`.
+    /// The lines after `data file: LIST`, each the name of a data file.
     pub list: Vec<String>,
-    /// Length up to and including the empty line, bytes.
+    /// Length of the header up to and including its empty line, bytes.
     pub length: u64,
 }
 
@@ -191,36 +191,39 @@ impl<'a> Header<'a> {
         self.get(field).map_or_else(|| self.fault(field, "is missing"), Ok)
     }
 
-    /// True if a field is stated.
+    /// True if the header has this field.
     pub(super) fn has(&self, field: &str) -> bool {
         self.stated.has(field)
     }
 
-    /// What was not used, once everything was read.
+    /// The fields that were not used; call it when everything was read. What a user must know of them is added to `remarks`.
     ///
     /// # Errors
-    /// A field that is refused.
+    /// A field for which the file has to be refused.
     pub(super) fn unused(self, remarks: &mut Vec<(String, String)>) -> Result<Unused, InputError> {
         let path = self.path;
         self.stated.finish(path, remarks).map_err(|(field, fault)| InputError::new(path, field, fault))
     }
 
-    /// The value of a key that a program added.
+    /// The value of a key that is not of NRRD itself but of a program; None if it is absent.
     pub(super) fn value(&self, key: &str) -> Option<&str> {
         self.values.get(key).map(String::as_str)
     }
 
-    /// True of a segmentation of 3D Slicer.
+    /// True if the file is a segmentation of 3D Slicer.
     pub(super) fn has_segments(&self) -> bool {
         self.segments.keys().any(|key| key.starts_with("segment0_"))
     }
 
-    /// What a segmentation states of a segment, by the number of the segment and the name of the field in lower case.
+    /// The value of a field, in lower case, of the segment with this number in a segmentation; None if it is absent.
     pub(super) fn of_segment(&self, segment: usize, field: &str) -> Option<&str> {
         self.segments.get(&format!("{SEGMENT}{segment}_{field}")).map(String::as_str)
     }
 
-    /// The words of a field, one for each of `count`; those in quotes may be empty. None if the field is absent.
+    /// The words of a field, which must be `count`. A word in quotes may be empty. None if the field is absent.
+    ///
+    /// # Errors
+    /// The field has another number of words.
     pub(super) fn words(&self, field: &str, count: usize) -> Result<Option<Vec<String>>, InputError> {
         let Some(text) = self.get(field) else { return Ok(None) };
         let words = words(text);
@@ -230,7 +233,11 @@ impl<'a> Header<'a> {
         Ok(Some(words))
     }
 
-    /// One number for each axis; None for what is not known (NaN), or if the field is absent.
+    /// The numbers of a field, one for each of `count` axes. None for an axis whose number is NaN (not known), and for all if the field is
+    /// absent.
+    ///
+    /// # Errors
+    /// The field has another number of entries, or one is not a finite number.
     pub(super) fn numbers(&self, field: &str, count: usize) -> Result<Vec<Option<f64>>, InputError> {
         let Some(words) = self.words(field, count)? else { return Ok(vec![None; count]) };
         let mut numbers = Vec::new();
@@ -244,7 +251,10 @@ impl<'a> Header<'a> {
         Ok(numbers)
     }
 
-    /// Vectors in brackets, or None for `none`; None if the field is absent.
+    /// The vectors of a field. An inner None stands for the word `none`; the result is None if the field is absent.
+    ///
+    /// # Errors
+    /// The field is not a list of vectors in brackets.
     pub(super) fn vectors(&self, field: &str) -> Result<Option<Vec<Option<Vector>>>, InputError> {
         let Some(mut rest) = self.get(field) else { return Ok(None) };
         let mut vectors = Vec::new();

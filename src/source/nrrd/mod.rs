@@ -39,7 +39,7 @@ const NUMBERS: [(&[&str], Number); 10] = [
     (&["double"], Number::F64),
 ];
 
-/// True if a file begins like this.
+/// True if a file that begins with these bytes is NRRD.
 pub(super) fn is_one(start: &[u8]) -> bool {
     start.starts_with(b"NRRD000")
 }
@@ -105,7 +105,10 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
     Ok(layout)
 }
 
-/// The segments of a segmentation, in their order: label, name, and colour.
+/// Label, name and colour (red, green, blue, 0..=1) of each segment of a segmentation, in their order.
+///
+/// # Errors
+/// The file cannot be read, or states a label that is no number of 8 bits.
 pub(super) fn segments(path: &Path) -> Result<Vec<(u8, String, [f64; 3])>, InputError> {
     let header = Header::read(&InputFile::new(path)?)?;
     let one = |n: usize| {

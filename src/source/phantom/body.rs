@@ -12,15 +12,15 @@ use std::fmt;
 use std::path::Path;
 use std::str::FromStr;
 
-/// The body that is scanned.
+/// The object that the phantom's probe scans.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Body {
-    /// A fetal head, a hand and a cord in fluid behind the uterine wall; moving.
+    /// A fetal head, a hand and a cord in fluid behind the uterine wall; they move.
     #[default]
     Head,
     /// A bright ball in dark fluid.
     Sphere,
-    /// Dark above a plane across the beam, bright below it.
+    /// Dark above a plane across the beam, bright below.
     Step,
     /// Thin bright wires in dark fluid.
     Wires,
@@ -51,7 +51,7 @@ impl Body {
         }
     }
 
-    /// The labels of the body's truth. Empty if a formula describes the body.
+    /// The labels that this object's ground truth can have. Empty if a formula describes the object.
     pub fn labels(self) -> &'static [Label] {
         match self {
             Body::Head => &Label::ALL[..10],
@@ -85,7 +85,7 @@ pub struct Wire {
 }
 
 impl Wire {
-    /// Distance from the wire, mm.
+    /// Distance of a position from the wire's axis, mm.
     pub fn distance(&self, place: DVec3) -> f64 {
         let along = self.to - self.from;
         let share = ((place - self.from).dot(along) / along.length_squared()).clamp(0.0, 1.0);
@@ -93,8 +93,8 @@ impl Wire {
     }
 }
 
-/// Grey = `middle` + `per_mm` (range - `range`) + `per_line_rad` line angle + `per_motor_rad` motor angle. Range is from the
-/// in-plane apex. Trilinear interpolation between samples reproduces it, for both directions of the sweep.
+/// The formula grey = `middle` + `per_mm` (range - `range`) + `per_line_rad` line angle + `per_motor_rad` motor angle. Range is the distance
+/// from the in-plane apex, mm; angles are in rad. Trilinear interpolation between samples reproduces it, for both directions of the sweep.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RampTruth {
     pub middle: f64,
@@ -113,12 +113,12 @@ impl RampTruth {
     }
 }
 
-/// The ground truth: positions in mm in the space of [`Probe`], grey values 0..255 without speckle.
+/// The ground truth of the scanned object: positions in mm in the coordinates of [`Probe`], grey values 0..255 without speckle.
 ///
 /// Edges are linear in grey over one sample along the beam, with the middle grey on the edge itself.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Truth {
-    /// No formula describes the body.
+    /// The head, which no formula describes.
     Head,
     Sphere {
         centre: DVec3,
@@ -126,13 +126,13 @@ pub enum Truth {
         inside: f64,
         outside: f64,
     },
-    /// The plane Y = `y`.
+    /// Grey `above` and `below` the plane Y = `y`.
     Step {
         y: f64,
         above: f64,
         below: f64,
     },
-    /// `peak` is the grey on a wire; it falls as a parabola, `per_mm2` times the square of the distance, down to `outside`.
+    /// Grey `peak` on the axis of a wire, minus `per_mm2` times the square of the distance from it, but at least `outside`.
     Wires {
         wires: Vec<Wire>,
         peak: f64,
@@ -147,17 +147,17 @@ pub enum Truth {
     Vessels(VesselTree),
 }
 
-/// A ball of blood in a wall, whose radius changes with time.
+/// A ball of blood in a muscular wall, whose radius changes with time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HeartTruth {
     pub centre: DVec3,
-    /// Radius of the blood, mm: at the end of systole and at the end of diastole.
+    /// Radius of the blood, mm, at the end of systole and at the end of diastole.
     pub radii: [f64; 2],
-    /// Thickness of the wall, mm.
+    /// Thickness of the muscular wall, mm.
     pub wall: f64,
-    /// Length of a cycle at the mean rate, s.
+    /// Length of a heart cycle at the mean rate, s.
     pub period: f64,
-    /// Share of the mean rate by which the rate rises and falls, within 8 s.
+    /// Amplitude of the change of the heart rate, as a share of its mean. One rise and fall takes 8 s.
     pub swing: f64,
     pub blood: f64,
     pub muscle: f64,
@@ -170,13 +170,13 @@ impl HeartTruth {
     /// In so many seconds the rate rises, falls below the mean and comes back.
     const SWING_SECONDS: f64 = 8.0;
 
-    /// Number of cycles since time 0. It is whole at the end of each diastole.
+    /// Number of heart cycles, fractional, from time 0 to `time` s. It is whole at the end of each diastole.
     pub fn cycles(&self, time: f64) -> f64 {
         let turn = std::f64::consts::TAU / HeartTruth::SWING_SECONDS;
         (time + self.swing * (1.0 - (turn * time).cos()) / turn) / self.period
     }
 
-    /// Radius of the blood, mm, at a phase in cycles. It is largest at phase 0.
+    /// Radius of the blood, mm, at a phase (in cycles). It is largest at phase 0.
     pub fn radius(&self, phase: f64) -> f64 {
         let phase = phase.rem_euclid(1.0);
         let filled = match phase < HeartTruth::SYSTOLE {
@@ -200,14 +200,14 @@ const WIRE_PEAK: f64 = 250.0;
 /// Grey falls by this times the square of the distance: a wire is 2.9 mm wide in all, so that no frame pitch misses it.
 const WIRE_FALL: f64 = 107.0;
 
-/// A body in front of a probe.
+/// The echoes of a scanned object as a function of position and time.
 pub(super) enum Scatterers {
     Head(Box<Head>),
     Exact { truth: Truth, pitch: f64 },
 }
 
 impl Scatterers {
-    /// The scatterers of the body that the options name.
+    /// The object that `options.body` names, placed before the face of the probe.
     pub fn new(options: &PhantomOptions, probe: &Probe) -> Scatterers {
         let PhantomOptions { still, gap, clutter_db, .. } = *options;
         let face = probe.array_radius();
@@ -273,7 +273,7 @@ impl Scatterers {
         }
     }
 
-    /// Writes the echoes of the samples of a line, in dB re full scale, from sample 0 on: as many as `out` holds.
+    /// Computes the echoes of the first samples of a scan line, as many as `out` has room for.
     pub fn along(&self, beam: &Beam, out: &mut [Echo]) {
         match self {
             Scatterers::Head(head) => head.along(beam, out),
@@ -324,7 +324,7 @@ fn exact(truth: &Truth, beam: &Beam, sample: usize, pitch: f64) -> Echo {
     Echo { diffuse: level(diffuse), ..Echo::SILENT }
 }
 
-/// An option of the phantom that is out of its range.
+/// The error that an option of the phantom is out of its range.
 pub(super) fn refusal(field: impl AsRef<str>, fault: impl AsRef<str>) -> InputError {
     InputError::new(Path::new("phantom"), field, fault)
 }

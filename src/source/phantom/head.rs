@@ -53,11 +53,11 @@ const SCALE: f32 = 1.0;
 /// The distances of the model may grow faster than the point moves. So much of a distance is safe to skip.
 const SAFE_STEP: f32 = 0.6;
 
-/// What is around the fetus, and whether it moves.
+/// The fluid and the clutter around the fetus, and whether anything moves.
 pub(super) struct Surroundings {
-    /// Nothing moves.
+    /// True if nothing moves.
     pub still: bool,
-    /// Fluid between the near wall and the fetus where they are nearest, mm.
+    /// Least distance between the near uterine wall and the fetus, filled by fluid, mm.
     pub gap: f64,
     /// Level of the clutter, dB re full scale; None: no clutter.
     pub clutter_db: Option<f64>,
@@ -204,7 +204,7 @@ impl Head {
         }
     }
 
-    /// Distance of a place from the skin at a time, mm, negative inside; to first order, so exact on the skin itself.
+    /// Distance of a position (mm) from the skin at a time (s), mm, negative inside. It is exact on the skin and correct to first order near it.
     pub fn distance(&self, place: Vec3, time: f64) -> f32 {
         // Far from the skin the slope is that of the bounds, not of the surface.
         const NEAR: f32 = 2.0;

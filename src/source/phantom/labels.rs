@@ -1,6 +1,6 @@
 //! The names of what the volumes of head and vessels hold, as a label volume numbers them.
 
-/// What is at a point of the fetal head's volume, or of the vessels'. The number of a label never changes.
+/// The tissue at a point in the volume of the fetal head or of the vessels, as stored in label volumes. The number of a label never changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Label {
@@ -19,10 +19,10 @@ pub enum Label {
     Falx = 8,
     /// The wall of the uterus and what is outside of it.
     Uterus = 9,
-    /// Of the vessels.
+    /// Blood in the vessels.
     Blood = 10,
     VesselWall = 11,
-    /// The tissue that the vessels lie in.
+    /// The liver tissue around the vessels.
     Liver = 12,
 }
 
@@ -61,7 +61,7 @@ impl Label {
         }
     }
 
-    /// The colour of a segmentation: red, green, blue, 0..=1.
+    /// The colour of this label in a segmentation: red, green, blue, 0..=1.
     pub fn colour(self) -> [f64; 3] {
         match self {
             Label::Fluid => [0.0; 3],

@@ -5,7 +5,7 @@ use glam::{Vec3, vec3};
 use std::f32::consts::TAU;
 use std::sync::LazyLock;
 
-/// A hand beside the cheek, its back to the probe, fingers up.
+/// A hand beside the cheek, its back towards the probe, fingers up.
 pub(super) struct Hand {
     fingers: [Finger; 4],
 }
@@ -19,7 +19,7 @@ struct Finger {
 const HAND: Vec3 = vec3(3.5, -1.0, 1.5);
 
 impl Hand {
-    /// `curl`: flexion of the fingers, 0..=1.
+    /// `curl`: flexion of the fingers, from 0 (stretched) to 1.
     pub fn new(curl: f32) -> Hand {
         // First knuckle, length of the first bone, sideways slope, and how much more than the index it flexes.
         const FINGERS: [(f32, f32, f32, f32, f32); 4] = [
@@ -46,7 +46,7 @@ impl Hand {
         Hand { fingers: std::array::from_fn(finger) }
     }
 
-    /// Distance from the skin, mm, negative inside.
+    /// Distance of a position from the skin of the hand, mm, negative inside.
     pub fn distance(&self, p: Vec3) -> f32 {
         let p = p - HAND;
         let bound = ball(p, vec3(40.0, -40.0, -10.0), 40.0);
@@ -77,7 +77,8 @@ impl Hand {
 }
 
 impl Hand {
-    /// Distance from the nearest bone of fingers, thumb, palm and forearm, mm, negative inside. The joints are of cartilage, which is dark.
+    /// Distance of a position from the nearest bone of fingers, thumb, palm and forearm, mm, negative inside. The joints are of cartilage, which
+    /// is dark, and do not count.
     pub fn bone(&self, p: Vec3) -> f32 {
         /// Shares of the way from joint to joint at which bone begins and ends.
         const SHAFT: [f32; 2] = [0.14, 0.86];
@@ -168,7 +169,7 @@ const TWIST: f32 = 26.0;
 /// Radius of the cord with its strands, mm.
 const CORD: f32 = 2.0 * STRAND;
 
-/// Distance from the umbilical cord, mm, negative inside: three strands, two arteries and a vein, twisted to a rope of 11.6 mm.
+/// Distance of a position from the umbilical cord, mm, negative inside: three strands, two arteries and a vein, twisted to a rope 11.6 mm thick.
 pub(super) fn cord(p: Vec3) -> f32 {
     // A box around the centreline.
     let (low, high) = (vec3(-88.0, -64.0, -39.0), vec3(-5.0, 49.0, -9.0));
@@ -217,7 +218,7 @@ pub(super) fn cord(p: Vec3) -> f32 {
     join(strand(angle), strand(third - angle), 1.0)
 }
 
-/// Distance from shoulders and chest below the chin, mm, negative inside.
+/// Distance of a position from shoulders and chest below the chin, mm, negative inside.
 pub(super) fn shoulders(p: Vec3) -> f32 {
     let shoulder = rod(one_side(p), vec3(8.0, -64.0, -48.0), vec3(38.0, -70.0, -48.0), [15.0, 13.0]);
     join(shoulder, ellipsoid(p, vec3(0.0, -84.0, -46.0), vec3(36.0, 26.0, 24.0)), 10.0)

@@ -44,9 +44,9 @@ use std::path::Path;
 const ARRAY_RADIUS: f64 = 40.0;
 const WOBBLE_RADIUS: f64 = 25.0;
 const SECTOR_ANGLE_DEG: f64 = 75.0;
-/// Default angle from the first frame to the last.
+/// Default angle between the first and the last frame of a volume, degrees.
 pub const FAN_ANGLE_DEG: f64 = 61.0;
-/// Default distance of the near wall from the fetus where they are nearest, mm, which is also the largest.
+/// Default of [`PhantomOptions::gap`], mm, which is also its largest value.
 pub const GAP: f64 = 29.9;
 /// Depth of the last sample, mm.
 const END_DEPTH: f64 = 120.0;
@@ -61,9 +61,9 @@ const MAX_VOLUME_SAMPLES: usize = 1 << 25;
 pub enum Speckle {
     /// One realisation of the speckle, as a probe sees it.
     Random,
-    /// The mean grey value over all realisations, blurred by the probe: what a filter of speckle should find.
+    /// The mean grey value over all realisations of the speckle, blurred by the probe: the ideal result of a speckle filter.
     Mean,
-    /// No speckle: samples are the exact echogenicity, without the blur of the probe.
+    /// No speckle: samples are the exact echogenicity, not blurred by the probe.
     None,
 }
 
@@ -80,32 +80,33 @@ impl Speckle {
 /// Options of a [`Phantom`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct PhantomOptions {
-    /// Seed of the speckle. The body does not depend on it.
+    /// Seed of the random speckle. The scanned object does not depend on it.
     pub seed: u64,
     pub body: Body,
     /// Number of volumes, consecutive in time, 1..=10000.
     pub volumes: usize,
-    /// Every second volume is swept backwards.
+    /// True if every second volume is swept backwards.
     pub both_ways: bool,
     pub speckle: Speckle,
-    /// Fraction of the distance to the next frame that the motor travels while one frame is acquired, 0..=1.
+    /// Share of the distance between two frames that the motor travels while one frame is acquired, 0..=1.
     pub speed_ratio: f64,
-    /// Frames a volume, 2..=1024.
+    /// Number of frames of a volume, 2..=1024.
     pub frames: usize,
-    /// Scan lines a frame, 2..=1024.
+    /// Number of scan lines of a frame, 2..=1024.
     pub lines: usize,
-    /// Samples a line, 16..=8192, over a depth of 120 mm.
+    /// Number of samples of a line, 16..=8192, over a depth of 120 mm.
     pub samples: usize,
-    /// Angle from the first frame to the last, degrees, 10..=120.
+    /// Angle between the first and the last frame of a volume, degrees, 10..=120.
     pub fan_angle_deg: f64,
     pub point_spread: PointSpread,
-    /// The head does not move, the heart does not beat.
+    /// True if the head does not move and the heart does not beat.
     pub still: bool,
-    /// Share by which the rate of the heart rises and falls, 0..=0.3.
+    /// Amplitude of the change of the heart rate, as a share of its mean, 0..=0.3.
     pub heart_swing: f64,
-    /// Fluid between the near uterine wall and the fetus of body head where they are nearest, mm, 0..=29.9: the wall is so much thicker.
+    /// Least distance between the near uterine wall and the fetus of body head, filled by fluid, mm, 0..=29.9. A smaller gap makes the wall
+    /// thicker.
     pub gap: f64,
-    /// Level of clutter in body head, dB re full scale, -60..=0: haze of reverberations and side lobes everywhere. None is none.
+    /// Level of clutter in body head, a haze of reverberations and side lobes everywhere, dB re full scale, -60..=0. None: no clutter.
     pub clutter_db: Option<f64>,
     /// The bodies head and vessels: how the body was moved before the sweep. Its place without is that of the other bodies.
     pub moved: Rigid,
@@ -149,8 +150,10 @@ pub struct Phantom {
 }
 
 impl Phantom {
+    /// Checks the options and makes the phantom.
+    ///
     /// # Errors
-    /// An option that is out of its range.
+    /// An option is out of its range.
     pub fn new(options: PhantomOptions) -> Result<Phantom, InputError> {
         let whole = |field, value: usize, least: usize, most: usize| match (least..=most).contains(&value) {
             true => Ok(()),
@@ -216,17 +219,17 @@ impl Phantom {
         self.volumes.count
     }
 
-    /// The probe of a volume, including the motor's travel during each frame.
+    /// The probe during the volume of this index, including the motor's travel during each frame.
     pub fn probe(&self, volume: usize) -> Probe {
         self.volumes.swept(volume, &self.probe)
     }
 
-    /// The ground truth of the body, in the space of [`Probe`] and in grey values without speckle.
+    /// The ground truth of the scanned object: positions in the coordinates of [`Probe`], grey values without speckle.
     pub fn truth(&self) -> Truth {
         self.scatterers.truth()
     }
 
-    /// The frames of a volume in order of acquisition: u8, log-compressed over [`DYNAMIC_RANGE`].
+    /// Computes the frames of a volume, in order of acquisition. Samples are u8, log-compressed over [`DYNAMIC_RANGE`].
     pub fn volume(&self, volume: usize) -> Vec<Frame> {
         let probe = self.probe(volume);
         let backward = self.volumes.backward(volume);
@@ -288,10 +291,11 @@ impl Phantom {
         ((volume * frames + self.number_of(volume, slice)) * lines + line) as f64 * each
     }
 
-    /// Writes all volumes as a PLUS sequence (`.mha`), and its probe file `<stem>.probe.toml`. Both files are complete, or neither exists.
+    /// Writes all volumes as a PLUS sequence (`.mha`), and the probe file `<stem>.probe.toml`. Either both files exist and are complete, or
+    /// neither does.
     ///
     /// # Errors
-    /// More than 20000 frames, a path that does not end in .mha, a file that cannot be written.
+    /// More than 20000 frames, a path that does not end in .mha, or a file that cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), InputError> {
         write_sequence(self, path)
     }

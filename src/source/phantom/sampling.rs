@@ -5,20 +5,22 @@ use crate::files::InputError;
 use std::fmt;
 use std::str::FromStr;
 
-/// Standard deviations of the point-spread function of the field, of which the magnitude is shown. 0 is no blur.
+/// Standard deviations of the Gaussian point-spread function of the complex field, whose magnitude is the image. 0 is no blur.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointSpread {
-    /// Along a scan line, mm, 0..=5.
+    /// Standard deviation along a scan line, mm, 0..=5.
     pub axial_mm: f64,
-    /// From line to line at the focus, degrees, 0..=10. Away from the focus it is wider.
+    /// Standard deviation across scan lines at the focus, degrees, 0..=10. It is larger away from the focus.
     pub lateral_deg: f64,
-    /// From frame to frame, degrees, 0..=10.
+    /// Standard deviation across frames, degrees, 0..=10.
     pub elevation_deg: f64,
 }
 
 impl PointSpread {
+    /// Checks the ranges.
+    ///
     /// # Errors
-    /// A standard deviation that is out of its range.
+    /// A standard deviation is out of its range.
     pub(super) fn check(&self) -> Result<(), InputError> {
         let parts = [
             ("psf_axial", self.axial_mm, 5),
@@ -37,7 +39,7 @@ impl PointSpread {
 /// Named sets of [`PhantomOptions`]: how densely the head is scanned, how wide the beam is, and whether the fetus moves.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Sampling {
-    /// What a live probe acquires in under a second: 37 frames of 128 lines.
+    /// As a live probe acquires in under a second: 37 frames of 128 lines.
     #[default]
     Live,
     /// A slow, dense sweep of a fetus at rest, for stills: 111 frames of 192 lines and a narrower beam.
@@ -54,7 +56,7 @@ impl Sampling {
         }
     }
 
-    /// One volume of the head in this sampling.
+    /// Options for one volume of the head with this sampling.
     pub fn options(self) -> PhantomOptions {
         let live = PhantomOptions::default();
         match self {

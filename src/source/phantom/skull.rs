@@ -11,7 +11,7 @@ const CALVARIA: f32 = 1.8;
 /// Thickness of a bone's shell, mm. What is inside of it is brain, marrow or soft tissue.
 const SHELL: f32 = 1.6;
 
-/// True in the shell of a bone. `mouth` is how far the jaw is lowered, mm.
+/// True if a position in the head's coordinates lies in the shell of a bone. `mouth`: how far the jaw is lowered, mm.
 pub(super) fn is_bone(p: Vec3, mouth: f32) -> bool {
     let inside = -bone(p, mouth);
     inside > 0.0 && inside < SHELL && !is_suture(p)
@@ -22,7 +22,8 @@ fn is_suture(p: Vec3) -> bool {
     p.y > 14.0 && p.z > -42.0 && p.x.abs() < 0.6 + 0.06 * (p.y - 14.0)
 }
 
-/// Distance from the outer surface of the bones, mm, negative inside: vault, brows, nose, cheek bones, both jaws. The eye sockets have none.
+/// Distance of a position in the head's coordinates from the outer surface of the nearest bone, mm, negative inside: vault, brows, nose, cheek
+/// bones, both jaws. The eye sockets are open.
 pub(super) fn bone(p: Vec3, mouth: f32) -> f32 {
     let q = one_side(p);
     let vault = ellipsoid(p, VAULT, VAULT_RADII - SCALP);
@@ -37,7 +38,7 @@ pub(super) fn bone(p: Vec3, mouth: f32) -> f32 {
     carve(vault.min(face), sockets, 1.0).min(nose)
 }
 
-/// What is inside the vault.
+/// The tissues inside the vault of the skull.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Intracranial {
     /// White matter and cortex.
@@ -54,7 +55,7 @@ pub(super) enum Intracranial {
     Fluid,
 }
 
-/// The part inside the vault at a point; None outside of the vault.
+/// The tissue inside the vault at a position in the head's coordinates; None outside the vault.
 pub(super) fn intracranial(p: Vec3) -> Option<Intracranial> {
     let inside = -ellipsoid(p, VAULT, VAULT_RADII - (SCALP + CALVARIA));
     if inside < 0.0 {

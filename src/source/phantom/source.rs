@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 
-/// A source of the volumes of a phantom.
+/// A [`Source`] that delivers the volumes of a phantom.
 pub struct PhantomSource {
     phantom: Arc<Phantom>,
     /// The volumes in their order, if a thread computes them in advance.
@@ -20,13 +20,12 @@ pub struct PhantomSource {
 }
 
 impl PhantomSource {
-    /// Computes a volume when it is asked for, and keeps one.
+    /// Computes each volume when its frames are requested, and keeps only that one.
     pub fn new(phantom: Phantom) -> PhantomSource {
         PhantomSource { phantom: Arc::new(phantom), arriving: None, volumes: BTreeMap::new(), next: (0, 0) }
     }
 
-    /// Begins to compute the volumes of the phantom, each once and before it is asked for: only the first ones are waited for. They take one
-    /// byte a sample.
+    /// Computes all volumes once, on a thread, ahead of requests, so that callers wait only for the first ones. They take one byte a sample.
     pub fn cached(phantom: Phantom) -> PhantomSource {
         let mut source = PhantomSource::new(phantom);
         let (send, arriving) = channel();

@@ -9,29 +9,29 @@ use crate::probe::{Indices, Probe};
 use glam::{DAffine3, DVec3, Vec3};
 use rayon::prelude::*;
 
-/// Range of the grey scale, dB: 255 is 0 dB, 0 is so far below.
+/// Range of the grey scale, dB: grey 255 is 0 dB re full scale, grey 0 is this many dB below.
 pub const DYNAMIC_RANGE: f64 = 50.0;
 
-/// Position, direction and time of one scan line. Space is that of [`Probe`], mm.
+/// Position, direction and time of one scan line, in the coordinates of [`Probe`], mm.
 pub(super) struct Beam {
-    /// Position of sample 0.
+    /// Position of sample 0 of the line, mm.
     pub first: DVec3,
-    /// Step from one sample to the next. Both maps of the probe are linear along a line.
+    /// Vector from a sample to the next, mm. Both maps of the probe are linear along a line.
     pub step: DVec3,
     /// Distance from sample to sample, mm.
     pub pitch: f64,
-    /// Depth of sample 0 below the array, mm.
+    /// Distance of sample 0 from the face of the array, mm.
     pub start_depth: f64,
-    /// Range of sample 0 from the in-plane apex, mm; angle of the line and of the motor, rad.
+    /// Distance of sample 0 from the in-plane apex, mm. `line_angle` and `motor_angle` are in rad.
     pub range: f64,
     pub line_angle: f64,
     pub motor_angle: f64,
-    /// When it was fired, s.
+    /// Time at which the line was fired, s.
     pub time: f64,
 }
 
 impl Beam {
-    /// The beam of a line at a fractional slice, which may lie beyond the ends of the sweep.
+    /// The beam of line `line` at a fractional slice, which may lie beyond the ends of the sweep, fired at `time` s.
     pub fn new(probe: &Probe, line: usize, slice: f64, time: f64) -> Beam {
         let line = line as f64;
         let place = |sample| probe.to_space(Indices { sample, line, slice });
@@ -59,31 +59,31 @@ impl Beam {
         self.first + self.step * sample as f64
     }
 
-    /// In f32, for bodies that need no higher precision.
+    /// Position of a sample in f32, for objects that need no higher precision.
     pub(crate) fn rough_place(&self, sample: usize) -> Vec3 {
         self.place(sample).as_vec3()
     }
 
-    /// Unit vector away from the probe.
+    /// Unit vector along the line, away from the probe.
     pub fn direction(&self) -> Vec3 {
         (self.step / self.pitch).as_vec3()
     }
 }
 
-/// Echo of a point, dB re full scale.
+/// Levels of the echo from a point, dB re full scale.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Echo {
-    /// Level of the echo from many unresolved scatterers, which give speckle.
+    /// Level of the echo from many unresolved scatterers, which causes speckle.
     pub diffuse: f32,
-    /// Level of the echo from a surface or wire, without speckle.
+    /// Level of the specular echo from a surface or wire, which has no speckle.
     pub mirror: f32,
 }
 
 impl Echo {
-    /// Far below the dynamic range.
+    /// No echo: levels far below the dynamic range.
     pub(crate) const SILENT: Echo = Echo { diffuse: -200.0, mirror: -200.0 };
 
-    /// The level without speckle: the sum of both powers, dB.
+    /// The level without speckle, dB re full scale: that of the sum of both powers.
     pub fn bare(self) -> f32 {
         if self.mirror <= Echo::SILENT.mirror {
             return self.diffuse;
@@ -92,7 +92,7 @@ impl Echo {
     }
 }
 
-/// Grey value of an echo in dB re full scale.
+/// Grey value of a level in dB re full scale; saturates at 0 and 255.
 pub(super) fn grey(level: f32) -> u8 {
     // Saturates at 0 and 255.
     ((1.0 + level / DYNAMIC_RANGE as f32) * 255.0).round() as u8
@@ -112,7 +112,7 @@ struct Field {
     im: Vec<f32>,
 }
 
-/// Grey values of all slices of a volume, in geometric order like `echoes`.
+/// Grey values of all slices of a volume with speckle. `echoes` and the result: one list for each slice, in geometric order.
 pub(super) fn slices(echoes: &[Vec<Echo>], probe: &Probe, psf: &PointSpread, seed: u64, volume: u64) -> Vec<Vec<u8>> {
     let blur = Blur::new(probe, psf);
     let fields: Vec<Field> = echoes
@@ -135,8 +135,9 @@ pub(super) fn slices(echoes: &[Vec<Echo>], probe: &Probe, psf: &PointSpread, see
         .collect()
 }
 
-/// Grey values of all slices of a volume as their mean over all speckle, in geometric order like `echoes`: the frame that a filter of speckle
-/// should find. The power of the scatterers is blurred by the square of the point-spread function, the specular echo by the function itself.
+/// Grey values of all slices of a volume as the mean over all realisations of the speckle, which is the ideal result of a speckle filter.
+/// `echoes` and the result: one list for each slice, in geometric order. The power of the scatterers is blurred by the square of the
+/// point-spread function, the specular echo by the function itself.
 pub(super) fn mean_slices(echoes: &[Vec<Echo>], probe: &Probe, psf: &PointSpread) -> Vec<Vec<u8>> {
     let blur = Blur::new(probe, psf);
     let squared = blur.squared();

@@ -14,7 +14,7 @@ use crate::volume_file::VolumeFile;
 use glam::DVec3;
 use std::path::{Path, PathBuf};
 
-/// Path of the file of signed distances that belongs to a label volume: `truth.mha` and `truth.seg.nrrd` give `truth.distance.mha`.
+/// Path of the file of signed distances beside a label volume: `truth.distance.mha` for both `truth.mha` and `truth.seg.nrrd`.
 pub fn distance_path(labels: &Path) -> PathBuf {
     match segmentation::stem(labels) {
         Some(stem) => labels.with_file_name(format!("{stem}.distance.mha")),
@@ -29,10 +29,11 @@ enum Labelled<'a> {
 }
 
 impl Phantom {
-    /// The label at a place of the space of [`crate::probe::Probe`], mm, in a volume, at the time at which the beam passes there.
+    /// The label at a position in the coordinates of [`crate::probe::Probe`], mm, at the time at which the beam passes there in the volume of
+    /// this index.
     ///
     /// # Errors
-    /// A body other than head and vessels, which has a formula instead: [`Phantom::truth`].
+    /// The body is neither head nor vessels; [`Phantom::truth`] has its formula.
     pub fn label(&self, volume: usize, place: DVec3) -> Result<Label, InputError> {
         Ok(match self.labelled()? {
             Labelled::Head(head) => head.label(self.own(place).as_vec3(), self.time_at(volume, place)),
@@ -44,8 +45,8 @@ impl Phantom {
         })
     }
 
-    /// Distance of such a place from the skin of head, trunk, hand or cord, mm, negative inside; to first order, so exact on
-    /// the skin itself. The uterus does not count. Of vessels: from the blood.
+    /// Distance of a position, given as for [`Phantom::label`], from the skin of head, trunk, hand or cord (not of the uterus), or for vessels
+    /// from the blood; mm, negative inside. It is exact on the surface and correct to first order near it.
     ///
     /// # Errors
     /// As [`Phantom::label`].
@@ -56,20 +57,20 @@ impl Phantom {
         })
     }
 
-    /// The grid of the truth: over the insonified region, as [`lattice`] of the sweep, `spacing` mm apart.
+    /// The grid for writing the ground truth: `spacing` mm apart over the insonified region, as [`lattice`] makes it.
     ///
     /// # Errors
-    /// A body other than head and vessels, a spacing that is no length or makes too many voxels.
+    /// The body is neither head nor vessels, or the spacing is no length or makes too many voxels.
     pub fn truth_grid(&self, spacing: f64) -> Result<Grid, InputError> {
         self.labelled()?;
         lattice(&Geometry::Sweep(self.probe(0)), spacing).map_err(|fault| refusal("truth_spacing", fault))
     }
 
-    /// Writes the truth of the first volume on a grid: labels (u8, [`Label`]) to `path`, a MetaImage or a segmentation with the labels'
-    /// names, distances (f32, mm, as [`Phantom::distance`]) to [`distance_path`], a MetaImage. Both have values outside the sector, too.
+    /// Writes the ground truth of the first volume on a grid. Labels (u8, [`Label`]) go to `path`, a MetaImage or a segmentation with their
+    /// names. Distances (f32, mm, see [`Phantom::distance`]) go to [`distance_path`], a MetaImage. Both have values outside the sector, too.
     ///
     /// # Errors
-    /// A body other than head and vessels, a path that does not end in .mha or .seg.nrrd, a file that cannot be written. A file that is there is
+    /// The body is neither head nor vessels, the path does not end in .mha or .seg.nrrd, or a file cannot be written. A file that exists is
     /// complete.
     pub fn write_truth(&self, path: &Path, grid: &Grid) -> Result<(), InputError> {
         self.labelled()?;

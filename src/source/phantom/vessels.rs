@@ -6,19 +6,20 @@
 
 use glam::{DQuat, DVec3};
 
-/// A piece of a vessel between two divisions: a truncated cone, mm. Its ends are round.
+/// A piece of a vessel between two divisions: a truncated cone with round ends, in mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Vessel {
     pub from: DVec3,
     pub to: DVec3,
-    /// Radius of the blood at `from` and at `to`.
+    /// Radius of the blood at `from` and at `to`, mm.
     pub radii: [f64; 2],
     /// Index of the vessel that this one branches from. None for the trunk.
     pub parent: Option<usize>,
 }
 
 impl Vessel {
-    /// Distance from the blood, mm, negative inside: along the perpendicular to the axis, so exact on the surface.
+    /// Distance of a position from the blood of this piece, mm, negative inside, measured perpendicular to its axis, so that it is exact on the
+    /// surface.
     pub fn distance(&self, place: DVec3) -> f64 {
         let along = self.to - self.from;
         let share = ((place - self.from).dot(along) / along.length_squared()).clamp(0.0, 1.0);
@@ -27,12 +28,12 @@ impl Vessel {
     }
 }
 
-/// A tree of vessels with the same wall around all, and the grey values of blood, wall and tissue.
+/// A tree of vessels in liver tissue, all with a wall of the same thickness, and the grey values of blood, wall and tissue.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VesselTree {
-    /// The trunk comes first, and each vessel after its parent.
+    /// The pieces of the tree: the trunk first, and each one after its parent.
     pub vessels: Vec<Vessel>,
-    /// Thickness of the wall, mm.
+    /// Thickness of the wall of all vessels, mm.
     pub wall: f64,
     pub blood: f64,
     pub muscle: f64,
@@ -121,7 +122,7 @@ impl VesselTree {
         VesselTree { vessels, wall: WALL, blood, muscle, tissue }
     }
 
-    /// Distance from the blood, mm, negative inside.
+    /// Distance of a position from the blood of the nearest vessel, mm, negative inside.
     pub fn distance(&self, place: DVec3) -> f64 {
         self.vessels.iter().map(|vessel| vessel.distance(place)).fold(f64::MAX, f64::min)
     }

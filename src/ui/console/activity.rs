@@ -8,7 +8,7 @@ const STEP_PAUSE: Duration = Duration::from_millis(500);
 /// A picture that takes longer is said to be drawn.
 const PATIENCE: Duration = Duration::from_millis(500);
 
-/// The user's last actions, and those that no picture shows yet.
+/// Times of the user's last actions, and of those whose effect no picture shows yet.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Activity {
     acted: Instant,
@@ -24,7 +24,7 @@ impl Activity {
         Activity { acted: now, changed: now, unsent: None, unshown: None }
     }
 
-    /// Records that the user did something.
+    /// Notes that the user did something.
     pub(super) fn acts(&mut self, now: Instant) {
         self.acted = self.acted.max(now);
     }
@@ -34,40 +34,42 @@ impl Activity {
         self.acted
     }
 
-    /// Records a change of settings or of marks on the picture.
+    /// Notes that settings, or marks on the picture, were changed.
     pub(super) fn changes(&mut self, now: Instant) {
         self.changed = now;
     }
 
-    /// Records a change of settings, which a picture will show.
+    /// Notes that settings were changed, the effect of which a picture will show.
     pub(super) fn changes_settings(&mut self, now: Instant) {
         self.changes(now);
         self.awaits_picture(now);
     }
 
-    /// Records that a picture will show the effect of what the user did.
+    /// Notes that a picture will show the effect of what the user did.
     pub(super) fn awaits_picture(&mut self, now: Instant) {
         self.unsent.get_or_insert(now);
     }
 
-    /// True if nothing changed for so long that the next change is a step of undo of its own.
+    /// True if the last change was so long ago that the next one becomes a step of undo of its own.
     pub(super) fn has_paused(&self, now: Instant) -> bool {
         now.saturating_duration_since(self.changed) > STEP_PAUSE
     }
 
-    /// Records that settings were sent to the stream.
+    /// Notes that settings were sent to the stream.
     pub(super) fn settings_sent(&mut self, now: Instant) {
         let first = self.unsent.take().or(self.unshown.map(|(input, _)| input));
         self.unshown = first.map(|input| (input, now));
     }
 
-    /// When the window is to say that a picture of the user's action is being drawn; none if none is awaited.
+    /// Time from which on the window says that the picture with the effect of the user's action is being drawn. None if no such picture is
+    /// awaited.
     pub(super) fn says_it_works_at(&self) -> Option<Instant> {
         let since = self.unshown.map(|(input, _)| input).or(self.unsent)?;
         Some(since + PATIENCE)
     }
 
-    /// Records that a picture is shown that was begun at this time. Returns the first input whose effect it shows, if there is one.
+    /// Notes that a picture is shown whose drawing began at the time `begun`. Returns the time of the first input whose effect it shows; None if
+    /// it shows none.
     pub(super) fn answered_by(&mut self, begun: Option<Instant>) -> Option<Instant> {
         let answered = self.unshown.take_if(|(_, sent)| begun.is_some_and(|begun| begun >= *sent));
         answered.map(|(input, _)| input)

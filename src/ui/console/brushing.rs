@@ -16,7 +16,7 @@ const SPACING: f64 = 0.25;
 type Strokes = Vec<Vec<[f64; 3]>>;
 
 impl Console {
-    /// Removes what is near the surface along the finished stroke.
+    /// Removes tissue near the surface along the stroke of the brush that the user has finished.
     pub(super) fn end_stroke(&mut self, now: Instant) {
         let pixels = self.controls.take_stroke();
         if pixels.is_empty() {

@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 const ESCAPE_PAUSE: Duration = Duration::from_secs(1);
 
 impl Console {
-    /// Executes a command.
+    /// Executes a command of the user.
     pub fn execute(&mut self, command: &Command, now: Instant) {
         tracing::debug!("{command:?}");
         self.user_acts(now);
@@ -173,7 +173,7 @@ impl Console {
         }
     }
 
-    /// Rotates the view further, if the turntable runs.
+    /// Rotates the view by the next step, if the turntable runs.
     pub(super) fn turn(&mut self, now: Instant) {
         let can_draw = !self.stream.is_drawing() && self.stream.is_idle();
         let Some(by) = self.turntable.step(can_draw, now) else { return };
@@ -192,7 +192,7 @@ impl Console {
         }
     }
 
-    /// The cine loop with its playback settings.
+    /// The volumes of the cine loop with its playback settings.
     pub(super) fn cine_loop(&self) -> Loop<'_> {
         loop_of(&self.controls, &self.stream)
     }
@@ -271,25 +271,26 @@ impl Console {
         question.is_some()
     }
 
-    /// True if volumes of the loop are in no file: neither the one they were read from, nor a recording, nor a saved loop.
+    /// True if volumes of the cine loop are in no file: neither in the recording that they were read from, nor in one that is being made, nor in
+    /// a saved loop.
     pub(super) fn has_unsaved_loop(&self) -> bool {
         let newest = self.stream.cine().volumes().back().map(|kept| kept.volume);
         self.leaving.loses(newest, self.stream.feed_counts().unrecorded)
     }
 
-    /// Handles a request of the windowing system to close the window. True if the console asks first, because something would be lost.
+    /// Handles a request of the window system to close the window. Returns true if the user is asked first, because something would be lost.
     pub(crate) fn asks_before_closing(&mut self) -> bool {
         let asks = !self.leaving.asks() && self.asks_before_leaving();
         self.presentation.redraw_if(asks);
         asks
     }
 
-    /// Sets whether the window fills the screen and can leave that state.
+    /// Sets whether the window fills the screen and the user can leave full screen.
     pub fn set_full_screen(&mut self, is_full_screen: bool) {
         self.presentation.set_full_screen(is_full_screen);
     }
 
-    /// True while the console asks whether to save before it leaves.
+    /// True while the user is asked whether to save before the program ends.
     pub fn asks_to_leave(&self) -> bool {
         self.leaving.asks()
     }

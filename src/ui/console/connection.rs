@@ -6,7 +6,7 @@ use crate::source::live::SourceKind;
 use crate::source_supervisor::{SourceNotice, SourceState, SourceSupervisor};
 use std::time::{Duration, Instant};
 
-/// The source, and what is known of it.
+/// The source of frames, and what is known about its connection.
 pub(super) struct Connection {
     source: SourceSupervisor,
     kind: SourceKind,
@@ -41,7 +41,7 @@ impl Connection {
         matches!(self.source.state(), SourceState::Ended(_))
     }
 
-    /// Time since a probe or a pipe ended for good; nothing is live since then.
+    /// Time since a probe or a pipe ended for good, since when the picture is not live; None if it has not.
     pub(super) fn ended_for(&self, now: Instant) -> Option<Duration> {
         self.ended.map(|at| now.saturating_duration_since(at))
     }
@@ -51,7 +51,7 @@ impl Connection {
         self.source.not_opened()
     }
 
-    /// The reason why the source could not be opened.
+    /// The reason why the source could not be opened; None if it was.
     pub(super) fn fault(&self) -> Option<String> {
         match self.source.state() {
             SourceState::Ended(why) if self.not_opened() > 0 => why.clone(),
@@ -59,22 +59,22 @@ impl Connection {
         }
     }
 
-    /// Cancels opening the source. False if it is not being opened.
+    /// Cancels the opening of the source. Returns false if it is not being opened.
     pub(super) fn cancel(&mut self) -> bool {
         self.source.cancel()
     }
 
-    /// Begins an update of the console.
+    /// Notes that an update of the console begins.
     pub(super) fn begin_update(&mut self, now: Instant) {
         self.silence.begin_update(now);
     }
 
-    /// Ends an update that began at `now` and took this time. `is_busy`: the device still works.
+    /// Notes that the update that began at `now` took the time `took`. `is_busy`: the device still works.
     pub(super) fn end_update(&mut self, now: Instant, took: Duration, is_busy: bool) {
         self.silence.end_update(now, took, is_busy);
     }
 
-    /// The source opened since the last call. `is_wanted`: it is to be shown.
+    /// The source, if it was opened since the last call. It is dropped if `is_wanted` is false.
     pub(super) fn poll(&mut self, is_wanted: bool, now: Instant) -> Option<Feed> {
         let feed = self.source.poll(now).filter(|_| is_wanted);
         if feed.is_some() {
@@ -83,7 +83,8 @@ impl Connection {
         feed
     }
 
-    /// Takes the number of frames received, and the reason why the source is not connected. True if the reason changed.
+    /// Notes the number of frames received so far, and the reason why the source is not connected, if it is not. Returns true if the reason
+    /// changed.
     pub(super) fn follow(&mut self, frames: u64, disconnected: Option<String>, now: Instant) -> bool {
         if frames != self.frames {
             self.frames = frames;
@@ -94,7 +95,7 @@ impl Connection {
         is_other
     }
 
-    /// Records the end of the source. `why`: the fault, if the end was unexpected.
+    /// Notes that the source ended. `why`: the fault, if that was not expected.
     pub(super) fn ended(&mut self, why: Option<String>, now: Instant) {
         if let Some(why) = &why {
             tracing::warn!("source: {why}");
@@ -108,7 +109,7 @@ impl Connection {
         matches!(self.kind, SourceKind::Pipe | SourceKind::Probe)
     }
 
-    /// The message about the source, if there is one. `disconnected`: why it is not connected. `has_shown`: a volume was shown.
+    /// The message about the source, if there is one. `disconnected`: why it is not connected. `has_shown`: at least one volume was shown.
     pub(super) fn notice(
         &self,
         disconnected: Option<&str>,
@@ -120,7 +121,7 @@ impl Connection {
         self.source.state().notice(self.kind, disconnected, is_silent, has_shown)
     }
 
-    /// When the connection is to be polled again.
+    /// Times at which the connection has to be polled again.
     pub(super) fn due(&self, is_frozen: bool, now: Instant) -> impl Iterator<Item = Instant> {
         let is_listening = self.is_open() && !is_frozen;
         let silence = Some(self.silence.due()).filter(|at| is_listening && *at > now);

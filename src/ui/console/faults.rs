@@ -17,7 +17,7 @@ const MAX_DEVICE_FAULTS: u32 = 5;
 /// Lines of a shader compiler's message that are shown.
 const MAX_SHADER_LINES: usize = 12;
 
-/// The present lasting faults.
+/// The faults that persist: of the start, the device and the shaders.
 #[derive(Default)]
 pub(super) struct Faults {
     /// The fault of the start, and when to check it next.
@@ -48,41 +48,41 @@ impl Faults {
         Ok(())
     }
 
-    /// True if a fault of the start prevents the view: nothing is opened.
+    /// True if a fault of the start, such as a wrong configuration, prevents the view. Then no source is opened.
     pub(super) fn prevents_view(&self) -> bool {
         self.startup.is_some()
     }
 
-    /// Checks the fault of the start when that is due. True if it is resolved.
+    /// Checks, if that is due, whether the fault of the start is resolved. Returns true if it is.
     pub(super) fn is_resolved(&mut self, now: Instant) -> bool {
         let Some((fault, at)) = self.startup.as_mut().filter(|(_, at)| now >= *at) else { return false };
         *at = now + FAULT_CHECK_INTERVAL;
         (fault.is_resolved)()
     }
 
-    /// Records that the device drew a picture.
+    /// Notes that the device finished a picture.
     pub(super) fn picture_finished(&mut self) {
         self.of_device = 0;
     }
 
-    /// Records that the device failed. True if it failed so often that it counts as lost.
+    /// Notes that the device failed. Returns true if it failed so often without a picture that it counts as lost.
     pub(super) fn device_failed(&mut self) -> bool {
         let is_lost = self.of_device >= MAX_DEVICE_FAULTS;
         self.of_device = if is_lost { 0 } else { self.of_device + 1 };
         is_lost
     }
 
-    /// Shows the banner that the device hung and was opened again.
+    /// Shows the banner that says that the device hung and was opened again, for a while from `now`.
     pub(super) fn show_stall(&mut self, now: Instant) {
         self.stall_shown_until = Some(now + STALL_TIME);
     }
 
-    /// True once when that banner ends.
+    /// True once, when the banner of [`Faults::show_stall`] has to disappear.
     pub(super) fn stall_ends(&mut self, now: Instant) -> bool {
         self.stall_shown_until.take_if(|until| *until <= now).is_some()
     }
 
-    /// Polls the shaders. True if their fault changed.
+    /// Checks the watched folder of shaders. Returns true if its fault changed.
     pub(super) fn poll_shaders(&mut self) -> bool {
         let fault = self.shaders.as_ref().and_then(|folder| folder.fault());
         let is_other = fault != self.of_shaders;
@@ -90,17 +90,17 @@ impl Faults {
         is_other
     }
 
-    /// Why the picture is not drawn with the present shaders of their folder.
+    /// The reason why pictures are not drawn with the present shaders of the watched folder; None if they are.
     pub(super) fn of_shaders(&self) -> Option<&str> {
         self.of_shaders.as_deref()
     }
 
-    /// When the faults are to be polled again.
+    /// Times at which the faults have to be checked again.
     pub(super) fn due(&self) -> impl Iterator<Item = Instant> {
         self.startup.as_ref().map(|(_, at)| *at).into_iter().chain(self.stall_shown_until)
     }
 
-    /// The banner of the most important fault, if there is one.
+    /// The banner for the most important fault; None if there is none.
     pub(super) fn banner(&self) -> Option<Banner> {
         let banner = |title: &str, text: &str| Some(Banner { title: title.into(), text: text.into(), is_fault: true });
         if let Some((fault, _)) = &self.startup {

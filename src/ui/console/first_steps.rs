@@ -17,7 +17,7 @@ impl FirstSteps {
         FirstSteps { file, is_shown: false }
     }
 
-    /// Shows the hints if they are due, and records that. True while they are shown.
+    /// Shows the hints if they have not been ended, and stores once that they were shown. Returns true while they are shown.
     pub(super) fn show(&mut self) -> bool {
         let Some(file) = &self.file else { return false };
         if !std::mem::replace(&mut self.is_shown, true) {
@@ -26,7 +26,7 @@ impl FirstSteps {
         true
     }
 
-    /// Ends the hints at the user's first action. True if the command only closes them.
+    /// Ends the hints at the user's first action. Returns true if the command does nothing but close them.
     pub(super) fn end(&mut self, command: &Command) -> bool {
         if !std::mem::take(&mut self.is_shown) {
             return *command == Command::CloseHints;

@@ -17,7 +17,7 @@ const STREAM_SLICE: Duration = Duration::from_millis(4);
 const EXPORT_POLL: Duration = Duration::from_millis(300);
 
 impl Console {
-    /// Does what is due and returns what the event loop does next.
+    /// Does everything that is due, and returns what the event loop has to do next.
     ///
     /// # Errors
     /// The device or the screen is lost.
@@ -140,7 +140,7 @@ impl Console {
         Ok(())
     }
 
-    /// Handles the end of the source. `why`: the fault, if it ended unexpectedly.
+    /// Reacts to the end of the source. `why`: the fault, if that was not expected.
     pub(super) fn source_ended(&mut self, why: Option<String>, now: Instant) {
         self.connection.ended(why, now);
         self.stream.replace_source(Feed::none());
@@ -185,7 +185,7 @@ impl Console {
         }
     }
 
-    /// True while frames come from a probe or a pipe, or are still to be shown.
+    /// True while frames come from a probe or a pipe, or while some that came are not shown yet.
     pub(super) fn is_followed(&self) -> bool {
         let comes = self.measured.times().frames > 0.0 || !self.stream.is_idle();
         comes && self.connection.is_live() && self.stream.is_connected()
@@ -201,7 +201,7 @@ impl Console {
         self.measured.write(&self.stream, &self.context, source, now);
     }
 
-    /// Writes the metrics for the last time, at the regular end of the program.
+    /// Writes the metrics for the last time, when the program ends regularly.
     pub fn end_metrics(&mut self) {
         self.measured.end(&mut self.stream, &self.context);
     }
@@ -289,12 +289,12 @@ impl Console {
         Ok(())
     }
 
-    /// Why there was nothing to show: the reason why the source could not be opened.
+    /// The reason why the source could not be opened, so that there was nothing to show; None if it was opened.
     pub fn source_fault(&self) -> Option<String> {
         self.connection.fault()
     }
 
-    /// A summary of the run in one line.
+    /// A summary of the whole run in one line.
     pub fn summary(&mut self) -> String {
         let ([shown, between], dispatched) = (self.presentation.presentations(), self.stream.dispatches());
         let still = self.stream.last_begun().map_or(0.0, |begun| begun.elapsed().as_secs_f64());

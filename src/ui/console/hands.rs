@@ -6,7 +6,7 @@ use crate::input::{Input, Key, Modifiers};
 use crate::keyboard_pointer::{KeyboardPointer, PictureArea, Pointed, PointerMark};
 use crate::picking::Viewport;
 
-/// The state of keys, gestures and pointer.
+/// The state of the user's inputs: keys, gestures, and the pointer.
 #[derive(Default)]
 pub(super) struct Hands {
     gestures: Gestures,
@@ -19,27 +19,27 @@ impl Hands {
         self.keys.modifiers()
     }
 
-    /// Records an input, whatever uses it.
+    /// Notes an input, whatever handles it.
     pub(super) fn see(&mut self, input: &Input) {
         self.pointer.other_input(input);
     }
 
-    /// The command of a key.
+    /// The command of a key that was pressed; None if it has none.
     pub(super) fn key(&mut self, input: &Input) -> Option<Command> {
         self.keys.input(input)
     }
 
-    /// The commands of a gesture on the picture.
+    /// The commands that an input gives as part of a gesture on the picture.
     pub(super) fn gesture(&mut self, input: &Input, on: &Viewport, tool: Tool, modifiers: Modifiers) -> Vec<Command> {
         self.gestures.input(input, on, tool, modifiers)
     }
 
-    /// The command that sets the position of a text started by typing.
+    /// The command that sets the position of a text that the user starts by typing.
     pub(super) fn place_of_text(&self, on: &Viewport) -> Option<Command> {
         gestures::place_of_text(on, self.gestures.pointer())
     }
 
-    /// Position of an input, or else of the pointer, pixels of the window.
+    /// Position of an input, otherwise that of the pointer, pixels of the window; None if neither is known.
     pub(super) fn place(&self, input: &Input) -> Option<[f64; 2]> {
         match input {
             Input::Moved(at) | Input::Touch { at, .. } => Some(*at),
@@ -47,27 +47,27 @@ impl Hands {
         }
     }
 
-    /// True while the pointer by keyboard is on.
+    /// True while the pointer is moved by keys.
     pub(super) fn points(&self) -> bool {
         self.pointer.is_on()
     }
 
-    /// True while the pointer by keyboard holds a button: the drag may pause between two keys.
+    /// True while a key holds the pointer's button down, so that a drag may pause between two keys.
     pub(super) fn holds(&self) -> bool {
         self.pointer.is_held()
     }
 
-    /// Turns the pointer by keyboard on or off. Returns the resulting inputs of a mouse.
+    /// Turns moving the pointer by keys on or off. Returns the mouse inputs that stand for this.
     pub(super) fn toggle_pointer(&mut self, picture: PictureArea) -> Vec<Pointed> {
         self.pointer.toggle(self.gestures.pointer(), picture)
     }
 
-    /// The inputs of a mouse that a key makes with the pointer; none if the pointer does not use the key.
+    /// The mouse inputs that a key stands for while the pointer is moved by keys; None if the key does not move it.
     pub(super) fn point(&mut self, key: Key, picture: PictureArea) -> Option<Vec<Pointed>> {
         self.pointer.key(key, &self.keys, picture)
     }
 
-    /// How the pointer by keyboard is drawn.
+    /// How the pointer that keys move is drawn; None while that is off.
     pub(super) fn mark(&self, picture: PictureArea) -> Option<PointerMark> {
         self.pointer.mark(picture)
     }

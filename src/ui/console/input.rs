@@ -10,7 +10,7 @@ use crate::texts::keys;
 use std::time::Instant;
 
 impl Console {
-    /// Handles an input.
+    /// Handles an input event.
     pub fn input(&mut self, input: &Input) {
         let now = Instant::now();
         // egui panics at coordinates that are not finite.
@@ -69,13 +69,13 @@ impl Console {
         }
     }
 
-    /// The command for a letter that starts a text with the text tool: it sets the text's position.
+    /// The command that sets the position of a text, when the user types a letter with the text tool.
     pub(super) fn place_of_text(&self) -> Option<Command> {
         let is_over_panel = self.hands.place(&Input::FocusLost).is_some_and(|at| self.panels.covers(at));
         self.hands.place_of_text(&self.viewport(is_over_panel, Instant::now()))
     }
 
-    /// Turns the pointer by keyboard on or off. It needs panels, without which it would be invisible.
+    /// Turns moving the pointer by keys on or off. Without panels it stays off, because the pointer would be invisible.
     pub(super) fn toggle_keyboard_pointer(&mut self, now: Instant) {
         if !self.fixed.overlay {
             return;

@@ -7,7 +7,8 @@ use crate::shown_picture::ShownPicture;
 use std::time::{Duration, Instant};
 
 impl Console {
-    /// Lays out the panels and executes the commands that they give.
+    /// Lays out the panels, executes the commands of their controls, and returns what is to be drawn. `picture`: the one that they are drawn
+    /// over.
     pub(super) fn lay_out_panels(&mut self, now: Instant, picture: Option<&ShownPicture>) -> gpu::window::Panels {
         let banner = self.banner(now);
         let shows_first_steps = self.shows_first_steps(picture.is_some() && banner.is_none());

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 /// How long a warning holds: what is asked for again within this time is done.
 const WARNED: Duration = Duration::from_secs(10);
 
-/// What was saved of the cine loop, and the question before the program ends.
+/// Whether leaving the program loses anything, and the question that is asked then.
 #[derive(Debug, Default)]
 pub(super) struct Leaving {
     /// Whether the source delivers each volume only once.
@@ -28,14 +28,14 @@ pub(super) struct Leaving {
 }
 
 impl Leaving {
-    /// `is_recorded`: everything that arrives is recorded to a file.
+    /// `is_recorded`: all frames that arrive are recorded to a file.
     pub(super) fn new(source: SourceKind, is_recorded: bool) -> Leaving {
         let comes_once = matches!(source, SourceKind::Probe | SourceKind::Pipe);
         Leaving { comes_once, is_recorded, ..Leaving::default() }
     }
 
-    /// True if volumes of the loop are in no file: neither the one they were read from, nor a recording, nor a saved loop. `newest`: the loop's
-    /// newest volume; `unrecorded`: number of volumes or frames that the recording lacks.
+    /// True if volumes of the cine loop are in no file: neither in the recording that they were read from, nor in one that is being made, nor in
+    /// a saved loop. `newest`: number of the loop's newest volume; `unrecorded`: number of volumes or frames that the recording lacks.
     pub(super) fn loses(&self, newest: Option<u32>, unrecorded: u64) -> bool {
         let is_only_here = self.comes_once && !(self.is_recorded && unrecorded == 0);
         is_only_here && newest.is_some() && newest != self.saved
@@ -53,17 +53,17 @@ impl Leaving {
         self.question = Some(question);
     }
 
-    /// Removes the question. False if there was none.
+    /// Closes the question. Returns false if none was shown.
     pub(super) fn dismiss(&mut self) -> bool {
         self.question.take().is_some()
     }
 
-    /// Ends the program once this number of files is saved; never, if it is 0.
+    /// Ends the program once this number of files is saved. 0: does not end it.
     pub(super) fn after(&mut self, files: usize) {
         self.awaited = Some(files).filter(|files| *files > 0);
     }
 
-    /// Records that a file was saved. True if the program ends now.
+    /// Notes that a file was saved. Returns true if the program has to end now.
     pub(super) fn saved(&mut self, holds: &Holds) -> bool {
         if let Holds::Loop(newest) = holds {
             self.saved = self.saved.max(Some(*newest));
@@ -74,14 +74,14 @@ impl Leaving {
         self.awaited == Some(0)
     }
 
-    /// Records that a file could not be saved: the program continues if it waited for that file.
+    /// Notes that a file could not be saved. If the end of the program waited for it, the program continues.
     pub(super) fn not_saved(&mut self, holds: &Holds) {
         if *holds != Holds::Nothing {
             self.awaited = None;
         }
     }
 
-    /// True if closing a recording needs a warning: there was none within the last seconds.
+    /// True if the user has to be warned before this recording is closed, because no warning about it was given within the last seconds.
     pub(super) fn warns_of(&mut self, recording: &Path, now: Instant) -> bool {
         let is_warned =
             |(path, at): (PathBuf, Instant)| path == recording && now.saturating_duration_since(at) < WARNED;

@@ -13,7 +13,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 impl Console {
-    /// The thumbnails of the list of presets; none while it is not shown.
+    /// The thumbnails of the presets, in the order of their list; empty if none was drawn.
     pub fn thumbnails(&self) -> &[Option<Arc<Picture>>] {
         self.presets.thumbnails()
     }
@@ -50,7 +50,7 @@ impl Console {
         }
     }
 
-    /// Starts to type a name: of a new preset, or of the user's n-th.
+    /// Starts to type the name of a new preset (None), or a new name of the user's preset with this index.
     pub(super) fn begin_naming(&mut self, of: Option<usize>) {
         match self.presets.begin_naming(of) {
             // Space and Enter are the name's.
@@ -60,7 +60,7 @@ impl Console {
         }
     }
 
-    /// Saves under the typed name: the present look, or a renamed preset.
+    /// Saves the present settings as a preset of the typed name, or renames a preset.
     pub(super) fn end_naming(&mut self) {
         let said = self.presets.end_naming(self.controls.settings());
         self.say(said);
@@ -85,7 +85,7 @@ impl Console {
         }
     }
 
-    /// Updates the thumbnails: of the present volume in each look when volume or view have changed much, and of the volumes of the loop.
+    /// Updates the thumbnails: of the present volume with each preset, if volume or view have changed much, and of the volumes of the cine loop.
     pub(super) fn poll_thumbnails(&mut self, now: Instant) {
         let (acted, is_drawing) = (self.activity.acted(), self.stream.is_drawing());
         let has_new = self.presets.poll(acted, is_drawing, now) | self.reel.poll(acted, is_drawing, now);

@@ -7,7 +7,7 @@ use crate::live::{Statistics, Stream};
 use crate::times::{RecentTimes, Times};
 use std::time::{Duration, Instant};
 
-/// The times of the view, and when statistics are due.
+/// Collects the times that the viewer measures, and determines when statistics are due.
 pub(super) struct Measured {
     times: Times,
     /// When statistics were last collected.
@@ -17,7 +17,7 @@ pub(super) struct Measured {
 }
 
 impl Measured {
-    /// `interval`: that of the statistics. Metrics, if there are any, have an interval of their own.
+    /// `interval`: that of the statistics. Metrics are written at their own interval; None: there are none.
     pub(super) fn new(interval: Duration, metrics: Option<LiveMetrics>, now: Instant) -> Measured {
         Measured { times: Times::default(), taken: now, interval, metrics }
     }
@@ -26,22 +26,22 @@ impl Measured {
         &self.times
     }
 
-    /// Time from the start of a picture to its end.
+    /// Adds the time from the start of a picture to its completion.
     pub(super) fn picture_took(&mut self, time: Duration) {
         self.times.pictures.add(time);
     }
 
-    /// Time from an input to the picture that shows its effect.
+    /// Adds the time from an input to the picture that shows its effect.
     pub(super) fn input_waited(&mut self, time: Duration) {
         self.times.input_latency.add(time);
     }
 
-    /// Time from a presentation to the monitor.
+    /// Adds the time from the presentation of a picture to its first pixel on the monitor.
     pub(super) fn reached_monitor(&mut self, time: Duration) {
         self.times.scan_out.add(time);
     }
 
-    /// True once an interval: statistics are to be collected.
+    /// True once in each interval, when statistics have to be collected.
     pub(super) fn is_due(&mut self, now: Instant) -> bool {
         let is_due = now.saturating_duration_since(self.taken) >= self.interval;
         if is_due {
@@ -50,8 +50,8 @@ impl Measured {
         is_due
     }
 
-    /// Adds the statistics of an interval. `acquisition_time`: least time to acquire a volume, s; `totals`: a line about all intervals. True if
-    /// anything was received or drawn.
+    /// Adds the statistics of an interval. `acquisition_time`: shortest time in which a volume can be acquired, s; `totals`: gives a line about
+    /// all intervals. Returns true if anything was received or drawn.
     pub(super) fn add(
         &mut self,
         statistics: &Statistics,
@@ -68,7 +68,7 @@ impl Measured {
         is_active
     }
 
-    /// When statistics are due, while the display of times is shown and has content, and when metrics are.
+    /// Times at which statistics are due, if the display of times is shown and has content, and at which metrics are due.
     pub(super) fn due(&self, shows_times: bool) -> impl Iterator<Item = Instant> {
         let has_pictures = self.times.pictures.newest().is_some();
         let statistics = (shows_times && has_pictures).then_some(self.taken + self.interval);
@@ -86,7 +86,7 @@ impl Measured {
         }
     }
 
-    /// Writes the metrics for the last time, at the regular end of the program.
+    /// Writes the metrics for the last time, when the program ends regularly.
     pub(super) fn end(&mut self, stream: &mut Stream, context: &Context) {
         let Some(mut metrics) = self.metrics.take() else { return };
         if let Ok(statistics) = stream.take_statistics() {
@@ -95,7 +95,7 @@ impl Measured {
         metrics.end(stream, context);
     }
 
-    /// Percentiles of the times, in one line.
+    /// Percentiles of the times, in ms, as one line.
     pub(super) fn line(&self) -> String {
         let ms = |value: Option<f64>| value.map_or("-".into(), |ms| format!("{ms:.1}"));
         let percentiles =

@@ -6,7 +6,7 @@ use crate::measure::made;
 use crate::scene::Made;
 
 impl Console {
-    /// Tells the controls on what the point of a command is set, if the command sets one.
+    /// If a command sets a point of a measurement, tells the controls on which volume and plane.
     pub(super) fn note_what_is_measured_on(&mut self, command: &Command) {
         let (point, on_surface) = match *command {
             Command::Point(point, on_surface) => (point, on_surface),
@@ -31,7 +31,7 @@ impl Console {
         })
     }
 
-    /// What is known of a measurement on a whole volume.
+    /// The conditions of a measurement on the whole volume of this number, as far as they are known.
     pub(super) fn made_on(&self, volume: u32) -> Made {
         let kept = self.stream.cine().volumes().iter().find(|kept| kept.volume == volume);
         let time = kept.and_then(|kept| kept.frames.first()?.time).filter(|time| time.is_finite());
@@ -39,7 +39,7 @@ impl Console {
         Made { volume, time, plane: String::new(), settings: settings.unwrap_or_default() }
     }
 
-    /// The recording's name for results, that of its file or folder; empty for live volumes.
+    /// The name of the recording that results contain: that of its file or folder; empty for live volumes.
     pub(super) fn recording_name(&self) -> String {
         let recording = self.fixed.origin.as_ref().and_then(|origin| origin.recording.as_ref());
         let name = recording.and_then(|path| path.file_name()).map(|name| name.to_string_lossy().into_owned());

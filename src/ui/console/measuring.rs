@@ -25,7 +25,7 @@ const TEXT: Tool = Tool::Measure(MeasureKind::Text);
 const VOXEL: f64 = 0.5;
 
 impl Console {
-    /// Sets a point of the tool in use on the surface under a pixel of the picture.
+    /// Sets a point of the selected tool on the rendered surface under a pixel of the picture.
     pub(super) fn pick_surface(&mut self, pixel: [f64; 2]) {
         let Tool::Measure(kind) = self.controls.tool() else { return };
         match self.picked(kind, pixel) {
@@ -78,7 +78,7 @@ impl Console {
         Ok(Some(Measurement { kind, points, on_surface: true, ..Measurement::default() }))
     }
 
-    /// Starts to count the voxels of the region whose echo reaches the threshold of the mode.
+    /// Starts to count, on a thread, the voxels of the region whose echo reaches the threshold of the mode.
     pub(super) fn count_voxels(&mut self) {
         match self.voxels_to_count() {
             Ok(count) => match self.survey.count(count) {
@@ -118,7 +118,7 @@ impl Console {
         })
     }
 
-    /// Takes the result of counting.
+    /// Adds the result of counting as a measurement, once it is there.
     pub(super) fn poll_counting(&mut self) {
         let Some(counted) = self.survey.poll() else { return };
         self.presentation.redraw();
@@ -129,7 +129,7 @@ impl Console {
         }
     }
 
-    /// Copies the results as CSV.
+    /// Copies the results of measurements to the clipboard as CSV.
     pub(super) fn copy_measures(&mut self) {
         if self.controls.measures().is_empty() {
             return self.notify(texts::NO_MEASUREMENTS_YET, true);
@@ -143,7 +143,7 @@ impl Console {
         }
     }
 
-    /// Saves the results as a CSV file.
+    /// Saves the results of measurements as a CSV file.
     pub(super) fn save_measures(&mut self) {
         let saved = match self.controls.measures().is_empty() {
             true => Err(texts::WHY_NO_MEASUREMENTS.into()),
@@ -158,7 +158,7 @@ impl Console {
         }
     }
 
-    /// Saves settings, recording and measurements as a workspace. False if that is impossible.
+    /// Saves settings, recording and measurements as a workspace. Returns false if that is impossible.
     pub(super) fn save_workspace(&mut self) -> bool {
         let origin = self.fixed.origin.clone().ok_or_else(|| texts::WHY_NO_ORIGIN.to_string());
         let saved = origin.and_then(|mut origin| {
@@ -184,7 +184,7 @@ impl Console {
         is_saved
     }
 
-    /// Saves the handiwork on a recording that is not shown. False if that is impossible.
+    /// Saves the state that is kept of a recording that is not shown as a workspace. Returns false if that is impossible.
     pub(super) fn save_kept(&mut self, path: PathBuf, kept: &Kept) -> bool {
         let work = kept.controls.handiwork();
         // The flags of the geometry are those of all recordings.
@@ -198,7 +198,8 @@ impl Console {
         saved.is_ok()
     }
 
-    /// Discards the measurement in progress, or a text that is typed, or leaves the tool. False if there was nothing to leave.
+    /// Discards the measurement in progress or the text that is being typed, or else leaves the measuring tool. Returns false if there was
+    /// nothing to leave.
     pub(super) fn leave_measuring(&mut self) -> bool {
         self.survey.end_distance();
         if self.controls.work().is_some() || self.controls.typing().is_some() {
@@ -216,7 +217,8 @@ impl Console {
         is_measuring
     }
 
-    /// The commands of a key that is typed into a text, ends a contour, or chooses a file or format; none if the key belongs to the view.
+    /// The commands of a key that belongs to a text being typed, to a contour, or to an open list of files or formats; None if it belongs to the
+    /// view.
     pub(super) fn typed(&mut self, input: &Input) -> Option<Vec<Command>> {
         let Input::Key { key, pressed: true } = *input else { return None };
         let modifiers = self.hands.modifiers();
@@ -271,7 +273,7 @@ impl Console {
         }
     }
 
-    /// The command by which Enter ends the contour or line in progress.
+    /// The command by which Enter ends the contour or line in progress; None if there is none.
     pub(super) fn what_enter_ends(&self) -> Option<Command> {
         match (self.controls.work(), self.controls.line()) {
             (Some(_), _) => Some(Command::EndMeasure),
@@ -280,7 +282,7 @@ impl Console {
         }
     }
 
-    /// True while a list is open whose entries have keys.
+    /// True while a list is open whose entries can be chosen by keys.
     pub(super) fn shows_list(&self) -> bool {
         self.opening.is_shown() || self.visible.exports || self.presets.is_shown()
     }

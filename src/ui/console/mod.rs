@@ -67,18 +67,18 @@ use crate::workspace::Origin;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// What the event loop does after an update of the console.
+/// What an update of the console asks of the event loop.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LoopRequest {
-    /// When to update again if no event comes; `None`: not before an event.
+    /// Time of the next update if no event comes before; `None`: an event is awaited.
     pub wake_at: Option<Instant>,
     pub exit: bool,
     pub toggle_full_screen: bool,
-    /// Whether this console is to be replaced by a new one.
+    /// True if this console has to be replaced by a new one.
     pub restart: bool,
 }
 
-/// Why the console cannot continue by itself.
+/// Why a console needs help from outside to continue.
 #[derive(Debug, thiserror::Error)]
 pub enum ConsoleError {
     /// The device is lost; [`Console::revive`] continues on another one.
@@ -89,7 +89,8 @@ pub enum ConsoleError {
     Screen(GpuError),
 }
 
-/// The live view without its window. It owns the parts, none of which knows another, and passes between them what they need.
+/// The console: the viewer's live picture, panels and state, without the window. It owns its parts, none of which knows another, and passes
+/// between them what they need.
 pub struct Console {
     // Fields are dropped in this order: the screen, which is in the first, before the stream whose pictures it shows.
     presentation: Presentation,
@@ -140,7 +141,7 @@ struct Fixed {
 }
 
 impl Console {
-    /// `size`: of the window, pixels.
+    /// A console that opens its source by `open`. `size`: that of the window, pixels.
     pub fn new(context: &Arc<Context>, open: OpenSource, options: ConsoleOptions, size: [u32; 2]) -> Console {
         let now = Instant::now();
         let (kept, display) = options.opening.recordings.lock().unwrap_or_else(|e| e.into_inner()).take_kept();
@@ -233,12 +234,12 @@ impl Console {
         console
     }
 
-    /// Why the picture is not drawn with the present shaders of their folder.
+    /// The reason why pictures are not drawn with the present shaders of the watched folder; None if they are.
     pub fn shader_fault(&self) -> Option<&str> {
         self.faults.of_shaders()
     }
 
-    /// Sets the screen to present to.
+    /// Sets the screen on which pictures are presented; None: there is none.
     pub(super) fn set_screen(&mut self, screen: Option<Screen>) {
         self.presentation.set_screen(screen);
         self.panels.reset();
@@ -252,7 +253,7 @@ impl Console {
     /// Continues on another device, or on the same one opened again. The cine loop is kept; the live picture continues with the next volume.
     ///
     /// # Errors
-    /// The device cannot hold what is shown.
+    /// The device cannot hold the slots of what is shown.
     pub fn revive(&mut self, context: &Arc<Context>, screen: Option<Screen>) -> Result<(), StreamError> {
         self.presentation.screen = None;
         self.presets.device_lost();
@@ -268,7 +269,7 @@ impl Console {
         revived
     }
 
-    /// Shows for a while that the device hung and was opened again.
+    /// Shows for a while a banner that says that the device hung and was opened again.
     pub(crate) fn show_stall(&mut self, now: Instant) {
         self.faults.show_stall(now);
         self.presentation.redraw();
@@ -281,7 +282,7 @@ impl Console {
         }
     }
 
-    /// Redraws the window, whose content was lost.
+    /// Draws the window again, because its content was lost.
     pub fn redraw(&mut self) {
         self.presentation.content_lost();
     }
@@ -309,24 +310,24 @@ impl Console {
         self.panels.is_described()
     }
 
-    /// The tree of the panels for a screen reader, if they were laid out since the last call.
+    /// The accessibility tree of the panels for a screen reader; None if they were not laid out since the last call.
     pub fn take_tree(&mut self) -> Option<TreeUpdate> {
         self.presentation.take_tree()
     }
 
-    /// Performs a screen reader's request for a control.
+    /// Does what a screen reader requests of a control, such as a press.
     pub fn act(&mut self, request: ActionRequest) {
         self.user_acts(Instant::now());
         self.panels.act(request);
         self.presentation.redraw();
     }
 
-    /// Sets the position of a pointer to draw, pixels, where no windowing system draws one.
+    /// Sets the position of the pointer, pixels of the window, if no window system draws it; None: it is not drawn.
     pub(super) fn set_pointer(&mut self, at: Option<[f64; 2]>) {
         self.presentation.set_pointer(at);
     }
 
-    /// Shows a message for a few seconds and writes it to the log.
+    /// Shows a message in the window for a few seconds, and writes it to the log.
     pub(super) fn notify(&mut self, text: &str, is_fault: bool) {
         match is_fault {
             true => tracing::warn!("{text}"),
@@ -348,7 +349,7 @@ impl Console {
         self.presentation.screen.as_ref()
     }
 
-    /// The quality of the last settings that were sent to the stream.
+    /// The quality of the settings that were sent to the stream last.
     pub fn quality(&self) -> Quality {
         self.quality.now()
     }

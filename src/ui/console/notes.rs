@@ -8,12 +8,12 @@ const NOTE_TIME: Duration = Duration::from_secs(5);
 /// Largest number of notes that are shown at once; the newest ones win.
 const MAX_NOTES: usize = 4;
 
-/// The shown notes, the oldest first, each with the time of its end.
+/// The messages (notes) that are shown for a few seconds: each with the time of its end, the oldest first.
 #[derive(Debug, Default)]
 pub(super) struct Notes(Vec<(Instant, Note)>);
 
 impl Notes {
-    /// Shows a message from now on, even if it is shown already.
+    /// Shows a message for the full time from `now` on, even if it is shown already.
     pub(super) fn add(&mut self, text: &str, is_fault: bool, now: Instant) {
         let note = Note { text: text.into(), is_fault };
         self.0.retain(|(_, known)| *known != note);
@@ -23,7 +23,7 @@ impl Notes {
         }
     }
 
-    /// Removes expired notes. True if there was one.
+    /// Removes messages whose time is over. Returns true if there was one.
     pub(super) fn end(&mut self, now: Instant) -> bool {
         let before = self.0.len();
         self.0.retain(|(until, _)| *until > now);
@@ -38,7 +38,7 @@ impl Notes {
         self.0.iter().map(|(_, note)| note.clone())
     }
 
-    /// When the notes expire.
+    /// Times at which messages end.
     pub(super) fn due(&self) -> impl Iterator<Item = Instant> {
         self.0.iter().map(|(until, _)| *until)
     }

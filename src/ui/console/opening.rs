@@ -20,7 +20,7 @@ const SHOWN_AFTER: Duration = Duration::from_millis(200);
 /// How often it is looked at how far it is.
 const LOOK_INTERVAL: Duration = Duration::from_millis(100);
 
-/// The files that can be opened, and the one that is being opened.
+/// The list of files to open, the open recordings, and the file that is being read.
 pub(super) struct Opening {
     open: Option<OpenFile>,
     recent: Option<PathBuf>,
@@ -81,14 +81,14 @@ struct List {
 /// Longest path that is typed, characters.
 const MAX_TYPED: usize = 1000;
 
-/// The effect of a key while the list is shown.
+/// What a key does while the list of files is shown.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum ListKey {
-    /// Chooses the n-th entry.
+    /// It chooses the n-th entry.
     Entry(usize),
-    /// Opens a file.
+    /// It opens the file of this path.
     Open(PathBuf),
-    /// Nothing else: the key was typed into the path, or has no effect.
+    /// It was typed into the path, or has no effect.
     Taken,
 }
 
@@ -103,7 +103,7 @@ impl Opening {
         self.list.is_some()
     }
 
-    /// The list while it is shown.
+    /// The list of files to open; None while it is not shown.
     pub(super) fn shown(&self) -> Option<FilesShown<'_>> {
         let List { folder, recent, names, typed, .. } = self.list.as_ref()?;
         let typed = typed.as_ref().map(|(text, fault)| (text.as_str(), fault.as_deref()));
@@ -115,12 +115,12 @@ impl Opening {
         self.list.as_ref().is_some_and(|list| list.typed.is_some())
     }
 
-    /// Removes the path that is being typed. False if there is none.
+    /// Discards the path that is being typed. Returns false if there is none.
     pub(super) fn stop_typing(&mut self) -> bool {
         self.list.as_mut().is_some_and(|list| list.typed.take().is_some())
     }
 
-    /// Handles a key while the list is shown; none for Escape. `is_upper`: Shift is held.
+    /// Handles a key while the list of files is shown. None for Escape, which the list does not handle. `is_upper`: Shift is held.
     pub(super) fn key(&mut self, key: Key, is_upper: bool) -> Option<ListKey> {
         let list = self.list.as_mut()?;
         // A keyboard without a windowing system tells its keys, not their signs.
@@ -168,12 +168,12 @@ impl Opening {
         Some(ListKey::Taken)
     }
 
-    /// The recordings that are open.
+    /// All open recordings, as the window lists them.
     pub(super) fn named(&self) -> Vec<Named> {
         self.recordings().list()
     }
 
-    /// The file being read, as the window shows it.
+    /// The file that is being read and its progress, as the window shows it; None if it shows none.
     pub(super) fn told(&self) -> Option<&Reading> {
         self.told.as_ref()
     }
@@ -182,7 +182,7 @@ impl Opening {
         self.recordings.lock().unwrap_or_else(|e| e.into_inner())
     }
 
-    /// Puts a file at the top of the recent files, if they are stored.
+    /// Puts a file at the top of the list of recent files, if that is stored.
     pub(super) fn remember(&self, file: &Path) {
         self.recent.iter().filter(|_| file.exists()).for_each(|list| open_list::remember(list, file));
     }
@@ -207,22 +207,22 @@ impl Opening {
         List { folder: folder.display().to_string(), recent: count, entries, names, typed: None }
     }
 
-    /// True if files can be opened.
+    /// True if the user can open files.
     pub(super) fn is_offered(&self) -> bool {
         self.open.is_some()
     }
 
-    /// Shows the list for a folder, with the recent files first.
+    /// Shows the list of files: the recent ones first, then those of a folder.
     pub(super) fn show_list(&mut self, folder: &Path) {
         self.list = Some(self.list(folder, true));
     }
 
-    /// Closes the list. False if it is not shown.
+    /// Closes the list of files. Returns false if it is not shown.
     pub(super) fn close_list(&mut self) -> bool {
         self.list.take().is_some()
     }
 
-    /// Chooses the n-th entry of the list. A file is returned to be opened; a folder is listed.
+    /// Chooses the n-th entry of the list of files. The path of a file is returned, for the caller to open; the content of a folder is listed.
     pub(super) fn choose(&mut self, n: usize) -> Option<PathBuf> {
         let (kind, path) = self.list.as_ref()?.entries.get(n)?.clone();
         let is_folder = matches!(kind, Kind::Folder | Kind::FolderAbove);
@@ -230,7 +230,7 @@ impl Opening {
         (!is_folder).then_some(path)
     }
 
-    /// Records a file that was dropped on the window.
+    /// Notes a file that was dropped on the window.
     pub(super) fn drop_file(&mut self, path: &Path) {
         self.dropped.push(path.to_path_buf());
     }
@@ -240,7 +240,7 @@ impl Opening {
         std::mem::take(&mut self.dropped)
     }
 
-    /// Adds recordings to the list of open ones. False if there is no room for all.
+    /// Adds recordings to the list of open ones. Returns false if there was no room for all.
     pub(super) fn add(&self, paths: &[PathBuf]) -> bool {
         let mut list = self.recordings();
         paths.iter().filter(|path| !list.add(path)).count() == 0
@@ -250,10 +250,11 @@ impl Opening {
         self.file.is_some()
     }
 
-    /// Reads a file in the background, instead of the one being read, which stays in the list. `closes`: the shown recording is closed for it.
+    /// Starts to read a file on a thread. A file that was being read is given up, but stays in the list. `closes`: the shown recording is closed
+    /// for it.
     ///
     /// # Errors
-    /// One line: no other files can be opened, too many are, or no thread can be started.
+    /// One line: other files cannot be opened, too many are open, or no thread can be started.
     pub(super) fn read(&mut self, path: &Path, closes: bool) -> Result<(), String> {
         let open = self.open.clone().ok_or(texts::OPENS_NO_OTHER_FILES)?;
         self.file = None;
@@ -292,7 +293,7 @@ impl Opening {
         }
     }
 
-    /// Stops reading a file and returns its name, if one was being read.
+    /// Gives up reading a file and returns its name; None if none was being read.
     pub(super) fn end_reading(&mut self) -> Option<String> {
         let file = self.file.take()?;
         let name = self.recordings().name(&file.path);
@@ -300,27 +301,28 @@ impl Opening {
         Some(name)
     }
 
-    /// Cancels opening the console's own source.
+    /// Cancels the opening of the source with which this console began.
     pub(super) fn cancel_source(&self) {
         self.source.cancel();
     }
 
-    /// The n-th open recording, and whether it is shown.
+    /// Path of the n-th open recording, and whether it is shown. None if there is no n-th.
     pub(super) fn recording(&self, n: usize) -> Option<(PathBuf, bool)> {
         let list = self.recordings();
         let path = list.path(n)?;
         Some((path.to_path_buf(), Some(path) == list.shown()))
     }
 
-    /// The index of the recording so many positions after the shown or next one; none if there is no other.
+    /// Index of the recording `by` positions after the one that is being read, or else the shown one; None if only one is open.
     pub(super) fn further(&self, by: i32) -> Option<usize> {
         let list = self.recordings();
         let from = self.file.as_ref().map(|file| file.path.as_path()).or(list.shown())?;
         list.index(list.step(from, by)?).filter(|_| list.list().len() > 1)
     }
 
-    /// Closes the n-th recording, or the shown one if there is no n-th. Returns the name of one that is closed now. For the shown one it returns the
-    /// recording to show instead: the next one, or else the previous one. None if there is no such recording.
+    /// Closes the n-th recording, or the shown one if `n` is `usize::MAX`. One that is not shown is closed now, and its name is returned (Ok).
+    /// For the shown one the recording to show in its place is returned (Err): the next one, or else the previous one. None if there is no n-th
+    /// recording.
     pub(super) fn close(&mut self, n: usize) -> Option<Result<String, Option<PathBuf>>> {
         let list = self.named();
         let shown = list.iter().position(|named| named.is_shown);
@@ -341,7 +343,7 @@ impl Opening {
         Some(Ok(name))
     }
 
-    /// The name and path of the recording that [`Opening::close`] would close, with whether it is shown; none if that would close none.
+    /// Name and path of the recording that [`Opening::close`] would close, and whether it is shown; None if it would close none.
     pub(super) fn to_close(&self, n: usize) -> Option<(String, PathBuf, bool)> {
         let list = self.named();
         let shown = list.iter().position(|named| named.is_shown);
@@ -351,22 +353,22 @@ impl Opening {
         Some((list.get(n)?.name.clone(), path, shown == Some(n)))
     }
 
-    /// The recordings in the background with unsaved handiwork, and their kept state.
+    /// The recordings that are not shown and have measurements, marks or cuts that are in no file, with the state kept of each.
     pub(super) fn unsaved(&self) -> Vec<(PathBuf, Kept)> {
         let recordings = self.recordings();
         let of = |n: usize| Some((recordings.path(n)?.to_path_buf(), recordings.unsaved(n)?.clone()));
         (0..MAX_OPEN).filter_map(of).collect()
     }
 
-    /// Records that this handiwork on a recording is saved.
+    /// Notes that these measurements, marks and cuts of a recording are saved in a file.
     pub(super) fn saved(&self, path: &Path, work: Handiwork) {
         self.recordings().saved(path, work);
     }
 
-    /// The file that was opened since the last call and is to be shown.
+    /// The file whose reading has ended since the last call; None if there is none.
     ///
     /// # Errors
-    /// One line: why it was not. It is read no longer.
+    /// One line: why the file could not be opened. Reading it has ended.
     pub(super) fn poll(&mut self) -> Option<Result<BeingRead, String>> {
         let fault = match self.file.as_ref()?.opened.try_recv() {
             Err(TryRecvError::Empty) => return None,
@@ -384,12 +386,13 @@ impl Opening {
         Some(Err(fault))
     }
 
-    /// Makes the next console show this file. `kept`: state of the recording that is shown now.
+    /// Makes the next console show this file. `kept`: the state of the recording that is shown now, to restore it later.
     pub(super) fn show(&self, file: &BeingRead, kept: Option<Kept>, display: Display) {
         self.recordings().show(&file.path, kept, file.closes, display);
     }
 
-    /// Polls the progress of reading. `source_since`: when opening the console's own source began, while it lasts. True if the window's text changes.
+    /// Checks the progress of reading. `source_since`: time at which the opening of the console's own source began, while it lasts. Returns true
+    /// if the text in the window changes.
     pub(super) fn look(&mut self, source_since: Option<Instant>, now: Instant) -> bool {
         let told = self.being_read(source_since, now);
         let is_other = told != self.told;
@@ -417,7 +420,7 @@ impl Opening {
         Some(Reading { name, share, text })
     }
 
-    /// When the progress of reading is to be polled. `reads_source`: the console's own source is being opened.
+    /// Time at which the progress of reading has to be checked again. `reads_source`: the console's own source is being opened.
     pub(super) fn due(&self, reads_source: bool, now: Instant) -> Option<Instant> {
         (self.is_reading() || reads_source).then_some(now + LOOK_INTERVAL)
     }

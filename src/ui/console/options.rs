@@ -13,53 +13,53 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// The options with which a console is created.
+/// Options of a [`Console`](super::Console).
 pub struct ConsoleOptions {
     pub settings: Settings,
-    /// Options of the stream: chosen settings, volume images, queues, time stamps, cine loop, and the watched folder of shaders. The console sets
-    /// what depends on its window.
+    /// Options of the stream: chosen settings, volume images, queues, time stamps, cine loop, and the watched folder of shaders. The console
+    /// itself sets those that depend on its window.
     pub stream: StreamOptions,
-    /// Interval of the statistics in the log and in the display of times.
+    /// Time between two statistics in the log and in the display of times.
     pub statistics_interval: Duration,
-    /// The frame budget: longest time of a picture while the view moves.
+    /// The frame budget: longest time that a picture may take while the view moves; `None`: no limit.
     pub budget: Option<Duration>,
-    /// The quality ladder, from full quality down.
+    /// The rungs of the quality ladder, from full quality down.
     pub rungs: Vec<Rung>,
-    /// Time before a source that ended is opened again; `None`: the end of the source is final.
+    /// Time after which a source that ended is opened again; `None`: it is not.
     pub retry: Option<Duration>,
-    /// Where the frames come from, for messages.
+    /// Kind of the source, for messages.
     pub source: SourceKind,
-    /// A file for all frames that arrive.
+    /// Path of a file to which all frames that arrive are recorded; `None`: they are not.
     pub record: Option<PathBuf>,
-    /// A file for metrics of Prometheus, which is rewritten at intervals.
+    /// Path of a file with metrics for Prometheus, which is rewritten at intervals; `None`: there is none.
     pub prometheus: Option<PathBuf>,
-    /// The folder for saved pictures and loops.
+    /// Folder for saved pictures and cine loops.
     pub folder: PathBuf,
-    /// Whether panels, notes and marks are drawn over the picture.
+    /// True if panels, messages and marks are drawn over the picture.
     pub overlay: bool,
-    /// Whether sliders and buttons are shown at the start.
+    /// True if sliders and buttons are shown at the start.
     pub panels: bool,
-    /// Pixels per point.
+    /// Pixels of the window per point, the unit of text and buttons.
     pub scale: f32,
-    /// The keys that end a kiosk, if any.
+    /// The key combination that ends a kiosk; `None`: none does.
     pub exit: Option<Chord>,
     pub is_kiosk: bool,
-    /// What a workspace stores of the source; `None`: no workspace can be saved.
+    /// What a workspace stores about the source; `None`: no workspace can be saved.
     pub origin: Option<Origin>,
-    /// Whether the volumes of the source are numbered as in its recording.
+    /// True if volume numbers of the stream are those of the recording.
     pub plays_once: bool,
     pub opening: OpeningOptions,
-    /// The file that records that the hints of the first start were shown; `None`: they are never shown.
+    /// Path of the file that marks that the hints of the first start were shown; `None`: they are not shown.
     pub first_steps: Option<PathBuf>,
-    /// The file with the presets of the user.
+    /// Path of the file with the user's presets; `None`: there are none.
     pub presets: Option<PathBuf>,
-    /// Called when [`Console::update`] has something to do.
+    /// Called when [`Console::update`](super::Console::update) has something to do.
     pub wake: Wake,
-    /// A fault that prevents the view: only its message is shown.
+    /// A fault that prevents the view, so that only its message is shown.
     pub startup_fault: Option<StartupFault>,
-    /// Whether the pipelines of every mode, layout and preset are compiled in advance while the user rests.
+    /// True if the pipelines of every mode, layout and preset are compiled in advance while the user does nothing.
     pub warms: bool,
-    /// Whether thumbnails of looks and of the loop's volumes are made while the user rests. A kiosk makes none.
+    /// True if thumbnails of presets and of the cine loop's volumes are drawn while the user does nothing. In a kiosk they are not.
     pub small_pictures: bool,
 }
 
@@ -95,29 +95,30 @@ impl Default for ConsoleOptions {
     }
 }
 
-/// The files that can be opened besides the console's own source.
+/// Options for opening files besides the console's own source.
 #[derive(Clone, Default)]
 pub struct OpeningOptions {
-    /// Opens another recording or workspace; `None`: none can be opened.
+    /// Opens another recording or workspace; `None`: the user can open none.
     pub open_file: Option<OpenFile>,
-    /// The open recordings, one of which is shown.
+    /// The list of open recordings, one of which is shown.
     pub recordings: OpenRecordings,
-    /// Progress of opening the console's own source.
+    /// Progress of opening the console's own source, by which it can also be cancelled.
     pub progress: Progress,
-    /// The file with the list of recent files.
+    /// Path of the file with the list of recent files; `None`: the list is not stored.
     pub recent: Option<PathBuf>,
 }
 
-/// Opens a recording or a workspace, or returns the reason in one line. It may take long; [`Progress`] reports how far it is and can cancel it.
+/// A function that opens a recording or a workspace, or returns in one line why it cannot. It may take long; [`Progress`] reports how far it is
+/// and can cancel it.
 pub type OpenFile = Arc<dyn Fn(&Path, &Progress) -> Result<Opened, String> + Send + Sync>;
 
-/// An opened file. Called when the console asks to be replaced: the next one shows the file. Nothing changes if it is dropped.
+/// An opened file: a function that makes the next console show it. If it is dropped without a call, nothing changes.
 pub type Opened = Box<dyn FnOnce() + Send>;
 
-/// A fault that prevents the view, such as a wrong configuration, and how to find out that it is resolved.
+/// A fault that prevents the view, such as a wrong configuration, and how to check whether it is resolved.
 pub struct StartupFault {
     pub title: String,
     pub why: String,
-    /// Called every two seconds. When it returns true, the console asks to be replaced.
+    /// Called every two seconds. Once it returns true, the console asks to be replaced.
     pub is_resolved: Box<dyn Fn() -> bool>,
 }

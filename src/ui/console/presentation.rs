@@ -18,24 +18,24 @@ const BLANK_INTERVAL: Duration = Duration::from_millis(20);
 /// Panels that want to be drawn again later than this are not.
 const LATEST_REPAINT: Duration = Duration::from_secs(3600);
 
-/// The state of the picture when the window is to be presented.
+/// The state of the picture at the time of a presentation.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct PictureState {
-    /// Whether there is a picture of the present volume.
+    /// True if there is a picture of the present volume.
     pub(super) has_drawn: bool,
-    /// Whether a picture is being drawn.
+    /// True while a picture is being drawn.
     pub(super) is_drawing: bool,
-    /// Time since that picture was begun.
+    /// Time since the picture that is being drawn was begun; None if none is.
     pub(super) drawn_for: Option<Duration>,
-    /// Whether panels can be drawn while a picture is.
+    /// True if panels can be drawn while a picture is being drawn.
     pub(super) is_paced: bool,
-    /// Whether there is nothing to draw.
+    /// True if there is nothing to draw.
     pub(super) is_idle: bool,
-    /// Whether a picture was drawn in full, which ends the start.
+    /// True once a picture was drawn in full.
     pub(super) has_started: bool,
 }
 
-/// The window and what of it is out of date.
+/// Decides when the window is presented, from what of its content is out of date.
 pub(super) struct Presentation {
     pub(super) screen: Option<Screen>,
     /// Size of the window, pixels.
@@ -64,7 +64,7 @@ pub(super) struct Presentation {
 }
 
 impl Presentation {
-    /// A window of this size, pixels, without a screen.
+    /// A window of this size, pixels, that has no screen yet.
     pub(super) fn new(size: [u32; 2]) -> Presentation {
         Presentation {
             screen: None,
@@ -83,7 +83,7 @@ impl Presentation {
         }
     }
 
-    /// Sets the screen to present to.
+    /// Sets the screen on which pictures are presented; None: there is none.
     pub(super) fn set_screen(&mut self, screen: Option<Screen>) {
         // Drop the old one first: a window has one surface at a time.
         self.screen = None;
@@ -93,7 +93,7 @@ impl Presentation {
         self.redraw();
     }
 
-    /// Sets the size, pixels; 0 while the window is minimised. False if it did not change.
+    /// Sets the size of the window, pixels; 0 while it is minimised. Returns false if it did not change.
     pub(super) fn resize(&mut self, size: [u32; 2]) -> bool {
         if let Some(screen) = &mut self.screen {
             screen.resize(size);
@@ -119,44 +119,44 @@ impl Presentation {
         self.is_full_screen = is_full_screen;
     }
 
-    /// Number of presentations, and of those while a picture was being drawn.
+    /// Number of all presentations, and of those while a picture was being drawn.
     pub(super) fn presentations(&self) -> [u64; 2] {
         [self.screen.as_ref().map_or(0, |screen| screen.shown()), self.shown_between]
     }
 
-    /// Records that something besides the picture changed.
+    /// Notes that something besides the picture changed.
     pub(super) fn redraw(&mut self) {
         self.needs_redraw = true;
     }
 
-    /// Like [`Presentation::redraw`], if something changed.
+    /// Notes that something besides the picture changed, if `has_changed`.
     pub(super) fn redraw_if(&mut self, has_changed: bool) {
         self.needs_redraw |= has_changed;
     }
 
-    /// Records that the content of the window was lost, or that there is a surface again.
+    /// Notes that the content of the window was lost, or that there is a surface to present to again.
     pub(super) fn content_lost(&mut self) {
         (self.needs_redraw, self.retry_at) = (true, None);
     }
 
-    /// Records that a picture was drawn.
+    /// Notes that a picture was drawn.
     pub(super) fn picture_finished(&mut self, picture: ShownPicture) {
         self.drawn = Some(Arc::new(picture));
         self.has_new_picture = true;
     }
 
-    /// The picture that the window shows; while it shows none, the last one that it showed.
+    /// The picture that the window shows, or else the last one that it showed; None before the first.
     pub(super) fn shown(&self) -> Option<&ShownPicture> {
         self.shown.as_deref()
     }
 
-    /// The picture that the window would show if it were presented now.
+    /// The picture that the window would show if it were presented now; None if it would show none.
     pub(super) fn content(&self, picture: &PictureState) -> Option<Arc<ShownPicture>> {
         let latest = if picture.is_drawing { &self.shown } else { &self.drawn };
         latest.clone().filter(|_| picture.has_drawn)
     }
 
-    /// Sets where to draw the pointer, pixels of the window, where no windowing system draws one.
+    /// Sets where the pointer is drawn, pixels of the window, if no window system draws it; None: it is not drawn.
     pub(super) fn set_pointer(&mut self, at: Option<[f64; 2]>) {
         self.needs_redraw |= self.pointer != at;
         self.pointer = at;
@@ -166,18 +166,18 @@ impl Presentation {
         self.pointer
     }
 
-    /// The tree of the panels for a screen reader, if they were laid out since the last call.
+    /// The accessibility tree of the panels for a screen reader; None if they were not laid out since the last call.
     pub(super) fn take_tree(&mut self) -> Option<TreeUpdate> {
         self.tree.take()
     }
 
-    /// Records a layout of the panels: their tree for a screen reader, and the time after which they want to be laid out again.
+    /// Notes a layout of the panels: their tree for a screen reader, and the time after which they have to be laid out again.
     pub(super) fn laid_out(&mut self, tree: Option<TreeUpdate>, repaint_after: Duration, now: Instant) {
         self.repaint_at = (repaint_after < LATEST_REPAINT).then(|| now + repaint_after);
         self.tree = tree.or(self.tree.take());
     }
 
-    /// Marks the panels for drawing if they wanted it by now.
+    /// Notes that the window has to be presented, if the time for another layout of the panels has come.
     pub(super) fn repaint(&mut self, now: Instant) {
         self.needs_redraw |= self.repaint_at.is_some_and(|at| at <= now);
     }
@@ -204,36 +204,37 @@ impl Presentation {
         true
     }
 
-    /// Keeps the old content, as there is nothing to draw over it.
+    /// Notes that the content of the window stays as it is, because there is nothing to draw.
     pub(super) fn keep_content(&mut self) {
         self.needs_redraw = false;
     }
 
-    /// Records that the window shows this picture, if any, and that the panels are up to date. `has_more`: inputs for the panels remain.
+    /// Notes that the window shows this picture, if any, and that the panels are up to date. `has_more`: inputs that the panels have not handled
+    /// remain.
     pub(super) fn up_to_date(&mut self, content: Option<Arc<ShownPicture>>, has_more: bool) {
         (self.has_new_picture, self.needs_redraw) = (false, has_more);
         self.shown = content.or(self.shown.take());
     }
 
-    /// Records that the window was presented with this picture. `is_between`: while another one was being drawn.
+    /// Notes that the window was presented with this picture. `is_between`: while another picture was being drawn.
     pub(super) fn presented(&mut self, content: Option<Arc<ShownPicture>>, is_between: bool, has_more: bool) {
         self.up_to_date(content, has_more);
         self.shown_between += u64::from(is_between);
         self.retry_at = None;
     }
 
-    /// Records that there is no surface to present to.
+    /// Notes that there is no surface to present to; another attempt is made later.
     pub(super) fn not_presentable(&mut self, now: Instant) {
         self.retry_at = Some(now + PRESENT_RETRY);
     }
 
-    /// True if something is to be presented and can be.
+    /// True if something has to be presented and nothing prevents it.
     pub(super) fn waits(&self) -> bool {
         let can_present = self.screen.is_some() && self.blank_since.is_none() && self.retry_at.is_none();
         self.needs_redraw && can_present
     }
 
-    /// When the window is to be looked at again.
+    /// Times at which the window has to be checked again.
     pub(super) fn due(&self, now: Instant) -> impl Iterator<Item = Instant> {
         [self.retry_at, self.repaint_at, self.blank_since.map(|_| now + BLANK_INTERVAL)].into_iter().flatten()
     }

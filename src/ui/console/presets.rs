@@ -16,15 +16,15 @@ use std::time::{Duration, Instant};
 
 /// Least time between two rounds of thumbnails of volumes that go on coming.
 const LIVE_INTERVAL: Duration = Duration::from_secs(5);
-/// Time after an input before thumbnails of the shown list are made.
+/// Time without an input after which thumbnails for the list on display are drawn.
 pub(super) const REST: Duration = Duration::from_millis(300);
-/// Time after an input before thumbnails are made that nobody asked for.
+/// Time without an input after which thumbnails are drawn although no list is on display.
 pub(super) const LONG_REST: Duration = Duration::from_secs(2);
 /// The view changed much: it turned by so many degrees, or zoom or an edge of the region changed by this share.
 const MUCH_DEGREES: f64 = 15.0;
 const MUCH: f64 = 0.1;
 
-/// The list while it is shown, and the presets of the user.
+/// The list of presets: the built-in ones and the user's, with their thumbnails.
 pub(super) struct Presets {
     /// The file with the user's presets; `None`: there are none.
     file: Option<PathBuf>,
@@ -56,7 +56,7 @@ struct MadeOf {
 }
 
 impl Presets {
-    /// `keeps_pictures`: the inspector shows the thumbnails, too.
+    /// `file`: path of the user's presets. `keeps_pictures`: the inspector shows the thumbnails, too.
     pub(super) fn new(file: Option<PathBuf>, keeps_pictures: bool, wake: Wake) -> Presets {
         let mut presets = Presets {
             keeps_pictures,
@@ -83,7 +83,7 @@ impl Presets {
         self.naming.is_some()
     }
 
-    /// Discards the thumbnails, whose device is lost.
+    /// Discards the thumbnails, because the device that drew them is lost.
     pub(super) fn device_lost(&mut self) {
         self.thumbnails.stop();
         self.made_of = None;
@@ -105,7 +105,7 @@ impl Presets {
         };
     }
 
-    /// The list for the panels, while it is shown.
+    /// The list of presets as the panels show it; None while it is not shown.
     pub(super) fn shown(&self) -> Option<PresetsShown<'_>> {
         self.is_shown.then(|| PresetsShown {
             tiles: self.tiles(),
@@ -116,7 +116,7 @@ impl Presets {
         })
     }
 
-    /// All presets, with their thumbnails if they are made.
+    /// All presets, with their thumbnails as far as they are drawn.
     pub(super) fn tiles(&self) -> Vec<PresetTile<'_>> {
         let pictures = self.thumbnails.pictures();
         let picture = |n: usize| pictures.get(n).cloned().flatten();
@@ -135,7 +135,7 @@ impl Presets {
         built_in.chain(own).collect()
     }
 
-    /// Shows or closes the list. Returns the fault if the user's presets cannot be read.
+    /// Shows or closes the list of presets. Returns the reason if the user's presets cannot be read.
     pub(super) fn toggle(&mut self) -> Option<&str> {
         if self.is_shown {
             self.close();
@@ -146,16 +146,16 @@ impl Presets {
         self.fault.as_deref()
     }
 
-    /// Number of built-in presets and the user's together.
+    /// Number of all presets, the built-in ones and the user's.
     pub(super) fn count(&self) -> usize {
         EXAMS.len() + self.own.len()
     }
 
-    /// The settings of the n-th preset, with everything in `controls` that a preset leaves alone. `is_phantom`: built-in presets are framed for the
-    /// phantom.
+    /// The settings of the n-th preset; what a preset does not contain is as in `controls`. `is_phantom`: the view of built-in presets fits the
+    /// phantom and is applied, too.
     ///
     /// # Errors
-    /// One line: there is no such preset, or the volume cannot be drawn so.
+    /// One line: there is no such preset, or the volume cannot be drawn with it.
     pub(super) fn settings(
         &self,
         n: usize,
@@ -170,10 +170,11 @@ impl Presets {
         controls.with_look(&own.look()?, scene).map_err(str::to_string)
     }
 
-    /// Starts to type a name: of a new preset, or of the user's n-th. False if there is nothing to name.
+    /// Starts to type the name of a new preset (None), or a new name of the user's preset with this index. Returns false if there is no such
+    /// preset.
     ///
     /// # Errors
-    /// One line: the user has as many as there can be.
+    /// One line: the user has as many presets as are allowed.
     pub(super) fn begin_naming(&mut self, of: Option<usize>) -> Result<bool, String> {
         if !self.is_shown || self.file.is_none() || self.fault.is_some() {
             return Ok(false);
@@ -190,10 +191,10 @@ impl Presets {
         Ok(true)
     }
 
-    /// Saves under the typed name: these settings, or a renamed preset. Returns a message; none if no name is typed.
+    /// Saves these settings as a preset of the typed name, or renames a preset. Returns a message for the user; None if no name is being typed.
     ///
     /// # Errors
-    /// One line: it cannot be kept. The name can be corrected.
+    /// One line: the preset cannot be saved. The name can be corrected.
     pub(super) fn end_naming(&mut self, settings: &Settings) -> Result<Option<String>, String> {
         let Some(naming) = self.naming.take() else { return Ok(None) };
         let kept = self.keep_named(&naming, settings);
@@ -240,10 +241,10 @@ impl Presets {
         Ok(())
     }
 
-    /// Deletes the user's n-th preset. Returns a message; none if there is no such preset.
+    /// Deletes the user's preset with this index. Returns a message for the user; None if there is no such preset.
     ///
     /// # Errors
-    /// One line: that cannot be written.
+    /// One line: the file of presets cannot be written.
     pub(super) fn delete(&mut self, n: usize) -> Result<Option<String>, String> {
         let Some(name) = self.own.get(n).map(|preset| preset.name.clone()) else { return Ok(None) };
         self.read();
@@ -253,7 +254,7 @@ impl Presets {
         Ok(Some(texts::preset_is_deleted(name)))
     }
 
-    /// Restores the user's presets as they were before the last change. False if there was none.
+    /// Restores the user's presets as they were before the last change. Returns false if there was no change.
     ///
     /// # Errors
     /// One line: another window changed them since, or they cannot be written.
@@ -269,7 +270,7 @@ impl Presets {
         Ok(true)
     }
 
-    /// Discards the name that is typed or, if there is none, closes the list. False if the list is not shown.
+    /// Discards the name that is being typed or, if there is none, closes the list. Returns false if the list is not shown.
     pub(super) fn leave(&mut self) -> bool {
         if self.naming.take().is_none() && self.is_shown {
             self.close();
@@ -278,7 +279,7 @@ impl Presets {
         self.is_shown
     }
 
-    /// The commands of a key in the list; none for Escape. `is_upper`: the letter is a capital.
+    /// The commands of a key while the list of presets is shown. None for Escape, which the list does not handle. `is_upper`: Shift is held.
     pub(super) fn key(&mut self, key: Key, is_upper: bool) -> Option<Vec<Command>> {
         let Some(naming) = &mut self.naming else {
             return match key {
@@ -307,18 +308,19 @@ impl Presets {
         Some(Vec::new())
     }
 
-    /// The thumbnails; none while the list is not shown.
+    /// The thumbnails of the presets, in the order of the list; empty if none was drawn.
     pub(super) fn thumbnails(&self) -> &[Option<Arc<Picture>>] {
         self.thumbnails.pictures()
     }
 
-    /// Takes finished thumbnails; `acted`: time of the user's last action. True if there are new ones.
+    /// Collects thumbnails that are finished. `acted`: time of the user's last action. Returns true if there are new ones.
     pub(super) fn poll(&mut self, acted: Instant, is_drawing: bool, now: Instant) -> bool {
         self.thumbnails.poll(now >= acted + REST && !is_drawing)
     }
 
-    /// True if thumbnails are to be made: of another volume, another view, or other presets. The shown list has them made less often for arriving
-    /// volumes than for one that `rests`; the inspector has them made for the first volume and for one that rests, after a longer pause.
+    /// True if thumbnails have to be drawn, because there is another volume, another view, or other presets. The list on display has them drawn
+    /// less often for arriving volumes than for one that stays (`rests`). The inspector has them drawn for the first volume and for one that
+    /// stays, after a longer pause.
     pub(super) fn wants_thumbnails(
         &self,
         (volume, settings): (u32, &Settings),
@@ -338,13 +340,13 @@ impl Presets {
         })
     }
 
-    /// Starts to make thumbnails of a volume.
+    /// Starts to draw thumbnails of a volume with each preset.
     pub(super) fn make_thumbnails(&mut self, job: Job, volume: u32, settings: &Settings, now: Instant) {
         self.made_of = Some(MadeOf { volume, settings: settings.clone(), own: self.own.clone(), at: now });
         self.thumbnails.begin(job);
     }
 
-    /// When thumbnails are to be looked at again, while the list is shown.
+    /// Time at which thumbnails have to be checked again; None if no list is on display and none are being drawn.
     pub(super) fn due(&self, acted: Instant, now: Instant) -> Option<Instant> {
         let at = if self.thumbnails.is_working() { Duration::from_millis(50) } else { REST };
         let is_waiting = self.thumbnails.is_working() || (self.is_shown && self.made_of.is_none());

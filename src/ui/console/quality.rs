@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 /// How long after the last input pipelines that may be needed next are compiled.
 const REST_BEFORE_WARMING: Duration = Duration::from_secs(1);
 
-/// The quality of the pictures, and the settings that were sent to the stream.
+/// Chooses the quality of pictures by the frame budget, and knows the settings that were sent to the stream.
 pub(super) struct PictureQuality {
     pace: Pace,
     rungs: Arc<Vec<Rung>>,
@@ -33,7 +33,7 @@ pub(super) struct PictureQuality {
 }
 
 impl PictureQuality {
-    /// `first`: the rung of a view that moves before any picture was timed; `warms`: compiles pipelines in advance while the user rests.
+    /// `first`: rung for a moving view before any picture was timed; `warms`: compile pipelines in advance while the user does nothing.
     pub(super) fn new(budget: Option<Duration>, rungs: Vec<Rung>, first: usize, warms: bool) -> PictureQuality {
         PictureQuality {
             pace: Pace::new(budget, &rungs, first),
@@ -48,7 +48,7 @@ impl PictureQuality {
         }
     }
 
-    /// The settings on each rung for a scene at full quality, for stage 1; none without a budget.
+    /// A function that gives the settings of all lower rungs for a scene at full quality, so that stage 1 can serve them; None without a budget.
     pub(super) fn lowered(&self) -> Option<Lowered> {
         let rungs = self.rungs.clone();
         self.budget().map(|_| Arc::new(move |scene: &Scene| frame_budget::lowered(&rungs, scene)) as Lowered)
@@ -58,17 +58,17 @@ impl PictureQuality {
         self.pace.budget()
     }
 
-    /// The quality of the last settings that were sent to the stream.
+    /// The quality of the settings that were sent to the stream last.
     pub(super) fn now(&self) -> Quality {
         self.quality
     }
 
-    /// The quality's label for the display of times.
+    /// The present quality in words, for the display of times.
     pub(super) fn label(&self) -> &str {
         frame_budget::label(self.quality, &self.rungs)
     }
 
-    /// Records that the user moved something whose picture takes this work.
+    /// Notes that the user moved something whose picture needs this kind of work.
     pub(super) fn moved(&mut self, work: Work, now: Instant) {
         self.pace.moved(work, now);
     }
@@ -77,12 +77,12 @@ impl PictureQuality {
         self.light_moved = Some(now);
     }
 
-    /// Discards times: another scene takes another time.
+    /// Discards the measured times, because pictures of another scene take other times.
     pub(super) fn scene_changed(&mut self) {
         self.pace.forget();
     }
 
-    /// Measures the rate of volumes. `count`: number received from a live source; `None` without one.
+    /// Measures the rate at which volumes arrive. `count`: number that arrived so far from a live source; `None` without one.
     pub(super) fn follow_volumes(&mut self, count: Option<u64>, now: Instant) {
         match count {
             Some(count) if count > self.live_volumes => self.pace.volumes_came(count - self.live_volumes, now),
@@ -96,19 +96,19 @@ impl PictureQuality {
         self.pace.picture_took(work, self.quality, time);
     }
 
-    /// When a moving view comes to rest.
+    /// Time at which a moving view counts as at rest; None if it does not move.
     pub(super) fn rests_at(&self, now: Instant) -> Option<Instant> {
         self.pace.rests_at(now)
     }
 
-    /// The quality and settings to send to the stream now; none if it has them, or cannot draw them.
+    /// The quality and settings to send to the stream now; None if it has these settings, or cannot draw them.
     pub(super) fn to_send(&self, controls: &Controls, now: Instant) -> Option<(Quality, Settings)> {
         let (quality, settings) = self.effective(controls, now);
         let is_known = self.sent.as_ref() == Some(&settings) || self.rejected.as_ref() == Some(&settings);
         (!is_known).then_some((quality, settings))
     }
 
-    /// Records that settings of this quality are sent. True if the quality changes.
+    /// Notes that settings of this quality are sent to the stream. Returns true if the quality changes.
     pub(super) fn choose(&mut self, quality: Quality) -> bool {
         std::mem::replace(&mut self.quality, quality) != quality
     }
@@ -143,8 +143,9 @@ impl PictureQuality {
         has_moved || self.pace.is_live(now) || settings.light.follows == Follows::Camera
     }
 
-    /// The settings to compile in advance while the user rests: every mode, layout and preset, and the lower rungs of the quality ladder, each with
-    /// its settings at full quality. `acted`: time of the user's last action; `has_warmed`: the stream was given such settings since the last source.
+    /// The settings whose pipelines are to be compiled in advance while the user does nothing: every mode, layout and preset, and the lower
+    /// rungs of the quality ladder, each with its settings at full quality. None if it is not the time for that. `acted`: time of the user's
+    /// last action; `has_warmed`: the stream was given such settings for the present source.
     pub(super) fn warm(
         &mut self,
         controls: &Controls,
@@ -171,19 +172,19 @@ impl PictureQuality {
         Some(next)
     }
 
-    /// Stops compiling in advance, as the user acts. True if it was in progress.
+    /// Stops compiling pipelines in advance, because the user acts. Returns true if it was in progress.
     pub(super) fn stop_warming(&mut self) -> bool {
         self.warmed.take().is_some()
     }
 
-    /// When compiling in advance begins, if it is not done.
+    /// Time at which compiling in advance begins; None if it is done.
     pub(super) fn warms_at(&self, acted: Instant, now: Instant) -> Option<Instant> {
         let at = acted + REST_BEFORE_WARMING;
         (self.warms && self.warmed.is_none() && at > now).then_some(at)
     }
 }
 
-/// The settings of a view at rest.
+/// The settings at full quality, with which a view at rest is drawn.
 pub(super) fn full_settings(controls: &Controls) -> Settings {
     let mut full = controls.settings().clone().without_drawings();
     // A region that grows and a plane that moves show slices that were left out. With all of them processed, dragging needs no frame

@@ -18,7 +18,7 @@ fn stride(count: usize) -> usize {
     count.div_ceil(MOST).max(1)
 }
 
-/// The thumbnails of the loop.
+/// The thumbnails of the cine loop's volumes.
 pub(super) struct Reel {
     thumbnails: Thumbnails,
     /// The numbers of the volumes, in the order of the pictures.
@@ -36,12 +36,13 @@ impl Reel {
         Reel { thumbnails: Thumbnails::new(wake), volumes: Vec::new(), look: None }
     }
 
-    /// Takes finished thumbnails; `acted`: time of the user's last action. True if there are new ones.
+    /// Collects thumbnails that are finished. `acted`: time of the user's last action. Returns true if there are new ones.
     pub(super) fn poll(&mut self, acted: Instant, is_drawing: bool, now: Instant) -> bool {
         self.thumbnails.poll(now >= acted + REST && !is_drawing)
     }
 
-    /// For each volume of the loop its thumbnail; in a long loop, that of the nearest earlier volume that has one. None while it is not made.
+    /// For each volume of the cine loop its thumbnail; in a long loop that of the nearest earlier volume that has one. None if it is not drawn
+    /// yet.
     pub(super) fn pictures(&self, volumes: &VecDeque<CineVolume>) -> Vec<Option<Arc<Picture>>> {
         let stride = stride(volumes.len());
         (0..volumes.len()).map(|n| self.picture(volumes.get(n - n % stride)?.volume)).collect()
@@ -52,7 +53,7 @@ impl Reel {
         self.thumbnails.pictures().get(at).cloned().flatten()
     }
 
-    /// For each volume of the loop, whether it needs a thumbnail and has none in the present mode.
+    /// For each volume of the cine loop: true if it needs a thumbnail and has none in the present mode.
     pub(super) fn missing(&self, volumes: &VecDeque<CineVolume>, settings: &Settings) -> Vec<bool> {
         let is_same = self.look == Some(look_of(settings));
         let stride = stride(volumes.len());
@@ -60,7 +61,7 @@ impl Reel {
         volumes.iter().enumerate().map(|(n, of)| n % stride == 0 && is_missing(of)).collect()
     }
 
-    /// True if thumbnails are to be made: several volumes, some without one, after a pause.
+    /// True if thumbnails have to be drawn: the loop has several volumes, some lack one, and the user has paused.
     pub(super) fn wants(
         &self,
         volumes: &VecDeque<CineVolume>,
@@ -72,7 +73,7 @@ impl Reel {
         can_begin && self.missing(volumes, settings).contains(&true)
     }
 
-    /// Starts to make the thumbnails of a job, which leaves out the volumes that keep theirs.
+    /// Starts to draw the thumbnails of a job. Volumes without an entry in it keep theirs.
     pub(super) fn make(&mut self, job: Job, volumes: &VecDeque<CineVolume>, settings: &Settings) {
         let kept = volumes.iter().map(|of| self.picture(of.volume)).collect();
         self.volumes = volumes.iter().map(|of| of.volume).collect();
@@ -80,7 +81,7 @@ impl Reel {
         self.thumbnails.begin_with(job, kept);
     }
 
-    /// Discards the thumbnails: their device is lost, or another source has other volumes.
+    /// Discards the thumbnails, because their device is lost or another source has other volumes.
     pub(super) fn forget(&mut self) {
         self.thumbnails.clear();
         (self.volumes, self.look) = (Vec::new(), None);

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 /// That fluid is lost is said at most so often: it may come and go with each live volume.
 const LOST_INTERVAL: Duration = Duration::from_secs(20);
 
-/// What the user was told about the start of rendering.
+/// Whether the user was told that rendering cannot start at the fluid, because the fluid was not found any more.
 #[derive(Debug, Default)]
 pub(super) struct RenderStart {
     /// Whether the fluid is lost and this was reported.
@@ -15,13 +15,13 @@ pub(super) struct RenderStart {
 }
 
 impl RenderStart {
-    /// Makes the next loss a new one: the source changed, or the search was switched off.
+    /// Makes the next loss of the fluid count as a new one, because the source changed or the search was switched off.
     pub(super) fn forget(&mut self) {
         (self.is_told, self.told_at) = (false, None);
     }
 
-    /// Takes the outcome of a picture's search; `None` if it did not search. Returns it if the fluid is lost and this is to be reported now: once for
-    /// each loss, and not more often than every [`LOST_INTERVAL`].
+    /// Evaluates the outcome of a picture's search for fluid; `None`: it did not search. Returns the outcome if the fluid was not found and the
+    /// user has to be told now: once for each loss, and not more often than every [`LOST_INTERVAL`].
     pub(super) fn take(&mut self, outcome: Option<Outcome>, now: Instant) -> Option<Outcome> {
         if outcome.is_none() {
             self.forget();

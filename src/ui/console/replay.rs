@@ -3,7 +3,7 @@
 use crate::cine_player::{CinePlayer, CineState, Loop};
 use std::time::Instant;
 
-/// The playback, and the volume to be frozen.
+/// The playback of the cine loop, and the volume that is to be frozen again when a recording is shown again.
 #[derive(Debug, Default)]
 pub(super) struct Replay {
     player: CinePlayer,
@@ -12,12 +12,12 @@ pub(super) struct Replay {
 }
 
 impl Replay {
-    /// `frozen`: the number of the volume that was frozen when the recording was left.
+    /// `frozen`: number of the volume that was frozen when the recording was last left; None if none was.
     pub(super) fn new(frozen: Option<u32>) -> Replay {
         Replay { frozen, ..Replay::default() }
     }
 
-    /// Forgets that volume: the user shows another one, or freezes.
+    /// Freezes no volume again, because the user shows another one or freezes.
     pub(super) fn forget_frozen(&mut self) {
         self.frozen = None;
     }
@@ -30,17 +30,17 @@ impl Replay {
         self.player.stop();
     }
 
-    /// Starts to play at `now`, or stops.
+    /// Starts to play the cine loop at `now`, or stops.
     pub(super) fn toggle(&mut self, of: Loop, now: Instant) {
         self.player.toggle(of, now);
     }
 
-    /// The index of the next volume to show, if one is due.
+    /// Index of the volume to show now; None if none is due. `shown`: index of the one that is shown.
     pub(super) fn advance(&mut self, of: Loop, shown: Option<usize>, now: Instant) -> Option<usize> {
         self.player.advance(of, shown, now)
     }
 
-    /// When the next volume is due.
+    /// Time at which the next volume is to be shown; None while the loop is not played.
     pub(super) fn due(&self) -> Option<Instant> {
         self.player.due()
     }
@@ -49,8 +49,8 @@ impl Replay {
         self.player.state(of, shown)
     }
 
-    /// The index of the volume to freeze again now, once the recording is loaded or the loop would drop the volume. `volumes`: the numbers of the
-    /// loop; `most`: how many it keeps.
+    /// Index of the volume that is to be frozen again now: once the recording is loaded, or before the loop would drop it. `volumes`: numbers of
+    /// the loop's volumes; `most`: how many it holds at most.
     pub(super) fn refreeze(
         &mut self,
         volumes: impl ExactSizeIterator<Item = u32>,

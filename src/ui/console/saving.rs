@@ -12,13 +12,13 @@ use crate::volume_export::{FORMATS, Job, renumbered};
 use std::time::SystemTime;
 
 impl Console {
-    /// What the pictures show if not a patient: the phantom, also in a recording of it.
+    /// Text for pictures that are not of a patient but of the phantom, also from a recording of it; None otherwise.
     pub(super) fn origin(&self) -> Option<&'static str> {
         let is_synthetic = self.stream.header().is_some_and(|header| header.synthetic);
         (self.connection.kind() == SourceKind::Demo || is_synthetic).then_some(texts::DEMO_DATA)
     }
 
-    /// Saves the shown picture with its measurements, and with a bar if that is chosen.
+    /// Saves the shown picture with its measurements, and with a bar of text if that is chosen.
     pub(super) fn save_picture(&mut self) {
         let picture = match self.stream.renderer().filter(|renderer| renderer.has_drawn()) {
             Some(renderer) => match renderer.end_picture() {
@@ -51,7 +51,7 @@ impl Console {
         self.stream.cine().volumes().iter().skip(*range.start()).take(range.count()).cloned().collect()
     }
 
-    /// Saves the cine loop between its marks. False if that is impossible.
+    /// Saves the volumes of the cine loop between its marks. Returns false if that is impossible.
     pub(super) fn save_loop(&mut self) -> bool {
         let volumes = self.marked_volumes();
         let kept = self.stream.cine().volumes();
@@ -70,7 +70,7 @@ impl Console {
         saved.is_ok()
     }
 
-    /// Exports the shown volume, or else the newest, in the n-th format of the menu.
+    /// Exports the shown volume, or else the newest one, in the n-th format of the menu.
     pub(super) fn export_volume(&mut self, n: usize) {
         let Some(format) = FORMATS.get(n).copied() else { return };
         self.visible.close_exports();
@@ -100,7 +100,7 @@ impl Console {
         }
     }
 
-    /// Takes the files that were saved since the last update.
+    /// Handles the files whose saving has ended since the last update.
     pub(super) fn poll_saved(&mut self) {
         while let Some(saved) = self.exporter.poll() {
             match saved.file {
@@ -124,7 +124,7 @@ impl Console {
         }
     }
 
-    /// A note about the running export, once its progress is known; none while the list of exports shows it.
+    /// A message about the export in progress, once its progress is known; None while the list of exports shows it.
     pub(super) fn export_note(&self) -> Option<Note> {
         let name = self.exporter.exporting().filter(|_| !self.visible.exports)?;
         let Progress { done, of } = self.exporter.progress()?;

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 /// Longest that the screen says less of the start than is known: each drawing of it takes the processor from what it tells of.
 const START_INTERVAL: Duration = Duration::from_millis(100);
 
-/// How far the start is.
+/// How far the start of the view is, and what the screen says about it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Start {
     /// The step that the screen names, and since when.
@@ -29,14 +29,15 @@ impl Start {
         self.is_over
     }
 
-    /// True once, before the first picture is drawn: panels cannot be presented while the device draws, so the screen has to announce it before.
+    /// True once, before the first picture is drawn: the screen has to announce it first, because panels cannot be presented while the device
+    /// draws.
     pub(super) fn tells_first(&mut self, step: Option<StartStep>) -> bool {
         let is_first = !self.tells_of_picture && step == Some(StartStep::Picture);
         self.tells_of_picture |= is_first;
         is_first
     }
 
-    /// Records a finished picture. `is_coarse`: with few rays.
+    /// Notes that a picture is finished. `is_coarse`: it was drawn with few rays.
     pub(super) fn picture_finished(&mut self, is_coarse: bool) {
         if !self.is_over {
             tracing::debug!("start: a picture {}", if is_coarse { "with few rays" } else { "in full" });
@@ -44,7 +45,7 @@ impl Start {
         self.is_over |= !is_coarse;
     }
 
-    /// Takes the present step of the stream. True if the screen is to name it.
+    /// Notes the present step of the stream. Returns true if the screen has to name it.
     pub(super) fn follow(&mut self, step: Option<StartStep>, now: Instant) -> bool {
         let kind = |step: Option<StartStep>| step.map(|step| std::mem::discriminant(&step));
         let is_due = now.saturating_duration_since(self.step_at) >= START_INTERVAL;
@@ -55,14 +56,15 @@ impl Start {
         is_said
     }
 
-    /// Writes to the log what the screen says.
+    /// Writes to the log what the screen says about the start.
     pub(super) fn presented(&self) {
         if let Some(step) = self.step.filter(|_| !self.is_over) {
             tracing::debug!("start: the screen says {step:?}");
         }
     }
 
-    /// The banner for the present step; none if it is the source's. `title`: what the source does, the title while frames are awaited.
+    /// The banner about the present step; None if the message about the source covers it. `title`: what the source does, the title while frames
+    /// are awaited.
     pub(super) fn banner(&self, title: &str) -> Option<Banner> {
         let banner = |title: &str, text: &str| Banner { title: title.into(), text: text.into(), is_fault: false };
         Some(match self.step? {

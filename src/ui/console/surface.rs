@@ -11,7 +11,7 @@ const MISSED: f64 = 1e30;
 const PATH_STEP: f64 = 1.0;
 /// Most points of such a path.
 const PATH_POINTS: usize = 256;
-/// The points of the rendered surface.
+/// The points of the rendered surface, from its distance map.
 pub(super) struct SurfaceMap<'a> {
     pub(super) picker: Picker<'a>,
     pub(super) size: [u32; 2],
@@ -19,7 +19,7 @@ pub(super) struct SurfaceMap<'a> {
 }
 
 impl SurfaceMap<'_> {
-    /// The point under a pixel of the picture; none where no surface is.
+    /// The point of the surface under a pixel of the picture, in space, mm; None if there is no surface.
     pub(super) fn at(&self, pixel: [f64; 2]) -> Option<DVec3> {
         let on_nearest = || {
             let ([x, y], (origin, direction)) = self.picker.nearest_ray(pixel, self.size)?;
@@ -55,7 +55,8 @@ impl SurfaceMap<'_> {
         Some(origin + direction * away)
     }
 
-    /// The points of the surface along the straight line on the picture between two of its points.
+    /// The points of the surface, in space, mm, along the line that is straight on the picture between two of its points. None if an end
+    /// cannot be projected onto the picture.
     pub(super) fn path(&self, from: DVec3, to: DVec3) -> Option<Vec<DVec3>> {
         let (a, b) = (self.picker.project(from)?, self.picker.project(to)?);
         let pixels = (b[0] - a[0]).hypot(b[1] - a[1]);

@@ -8,7 +8,7 @@ use glam::DVec3;
 use std::io;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
-/// The state of these measurements.
+/// Measurements that need the volume or the surface: counting voxels, a distance on the surface, and copied results.
 pub(super) struct Survey {
     wake: Wake,
     /// Receives the count of voxels.
@@ -19,12 +19,12 @@ pub(super) struct Survey {
 }
 
 impl Survey {
-    /// `wake` is called when voxels are counted.
+    /// `wake` is called when counting has ended.
     pub(super) fn new(wake: Wake) -> Survey {
         Survey { wake, counted: None, first_end: None, clipboard: Clipboard::default() }
     }
 
-    /// The first end of the distance on the surface that is in progress.
+    /// The first end (in space, mm) of the distance on the surface that is being measured; None if none is.
     pub(super) fn first_end(&self) -> Option<DVec3> {
         self.first_end
     }
@@ -41,10 +41,10 @@ impl Survey {
         self.counted.is_some()
     }
 
-    /// Starts to count in a thread.
+    /// Starts to count voxels on a thread.
     ///
     /// # Errors
-    /// No thread can be started.
+    /// The thread cannot be started.
     pub(super) fn count(&mut self, count: impl FnOnce() -> Option<Measurement> + Send + 'static) -> io::Result<()> {
         let (sender, receiver) = channel();
         let wake = self.wake.clone();
@@ -57,7 +57,7 @@ impl Survey {
         Ok(())
     }
 
-    /// The count finished since the last call; it is `Some(None)` if there was nothing to count.
+    /// The count that has ended since the last call, None if none has. The inner None means that there was nothing to count.
     pub(super) fn poll(&mut self) -> Option<Option<Measurement>> {
         let counted = match self.counted.as_ref()?.try_recv() {
             Err(TryRecvError::Empty) => return None,

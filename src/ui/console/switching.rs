@@ -21,14 +21,15 @@ impl Console {
         self.presentation.redraw();
     }
 
-    /// Opens the n-th entry of the list: shows a file, or lists a folder.
+    /// Opens the n-th entry of the list of files: shows a file, or lists the content of a folder.
     pub(super) fn open_entry(&mut self, n: usize) {
         if let Some(path) = self.opening.choose(n) {
             self.open_path(&path);
         }
     }
 
-    /// Handles a file that was dropped on the window. Of several dropped together the first is shown, and the others are listed.
+    /// Notes a file that was dropped on the window. Of several dropped together the first will be shown, and the others are added to the open
+    /// recordings.
     pub fn drop_file(&mut self, path: &Path) {
         self.opening.drop_file(path);
     }
@@ -42,7 +43,7 @@ impl Console {
         }
     }
 
-    /// Opens a recording or a workspace and shows it. The one that is shown already is read again.
+    /// Opens a recording or a workspace and shows it. If it is the one that is shown, it is read again.
     pub fn open_path(&mut self, path: &Path) {
         self.read(path, false);
     }
@@ -62,7 +63,7 @@ impl Console {
         }
     }
 
-    /// Cancels reading a file, as the user asked. False if none is being read.
+    /// Cancels the reading of a file at the user's request. Returns false if none is being read.
     pub(super) fn cancel_reading(&mut self) -> bool {
         if let Some(name) = self.opening.end_reading() {
             self.notify(&texts::not_read_further(name), false);
@@ -76,7 +77,7 @@ impl Console {
         is_cancelled
     }
 
-    /// True while the console's own source is being opened and the user may cancel that.
+    /// True while the console's own source is being opened in a way that the user can cancel.
     pub(super) fn reads_source(&self) -> bool {
         let is_opening = self.connection.is_opening() && !self.faults.prevents_view();
         is_opening && self.connection.kind() == SourceKind::Recording && !self.fixed.is_kiosk
@@ -95,7 +96,7 @@ impl Console {
         }
     }
 
-    /// Shows the recording so many positions after the shown or next one.
+    /// Shows the recording `by` positions after the one that is being read, or else the shown one.
     pub(super) fn step_recording(&mut self, by: i32) {
         match self.opening.further(by) {
             Some(next) => self.show_recording(next),
@@ -103,8 +104,8 @@ impl Console {
         }
     }
 
-    /// Closes the n-th recording and shows the next one, or else the previous one, in its place. Unsaved handiwork on it is discarded only if this is
-    /// asked for twice.
+    /// Closes the n-th recording and, if it was shown, shows the next one, or else the previous one. Measurements, marks or cuts on it that are
+    /// in no file are discarded only if the user asks for it twice.
     pub(super) fn close_recording(&mut self, n: usize, now: Instant) {
         if let Some((name, path, is_shown)) = self.opening.to_close(n) {
             let is_kept = |(other, _): &(PathBuf, Kept)| *other == path;
@@ -121,7 +122,7 @@ impl Console {
         }
     }
 
-    /// Takes an opened file: the console asks to be replaced by one that shows it.
+    /// If a file was opened, asks for this console to be replaced by one that shows it.
     pub(super) fn poll_opening(&mut self, now: Instant) {
         self.open_dropped();
         match self.opening.poll() {
@@ -157,7 +158,7 @@ impl Console {
         Display { panels, times, bar, has_focus: self.panels.has_focus() }
     }
 
-    /// Freezes the volume that was frozen when the recording was left, once it is loaded.
+    /// Freezes the volume that was frozen when the recording was last left, once it is loaded.
     pub(super) fn refreeze(&mut self) {
         let volumes = self.stream.cine().volumes().iter().map(|kept| kept.volume);
         if let Some(at) = self.replay.refreeze(volumes, self.fixed.cine_volumes, self.connection.is_over()) {

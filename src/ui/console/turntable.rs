@@ -10,7 +10,7 @@ const LONGEST: Duration = Duration::from_millis(250);
 /// Time between two pictures at least.
 const SHORTEST: Duration = Duration::from_millis(16);
 
-/// When the view last rotated, while the turntable runs.
+/// The continuous rotation of the view: the time of its last step, None while it is off.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Turntable(Option<Instant>);
 
@@ -23,19 +23,19 @@ impl Turntable {
         self.0 = Some(now);
     }
 
-    /// Stops the turntable. False if it did not run.
+    /// Stops the turntable. Returns false if it did not run.
     pub(super) fn stop(&mut self) -> bool {
         self.0.take().is_some()
     }
 
-    /// Stops the turntable at a command that rotates the view. True if it ran.
+    /// Stops the turntable if the command rotates the view. Returns true if it was stopped.
     pub(super) fn stop_for(&mut self, command: &Command) -> bool {
         use Command::{LookFrom, Redo, Reset, Roll, Rotate, Undo, UndoAll};
         matches!(command, Rotate(_) | LookFrom(_) | Roll(_) | Reset | Undo | UndoAll | Redo) && self.stop()
     }
 
-    /// The angle to rotate by now, degrees, from the time since the last step. `can_draw`: the previous picture is finished; a slow device rotates in
-    /// larger steps.
+    /// Angle by which to rotate the view now, degrees, for the time since the last step; None if no step is due. `can_draw`: the previous
+    /// picture is finished. On a slow device steps are larger.
     pub(super) fn step(&mut self, can_draw: bool, now: Instant) -> Option<f64> {
         let passed = now.saturating_duration_since(self.0?);
         if passed < SHORTEST || !can_draw {
@@ -45,7 +45,7 @@ impl Turntable {
         Some(SPEED * passed.min(LONGEST).as_secs_f64())
     }
 
-    /// When the next step is due.
+    /// Time of the next step; None while the turntable is off.
     pub(super) fn due(&self) -> Option<Instant> {
         self.0.map(|last| last + SHORTEST)
     }

@@ -15,14 +15,14 @@ impl Controls {
         &self.settings.body_marks
     }
 
-    /// The selected body mark, to which controls refer, and its index.
+    /// The selected body mark, to which the controls refer, and its index; None if there are none.
     pub fn body_mark(&self) -> Option<(usize, BodyMark)> {
         let last = self.settings.body_marks.len().checked_sub(1)?;
         let index = self.body_mark.min(last);
         Some((index, self.settings.body_marks[index]))
     }
 
-    /// Applies a command about body marks; none if the command is about something else.
+    /// Applies a command about body marks. None if the command is about something else.
     pub(super) fn mark_body(&mut self, command: &Command) -> Option<Change> {
         let marks = &self.settings.body_marks;
         Some(match *command {

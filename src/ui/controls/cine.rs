@@ -6,7 +6,7 @@ use crate::command::Command;
 use crate::scene::Cine;
 
 impl Controls {
-    /// Applies a command about playback that needs none of the volumes; none if the command is about something else.
+    /// Applies a command about playback that can be done without the volumes. None if the command is about something else.
     pub(super) fn play(&mut self, command: &Command) -> Option<Change> {
         let now = self.settings.cine;
         let cine = match *command {
@@ -18,7 +18,7 @@ impl Controls {
         Some(self.play_as(cine, command))
     }
 
-    /// Makes the volume of this number the first (`end` false) or the last of the cine loop.
+    /// Makes the volume of this number the first (`end` false) or the last one of the cine loop that is played.
     pub(crate) fn mark_cine(&mut self, volume: u32, end: bool) -> Change {
         self.play_as(marked(self.settings.cine, volume, end), &Command::MarkCine(end))
     }

@@ -19,17 +19,17 @@ fn has_plane(settings: &Settings) -> bool {
 }
 
 impl Controls {
-    /// The line in progress.
+    /// The line of a curved plane that is being drawn; None if none is.
     pub fn line(&self) -> Option<&Curve> {
         self.line.as_ref()
     }
 
-    /// The command for the mode that the tool needs to show a plane; none if a plane is shown.
+    /// The command that selects a mode in which the tool for curved planes has a plane to draw on; None if a plane is shown.
     pub(super) fn mode_for_line(&self) -> Option<Command> {
         (!has_plane(&self.settings)).then_some(Command::Mode(Mode::Orthogonal))
     }
 
-    /// Removes the last point of the line in progress. False if there is none.
+    /// Removes the last point of the line that is being drawn. Returns false if there is none.
     pub(super) fn undo_line_point(&mut self) -> bool {
         let Some(line) = &mut self.line else { return false };
         line.points.pop();
@@ -39,7 +39,7 @@ impl Controls {
         true
     }
 
-    /// Applies a command about curved planes; none if the command is about something else.
+    /// Applies a command about curved planes. None if the command is about something else.
     pub(super) fn curve(&mut self, command: &Command, scene: Option<&Scene>) -> Option<Change> {
         Some(match *command {
             Command::CurvePoint(plane, point) if point.iter().all(|n| n.is_finite()) => {
@@ -119,7 +119,7 @@ impl Controls {
     }
 }
 
-/// Settings with the point of the line with this index moved; none if there is no such point.
+/// The settings with a point of the curved plane's line moved to `to`, coordinates on its plane, mm. None if there is no point with this index.
 pub(super) fn moved(mut settings: Settings, index: usize, to: [f64; 2]) -> Option<Settings> {
     *settings.planes.curve.as_mut()?.points.get_mut(index)? = kept(to);
     Some(settings)

@@ -8,11 +8,12 @@ use crate::texts;
 /// Most points of a contour in work. A drag longer than that goes on without more.
 const MAX_OUTLINE: usize = 20_000;
 
-/// Radius of the brush at the start, and its limits, mm.
+/// Radius of the brush at the start, mm; [`BRUSH_RADII`] are its limits.
 pub(super) const BRUSH_RADIUS: f64 = 4.0;
 pub(crate) const BRUSH_RADII: [f64; 2] = [0.5, 20.0];
 
-/// The message about what removes parts of renderings and keeps these settings from being drawn: the first that does it alone, or all together.
+/// If these settings cannot be drawn because of cuts, the start at the fluid or the start curve: a message that names which of these is the
+/// reason, or that they are it together. Otherwise None.
 pub(super) fn in_the_way(now: &Scene, settings: &Settings) -> Option<&'static str> {
     // Cuts, the start at the fluid, the curved start line: what of them is left out.
     let ways = [
@@ -32,12 +33,12 @@ pub(super) fn in_the_way(now: &Scene, settings: &Settings) -> Option<&'static st
 }
 
 impl Controls {
-    /// The contour in progress, pixels of the picture.
+    /// The contour of a cut that is being drawn: positions in pixels of the picture.
     pub fn outline(&self) -> &[[f64; 2]] {
         &self.outline
     }
 
-    /// The side of the next contour that is kept.
+    /// The side of the next contour of a cut that is kept.
     pub(crate) fn kept_side(&self) -> KeptSide {
         self.kept_side
     }
@@ -47,12 +48,12 @@ impl Controls {
         self.brush_radius
     }
 
-    /// Ends a stroke of the brush and returns its positions, pixels of the picture.
+    /// Ends a stroke of the brush and returns its positions, in pixels of the picture.
     pub(crate) fn take_stroke(&mut self) -> Vec<[f64; 2]> {
         std::mem::take(&mut self.outline)
     }
 
-    /// Applies a command about cuts; none if the command is about something else, which discards the contour in progress.
+    /// Applies a command about cuts. None if the command is about something else; the contour that is being drawn is then discarded.
     pub(super) fn cut(&mut self, command: &Command, scene: Option<&Scene>) -> Option<Change> {
         Some(match *command {
             Command::BeginCut(at) if is_position(at) => {
@@ -105,7 +106,8 @@ impl Controls {
         })
     }
 
-    /// Removes what is near strokes on the surface: lateral, depth, elevation, mm. Strokes with the same radius are one cut.
+    /// Removes tissue near strokes of the brush on the surface. Their positions are lateral, depth, elevation, mm. Strokes with the same radius
+    /// become one cut.
     pub(crate) fn brush(&mut self, strokes: Vec<Vec<[f64; 3]>>, scene: &Scene) -> Change {
         let radius = self.brush_radius;
         let mut new = self.settings.clone();

@@ -8,7 +8,7 @@ const MAX_STEPS: usize = 100;
 /// Most steps of a recording that is not shown: settings with many cuts take up to 400 KiB each.
 const MAX_KEPT: usize = 20;
 
-/// The settings before each step, and those of undone steps.
+/// Undo and redo: the settings before each step, and those of steps that were undone.
 #[derive(Clone, Debug, Default)]
 pub(super) struct History {
     past: Vec<Settings>,
@@ -18,7 +18,7 @@ pub(super) struct History {
 }
 
 impl History {
-    /// Records the settings before a change by a command, and forgets undone steps.
+    /// Stores the settings before a change by a command. Steps that were undone can then no longer be redone.
     pub(super) fn record(&mut self, before: Settings, command: &Command) {
         self.future.clear();
         let goes_on = self.last.as_ref().is_some_and(|last| command.continues(last));
@@ -32,12 +32,12 @@ impl History {
         self.past.push(before);
     }
 
-    /// Makes the next change a step of its own, even by the same command.
+    /// Makes the next change a step of its own, even if it continues the last one.
     pub(super) fn seal(&mut self) {
         self.last = None;
     }
 
-    /// Returns the settings before the last step; [`History::redo`] can restore `now`.
+    /// Returns the settings before the last step; None if there is none. `now`: the present settings, which [`History::redo`] restores.
     pub(super) fn undo(&mut self, now: &Settings) -> Option<Settings> {
         self.last = None;
         let before = self.past.pop()?;
@@ -45,7 +45,7 @@ impl History {
         Some(before)
     }
 
-    /// Returns the settings after the step that was undone last.
+    /// Returns the settings after the step that was undone last; None if there is none. `now`: the present settings, which undo restores.
     pub(super) fn redo(&mut self, now: &Settings) -> Option<Settings> {
         self.last = None;
         let after = self.future.pop()?;
@@ -53,12 +53,12 @@ impl History {
         Some(after)
     }
 
-    /// Whether there is a step to undo, and one to redo.
+    /// True if there is a step to undo; true if there is one to redo.
     pub(super) fn has(&self) -> [bool; 2] {
         [!self.past.is_empty(), !self.future.is_empty()]
     }
 
-    /// Forgets all steps except for the last ones.
+    /// Removes all steps except for the last ones.
     pub(super) fn shorten(&mut self) {
         for steps in [&mut self.past, &mut self.future] {
             steps.drain(..steps.len().saturating_sub(MAX_KEPT));
@@ -67,7 +67,7 @@ impl History {
         self.last = None;
     }
 
-    /// Forgets everything, as the settings now belong to another source.
+    /// Removes all steps, because the settings now belong to another source.
     pub(super) fn clear(&mut self) {
         *self = History::default();
     }

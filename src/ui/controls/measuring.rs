@@ -15,22 +15,22 @@ impl Controls {
         &self.settings.measure
     }
 
-    /// The measurement whose points are being set.
+    /// The measurement whose points are being set; None if none is.
     pub fn work(&self) -> Option<&Measurement> {
         self.work.as_ref()
     }
 
-    /// The index of the measurement whose text is being typed.
+    /// The index of the measurement whose text is being typed; None if none is.
     pub fn typing(&self) -> Option<usize> {
         self.typing
     }
 
-    /// The threshold between the darker and brighter echoes of the source, as a fraction of the sample range; none before its first volume.
+    /// The threshold between the darker and brighter echoes of the source, as a share of the sample range; None before its first volume.
     pub(crate) fn found_threshold(&self) -> Option<f64> {
         self.defaults.as_ref()?.levels.as_ref().map(|levels| levels.threshold)
     }
 
-    /// States on what the next point is set: its volume and plane; `None`: unknown.
+    /// Sets the volume and plane on which the next point of a measurement is set; `None`: they are not known.
     pub(crate) fn measure_on(&mut self, made: Option<Made>) {
         self.made = made;
     }
@@ -50,7 +50,7 @@ impl Controls {
         Change::Marks
     }
 
-    /// Applies a command about measurements; none if the command is about something else.
+    /// Applies a command about measurements. None if the command is about something else.
     pub(super) fn measure(&mut self, command: &Command) -> Option<Change> {
         Some(match *command {
             Command::Point(point, on_surface) => self.add_point(point, on_surface),
@@ -106,7 +106,7 @@ impl Controls {
         self.work = None;
     }
 
-    /// Removes the last point of the measurement in progress. False if there is none.
+    /// Removes the last point of the measurement in progress. Returns false if there is none.
     pub(super) fn undo_point(&mut self) -> bool {
         let Some(work) = &mut self.work else { return false };
         if work.points.pop().is_none() {

@@ -26,23 +26,23 @@ use history::History;
 pub(super) use presets::EXAMS;
 use std::borrow::Cow;
 
-/// The effect of a command.
+/// What a command changed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Change {
     /// Nothing changed.
     Nothing,
-    /// Only the tool changed.
+    /// Only the selected tool changed.
     Tool,
     Settings,
-    /// Measurements or annotations changed, not the rendered picture.
+    /// Measurements, annotations or body marks changed, but not the rendered picture.
     Marks,
-    /// The command was refused, for this reason.
+    /// The command was refused for the given reason.
     Refused(&'static str),
-    /// The command does not concern settings: the caller executes it.
+    /// Nothing yet: the command is not about settings, and the caller has to execute it.
     Caller(Command),
 }
 
-/// Handiwork: measurements with annotations, body marks, and cuts.
+/// The user's work on a recording: measurements with annotations, body marks, and cuts.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Handiwork {
     measure: Vec<Measurement>,
@@ -118,23 +118,23 @@ impl Controls {
         self.tool
     }
 
-    /// The present handiwork.
+    /// The present measurements, annotations, body marks and cuts.
     pub(super) fn handiwork(&self) -> Handiwork {
         Handiwork::of(&self.settings)
     }
 
-    /// True if handiwork is in no file.
+    /// True if measurements, annotations, body marks or cuts are in no file.
     pub(super) fn is_unsaved(&self) -> bool {
         let work = self.handiwork();
         work != self.saved && work != Handiwork::default()
     }
 
-    /// Records that this handiwork is in a file.
+    /// Notes that these measurements, annotations, body marks and cuts are in a file.
     pub(super) fn saved(&mut self, work: Handiwork) {
         self.saved = work;
     }
 
-    /// A copy for a later time, without what is in progress and with only the last steps of undo.
+    /// A copy that is kept while another recording is shown: without what is in progress, and with only the last steps of undo.
     pub(super) fn set_aside(&self) -> Controls {
         let mut aside = Controls { work: None, typing: None, line: None, outline: Vec::new(), ..self.clone() };
         aside.history.shorten();
@@ -153,7 +153,7 @@ impl Controls {
         (self.work, self.typing, self.line) = (None, None, None);
     }
 
-    /// Whether there is a step to undo, and one to redo.
+    /// True if there is a step to undo; true if there is one to redo.
     pub(crate) fn can_undo(&self) -> [bool; 2] {
         let [past, future] = self.history.has();
         [past || self.work.is_some() || self.line.is_some(), future]
@@ -186,7 +186,7 @@ impl Controls {
         }
     }
 
-    /// Applies what was found from a source. Settings that were changed since the start are kept.
+    /// Applies settings that were derived from a source. Settings that the user changed since the start are kept.
     pub(super) fn adopt(&mut self, found: Defaults) {
         let Ok(start) = found.settings() else { return };
         let picture = self.settings.picture.clone();
@@ -213,7 +213,7 @@ impl Controls {
         }
     }
 
-    /// Settings with another mode or layout, and what follows from that.
+    /// The settings `to`, which differ from the present ones in mode or layout, with the other settings that depend on these.
     pub(super) fn switched(&self, to: Settings) -> Settings {
         match &self.defaults {
             Some(defaults) => defaults.switched(&self.settings, to),
@@ -238,8 +238,8 @@ impl Controls {
         self.settings.picture.size = size.map(|edge| edge.clamp(MAX_TILES, max));
     }
 
-    /// Applies a command. `scene` is the shown one, which may be older than the settings. Without it only the tool, the reset and commands for the
-    /// caller have an effect.
+    /// Applies a command. `scene`: the one that is shown, which may be older than the settings. Without a scene only changes of the tool, the
+    /// reset and commands for the caller have an effect.
     pub(super) fn apply(&mut self, command: &Command, scene: Option<&Scene>) -> Change {
         if let Some(change) = self.cut(command, scene).or_else(|| self.curve(command, scene)) {
             return change;

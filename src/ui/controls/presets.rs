@@ -7,7 +7,7 @@ use crate::scene::load::Layers;
 use crate::scene::{Layout, Region, Scene, Settings};
 use crate::texts;
 
-/// A built-in preset in the list of the view.
+/// A built-in preset in the list of presets.
 pub(crate) struct Exam {
     pub title: &'static str,
     pub hint: &'static str,
@@ -20,7 +20,7 @@ const fn exam(title: &'static str, preset: &'static str, is_framed: bool, hint: 
     Exam { title, hint, preset, is_framed }
 }
 
-/// The built-in presets of the list.
+/// The built-in presets, in the order of the list of presets.
 pub(crate) const EXAMS: [Exam; 6] = [
     exam(texts::FACE, "face", true, texts::FACE_HINT),
     exam(texts::SKELETON, "skeleton", true, texts::SKELETON_HINT),
@@ -34,10 +34,11 @@ pub(crate) const EXAMS: [Exam; 6] = [
 const PHANTOM: &str = "face-classic";
 
 impl Controls {
-    /// The present settings with a built-in preset applied. For the phantom, for which most presets are framed, region and camera change too.
+    /// The present settings with the n-th built-in preset applied. With `is_phantom`, region and camera change too, because most presets are
+    /// framed for the phantom.
     ///
     /// # Errors
-    /// Why it cannot be drawn.
+    /// The reason why the volume cannot be drawn with it.
     pub(crate) fn with_exam(&self, n: usize, scene: &Scene, is_phantom: bool) -> Result<Settings, &'static str> {
         self.drawn_by(self.examined(n, scene, is_phantom).ok_or(texts::PRESET_DOES_NOT_FIT)?, scene)
     }
@@ -61,10 +62,10 @@ impl Controls {
         Some(settings)
     }
 
-    /// The present settings with a preset of the user applied.
+    /// The present settings with `look`, those of a user's preset, applied.
     ///
     /// # Errors
-    /// Why it cannot be drawn.
+    /// The reason why the volume cannot be drawn with it.
     pub(crate) fn with_look(&self, look: &Settings, scene: &Scene) -> Result<Settings, &'static str> {
         self.drawn_by(look.look_over(&self.in_mode_of_look(look)), scene)
     }
@@ -80,7 +81,7 @@ impl Controls {
             .ok_or_else(|| in_the_way(&now, &settings).unwrap_or(texts::PRESET_DOES_NOT_FIT))
     }
 
-    /// Takes the settings of a preset, as one step of undo.
+    /// Applies the settings of a preset, as one step of undo.
     pub(crate) fn take(&mut self, settings: Settings, command: &Command) -> Change {
         if settings == self.settings {
             return Change::Nothing;

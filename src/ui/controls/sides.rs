@@ -5,7 +5,7 @@ use super::{Change, Controls};
 use crate::command::Command;
 
 impl Controls {
-    /// Applies a command about sides, marker and bar.
+    /// Applies a command about the letters of the patient's sides, the probe's marker or the bar of saved pictures.
     pub(super) fn mark_sides(&mut self, command: &Command) -> Change {
         let mut marks = self.settings.marks.clone();
         match *command {

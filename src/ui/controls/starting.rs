@@ -15,13 +15,13 @@ const GAP: f64 = 1.0;
 const FIRST: [f64; MIN_START_POINTS] = [0.1, 0.5, 0.9];
 
 impl Controls {
-    /// The points of the region's start line: lateral and depth, mm; none while it is straight.
+    /// The points of the region's start curve: lateral and depth, mm; empty while rendering starts at a straight line.
     pub(crate) fn start_line(&self) -> &[[f64; 2]] {
         self.settings.region.start_curve.as_deref().unwrap_or_default()
     }
 }
 
-/// The reason why a command about the start line has no effect, if there is one.
+/// The reason why a command about the start curve has no effect; None if it has one.
 pub(super) fn refusal(command: &Command, now: &Scene) -> Option<&'static str> {
     let count = now.settings.region.start_curve.as_ref().map(Vec::len);
     match (command, count) {
@@ -32,7 +32,7 @@ pub(super) fn refusal(command: &Command, now: &Scene) -> Option<&'static str> {
     }
 }
 
-/// The settings after a command about the start line; none if it changes nothing or is about something else.
+/// The settings after a command about the start curve. None if it changes nothing or is about something else.
 pub(super) fn changed(command: &Command, now: &Scene) -> Option<Settings> {
     let points = now.settings.region.start_curve.as_deref();
     let curve = match (*command, points) {

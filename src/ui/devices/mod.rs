@@ -33,7 +33,7 @@ const SCAN_INTERVAL: Duration = Duration::from_secs(2);
 /// Capacity of the channel: half a second of a fast mouse.
 const MAX_QUEUED: usize = 512;
 
-/// All input devices of this machine. Dropping it releases them.
+/// All input devices of this machine, read without a window system. Dropping it releases them.
 pub struct Devices {
     /// `None` once the drop began, which ends a thread that waits for room in the channel.
     receiver: Option<Receiver<DeviceMessage>>,
@@ -53,7 +53,7 @@ struct Shared {
 }
 
 impl Devices {
-    /// Starts to read devices. `size`: that of the screen, pixels; `grab`: whether events are withheld from other programs, such as the text console.
+    /// Starts to read devices. `size`: that of the screen, pixels; `grab`: other programs, such as the text console, get no events.
     ///
     /// # Errors
     /// The thread cannot be started. Missing or unreadable devices are no error: they may appear later.
@@ -68,7 +68,7 @@ impl Devices {
         Ok(Devices { receiver: Some(receiver), sender, wake_pending: Arc::default(), shared, thread: Some(thread) })
     }
 
-    /// A function that ends a [`Devices::wait`].
+    /// A function that makes [`Devices::wait`] return.
     pub fn wake(&self) -> Wake {
         let (sender, wake_pending) = (self.sender.clone(), self.wake_pending.clone());
         Arc::new(move || {
@@ -79,7 +79,7 @@ impl Devices {
         })
     }
 
-    /// The messages since the last call. Waits for the first one until this time, or without limit.
+    /// The messages since the last call. If there is none, waits for one until this time; `None`: without limit.
     pub fn wait(&self, until: Option<Instant>) -> Vec<DeviceMessage> {
         let Some(receiver) = &self.receiver else { return Vec::new() };
         let first = match until {

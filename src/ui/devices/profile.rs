@@ -5,7 +5,7 @@ use crate::input::{Button, Key};
 use evdev::{AbsoluteAxisCode as Abs, KeyCode, RelativeAxisCode as Rel};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// The range of an axis.
+/// The range of the values of a device's axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Span {
     pub(super) low: i32,
@@ -13,53 +13,53 @@ pub(super) struct Span {
 }
 
 impl Span {
-    /// The position of a value in the range, 0 to 1.
+    /// The position of a value in the range, as a share from 0 to 1.
     pub(super) fn fraction(&self, value: i32) -> f64 {
         ((f64::from(value) - f64::from(self.low)) / self.length()).clamp(0.0, 1.0)
     }
 
-    /// Length of the range, at least 1.
+    /// Largest value minus smallest, at least 1.
     pub(super) fn length(&self) -> f64 {
         (f64::from(self.high) - f64::from(self.low)).max(1.0)
     }
 }
 
-/// The abilities of a device, by the kernel's codes.
+/// What a device can report, in the kernel's codes.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Abilities {
     pub(super) keys: BTreeSet<u16>,
     pub(super) relative: BTreeSet<u16>,
     pub(super) absolute: BTreeMap<u16, Span>,
-    /// Whether it is a touch screen: the touched position is the position on the screen.
+    /// True for a touch screen: the touched position is the position on the screen.
     pub(super) is_direct: bool,
     pub(super) is_accelerometer: bool,
 }
 
-/// How a device points. Axes are horizontal and vertical.
+/// How a device moves the pointer. Spans are those of the horizontal and the vertical axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Pointing {
-    /// Moves the pointer relative to its position, or not at all.
+    /// It moves the pointer relative to its position, or not at all.
     Relative,
-    /// Sets the position of the pointer: a pen, or the tablet that a virtual machine uses as a mouse.
+    /// It sets the position of the pointer, as a pen does, or the tablet that a virtual machine uses as a mouse.
     Absolute([Span; 2]),
-    /// A touch pad: a finger moves the pointer relative to its position.
+    /// It is a touch pad: a finger moves the pointer relative to its position.
     Pad([Span; 2]),
-    /// A touch screen for one finger.
+    /// It is a touch screen that recognises one finger.
     Finger([Span; 2]),
-    /// A touch screen for several fingers, each in a slot.
+    /// It is a touch screen that recognises several fingers, each in a slot.
     Fingers([Span; 2]),
 }
 
-/// The kind of a device.
+/// What kind of device it is: how it points, and what its wheel reports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Profile {
     pub(super) pointing: Pointing,
-    /// Whether its wheel also reports fractions of notches.
+    /// True if the wheel also reports fractions of notches.
     pub(super) has_fine_wheel: bool,
 }
 
 impl Profile {
-    /// Classifies a device. None if it gives no inputs, such as a joystick, a power button or a lid switch.
+    /// The kind of a device with these abilities. None if the program uses no input of it, as of a joystick, a power button or a lid switch.
     pub(super) fn of(abilities: &Abilities) -> Option<Profile> {
         if abilities.is_accelerometer {
             return None;
@@ -96,7 +96,7 @@ impl Profile {
     }
 }
 
-/// The meaning of a key code.
+/// What a key code of the kernel stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Meaning {
     Key(Key),
@@ -121,7 +121,7 @@ const ROWS: [(KeyCode, &str); 5] = [
     (KeyCode::KEY_KP7, "789-456+1230."),
 ];
 
-/// The meaning of a key code; none if it is not used.
+/// What a key code stands for; None if it is not used.
 pub(super) fn meaning(code: u16) -> Option<Meaning> {
     let in_row = |(first, keys): &(KeyCode, &str)| {
         let place = code.checked_sub(first.0)?;
@@ -164,7 +164,7 @@ pub(super) fn meaning(code: u16) -> Option<Meaning> {
     Some(Meaning::Key(key))
 }
 
-/// The meaning of a key code on a tablet, where the pen has the buttons.
+/// What a key code of a tablet stands for, on which the pen has the buttons; None if it is not used.
 pub(super) fn pen_meaning(code: u16) -> Option<Meaning> {
     match KeyCode(code) {
         KeyCode::BTN_TOUCH => Some(Meaning::Button(Button::Left)),

@@ -16,11 +16,11 @@ const FOLDER: &str = "/dev/input";
 /// Largest number of open devices.
 const MAX_DEVICES: usize = 32;
 
-/// A message of the input devices, or a request to wake up.
+/// What [`Devices::wait`](super::Devices::wait) returns: an input, a warning, or a request to wake up.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum DeviceMessage {
     Input(Input),
-    /// A fault to report to the user.
+    /// A fault of a device that the user has to know.
     Warning(String),
     Woken,
 }
@@ -70,12 +70,12 @@ impl OpenDevices {
         self.translator.resize(size);
     }
 
-    /// The file descriptors to wait for, in the order of the indices of [`OpenDevices::read`].
+    /// The file descriptors to wait for. Their indices are those for [`OpenDevices::read`].
     pub(super) fn descriptors(&self) -> impl Iterator<Item = BorrowedFd<'_>> {
         self.readers.iter().map(|reader| reader.device.as_fd())
     }
 
-    /// Opens new devices. Unplugged ones are noticed when they are read.
+    /// Opens devices that were plugged in since the last call. Unplugged ones are noticed when they are read.
     pub(super) fn scan(&mut self, out: &mut Vec<DeviceMessage>) {
         // Without the folder there are no devices.
         let listed = std::fs::read_dir(FOLDER).into_iter().flatten().flatten().map(|entry| entry.path());
@@ -125,7 +125,7 @@ impl OpenDevices {
         Ok(true)
     }
 
-    /// Reads the pending events of the device with this index in [`OpenDevices::descriptors`]. Removes it if it is gone.
+    /// Reads the pending events of the device with this index in [`OpenDevices::descriptors`]. A device that is gone is removed.
     pub(super) fn read(&mut self, index: usize, out: &mut Vec<DeviceMessage>) {
         let Some(reader) = self.readers.get_mut(index) else { return };
         let number = reader.number;

@@ -13,12 +13,12 @@ const MAX_SLOTS: usize = 16;
 pub(super) struct Area(pub [u32; 2]);
 
 impl Area {
-    /// The nearest position on the screen.
+    /// The position on the screen that is nearest to `at`, pixels.
     pub(super) fn clamp(&self, at: [f64; 2]) -> [f64; 2] {
         [0, 1].map(|n| at[n].clamp(0.0, f64::from(self.0[n].max(1)) - 1.0))
     }
 
-    /// Converts values of the axes to a position on the screen.
+    /// Converts values of the horizontal and the vertical axis to a position on the screen, pixels.
     pub(super) fn scaled(&self, raw: [i32; 2], spans: &[Span; 2]) -> [f64; 2] {
         self.clamp([0, 1].map(|n| spans[n].fraction(raw[n]) * (f64::from(self.0[n].max(1)) - 1.0)))
     }
@@ -41,7 +41,7 @@ struct Slot {
     reported: Option<(u64, [f64; 2])>,
 }
 
-/// The fingers on a touch screen.
+/// The fingers on one touch screen, by slot of the kernel's protocol.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Fingers {
     slots: [Slot; MAX_SLOTS],
@@ -50,12 +50,12 @@ pub(super) struct Fingers {
 }
 
 impl Fingers {
-    /// Selects the slot to which values belong. Values for an invalid slot are ignored.
+    /// Selects the slot to which the following values belong. If the slot is invalid, they are ignored.
     pub(super) fn select_slot(&mut self, slot: i32) {
         self.current = usize::try_from(slot).unwrap_or(MAX_SLOTS);
     }
 
-    /// Sets the tracking ID of the current slot; a negative one means that the finger is lifted.
+    /// Sets the tracking ID of the selected slot; a negative one means that the finger was lifted.
     pub(super) fn set_tracking_id(&mut self, number: i32) {
         let Some(slot) = self.slots.get_mut(self.current) else { return };
         let tracking_id = (number >= 0).then_some(number);
@@ -64,7 +64,7 @@ impl Fingers {
         }
     }
 
-    /// Sets a coordinate of the current slot. `axis`: 0 horizontal, 1 vertical.
+    /// Sets a coordinate of the selected slot. `axis`: 0 horizontal, 1 vertical.
     pub(super) fn set_position(&mut self, axis: usize, value: i32) {
         let raw = self.slots.get_mut(self.current).and_then(|slot| slot.raw.get_mut(axis));
         if let Some(raw) = raw {
@@ -78,7 +78,8 @@ impl Fingers {
         }
     }
 
-    /// Appends the inputs for the values since the last call. `count`: number of fingers so far, of all devices.
+    /// Appends the touch inputs that follow from the values since the last call. `count`: number of fingers so far, on all devices, by which
+    /// each gets its number.
     pub(super) fn report(&mut self, area: &Area, spans: &[Span; 2], count: &mut u64, out: &mut Vec<Input>) {
         for slot in &mut self.slots {
             if let Some((finger, at)) = slot.reported.take_if(|_| slot.is_replaced || slot.is_palm) {
@@ -104,7 +105,7 @@ impl Fingers {
         }
     }
 
-    /// Cancels all fingers. Those that still touch are ignored until they are lifted.
+    /// Ends the touch of all fingers as cancelled. Those that still touch are ignored until they are lifted.
     pub(super) fn cancel_all(&mut self, area: &Area, out: &mut Vec<Input>) {
         for (finger, at) in self.slots.iter().filter_map(|slot| slot.reported) {
             out.push(Input::Touch { finger, phase: Phase::Cancelled, at: area.clamp(at) });
@@ -116,16 +117,16 @@ impl Fingers {
 /// Notches of the wheel for two fingers from top to bottom.
 const NOTCHES_PER_HEIGHT: f64 = 30.0;
 
-/// A motion on a touch pad.
+/// What fingers did on a touch pad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum PadMotion {
-    /// Motion of the pointer, in widths of the pad.
+    /// They moved the pointer by these shares of the pad's width: right, down.
     Pointer([f64; 2]),
-    /// Notches of the wheel.
+    /// They scrolled by this number of notches of a wheel.
     Scroll(f64),
 }
 
-/// A touch pad. Buttons are pressed; taps are ignored.
+/// The fingers on one touch pad. Its buttons have to be pressed: taps are ignored.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Pad {
     raw: [Option<i32>; 2],
@@ -142,7 +143,7 @@ impl Pad {
         }
     }
 
-    /// Records whether fingers touch the pad, and how many.
+    /// Notes a key code that says whether fingers touch the pad, and how many.
     pub(super) fn set_key(&mut self, code: u16, is_down: bool) {
         match KeyCode(code) {
             KeyCode::BTN_TOUCH => self.is_touched = is_down,
@@ -157,7 +158,7 @@ impl Pad {
         self.last = None;
     }
 
-    /// The motion since the last call.
+    /// What fingers did since the last call; None if nothing.
     pub(super) fn report(&mut self, spans: &[Span; 2]) -> Option<PadMotion> {
         let [Some(x), Some(y)] = self.raw else { return None };
         if !self.is_touched {

@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Value of ABS_MT_TOOL_TYPE for a palm.
 const PALM: i32 = 2;
 
-/// An event of a device, in the kernel's numbers.
+/// An event of an input device, as the kernel reports it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Event {
     pub(super) kind: u16,
@@ -17,33 +17,33 @@ pub(super) struct Event {
     pub(super) value: i32,
 }
 
-/// The state of a device, as queried from the kernel.
+/// The present state of a device, as queried from the kernel.
 #[derive(Clone, Debug, Default)]
 pub(super) struct State {
-    /// Keys that are down.
+    /// Key codes that are down.
     pub(super) keys: BTreeSet<u16>,
-    /// Values of ABS_X and ABS_Y.
+    /// Values of ABS_X and ABS_Y; None if the device has no such axis.
     pub(super) place: [Option<i32>; 2],
-    /// Value of ABS_MT_SLOT.
+    /// Value of ABS_MT_SLOT: the slot to which the next values of fingers belong.
     pub(super) slot: i32,
 }
 
-/// The state of a device from its events.
+/// What is known of a device from its events.
 pub(super) struct Device {
     pub(super) profile: Profile,
-    /// Keys and buttons of this device that are held.
+    /// Codes of the keys and buttons of this device that are held.
     pub(super) held: BTreeSet<u16>,
     pub(super) place: [Option<i32>; 2],
     pub(super) fingers: Fingers,
     pub(super) pad: Pad,
     pub(super) pending: PendingReport,
-    /// Whether the rest of the report is ignored, because the kernel dropped events.
+    /// True if the rest of the current report is ignored, because the kernel dropped events.
     pub(super) skips_report: bool,
-    /// Whether the state has to be queried, because events were dropped.
+    /// True if the state of the device has to be queried, because the kernel dropped events.
     pub(super) needs_resync: bool,
 }
 
-/// The events since the last report.
+/// The events since the last complete report of a device.
 #[derive(Default)]
 pub(super) struct PendingReport {
     pub(super) motion: [f64; 2],
@@ -66,7 +66,7 @@ impl Device {
         }
     }
 
-    /// The meaning of a key or button of this device; none if it is not used.
+    /// What a key or button of this device stands for; None if it is not used.
     pub(super) fn meaning(&self, code: u16) -> Option<Meaning> {
         match self.profile.pointing {
             Pointing::Absolute(_) => profile::pen_meaning(code),
@@ -116,7 +116,7 @@ const HIGH_RESOLUTION_STEPS: f64 = 120.0;
 /// Keys between two reports; beyond these, keys are handled before the report ends.
 const MAX_PENDING_KEYS: usize = 64;
 
-/// Translates the events of all devices, which share one pointer and one set of modifiers.
+/// Translates events of all devices to inputs. The devices share one pointer and one set of modifiers.
 pub(super) struct Translator {
     area: Area,
     pointer: [f64; 2],
@@ -143,14 +143,14 @@ impl Translator {
         self.pointer_is_sent = false;
     }
 
-    /// Adds a device. Keys that are already down are ignored, except for modifiers.
+    /// Adds a device with this number. Keys that are already down are ignored, except for modifiers.
     pub(super) fn add(&mut self, number: u32, profile: Profile, state: &State, out: &mut Vec<Input>) {
         self.remove(number, out);
         self.devices.insert(number, Device::new(profile));
         self.resync(number, state, out);
     }
 
-    /// Removes a device and releases what it held.
+    /// Removes the device with this number, and appends the inputs that release what it held.
     pub(super) fn remove(&mut self, number: u32, out: &mut Vec<Input>) {
         let Some(mut device) = self.devices.remove(&number) else { return };
         device.fingers.cancel_all(&self.area, out);
@@ -163,12 +163,12 @@ impl Translator {
         self.send_modifiers(out);
     }
 
-    /// True if events of a device were dropped: call [`Translator::resync`].
+    /// True if events of the device were dropped, so that [`Translator::resync`] has to be called.
     pub(super) fn needs_resync(&self, number: u32) -> bool {
         self.devices.get(&number).is_some_and(|device| device.needs_resync)
     }
 
-    /// Sets the queried state of a device after dropped events: keys that are up are released, and fingers are cancelled.
+    /// Applies the queried state of a device after events were dropped: keys that are up are released, and fingers are cancelled.
     pub(super) fn resync(&mut self, number: u32, state: &State, out: &mut Vec<Input>) {
         let Some(device) = self.devices.get_mut(&number) else { return };
         device.reset_to(state, &self.area, out);
@@ -179,7 +179,7 @@ impl Translator {
         down.into_iter().for_each(|code| self.key(number, code, 1, out));
     }
 
-    /// Handles an event and appends its inputs.
+    /// Translates an event of the device with this number and appends the inputs.
     pub(super) fn event(&mut self, number: u32, event: Event, out: &mut Vec<Input>) {
         let Some(device) = self.devices.get_mut(&number) else { return };
         let Event { kind, code, value } = event;

@@ -13,7 +13,7 @@ use crate::texts;
 use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, Ui, Vec2, pos2, vec2};
 use glam::DVec3;
 
-/// Smallest tile that has axes, points: in a smaller one they would lie over the anatomy.
+/// Smallest size of a tile, points, on which the axes of the volume are drawn: on a smaller one they would cover anatomy.
 pub(super) const MIN_FOR_AXES: f32 = 480.0;
 /// A smaller picture has no colour bar, points.
 const MIN_FOR_COLOURS: f32 = 300.0;
@@ -24,7 +24,7 @@ const MIN_FOR_SCALE: f32 = 90.0;
 const RULER_WIDTH: f32 = 60.0;
 const BAR_ROOM: (f32, f32) = (0.35, 46.0);
 
-/// The areas of annotations: those that messages must not cover, and those that give way to messages.
+/// The areas of annotations, points: first those that messages must not cover, then those that give way to messages.
 pub(super) fn areas(state: &PanelState, scale: f32) -> [Vec<Rect>; 2] {
     let Some((shown, whole)) = shown(state, scale) else { return Default::default() };
     let (mut fixed, mut others) = (body_marks::areas(state, scale), Vec::new());
@@ -74,7 +74,7 @@ fn plane_area(area: Rect, tile: &TileMarks) -> Rect {
     Rect::from_center_size(near_edge(area, tile.plane_corner()), vec2(20.0, 20.0))
 }
 
-/// Draws the annotations. `messages`: areas that are covered by messages.
+/// Draws the annotations over the picture. `messages`: areas that messages cover, points.
 pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32, messages: &[Rect]) {
     let Some((shown, whole)) = shown(state, scale) else { return };
     let scene = &shown.scene;
@@ -145,7 +145,7 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32, messages: &[Rect]) 
     }
 }
 
-/// Names what the picture shows if not a patient, and the picture's delay, where no other annotations are drawn.
+/// Writes on the picture, if no other annotations are drawn, what it shows if that is no patient, and by how much a live picture is late.
 pub(super) fn paint_origin(ui: &Ui, state: &PanelState, scale: f32) {
     let picture = picture_rect(state, scale);
     let painter = ui.ctx().layer_painter(egui::LayerId::background()).with_clip_rect(picture);

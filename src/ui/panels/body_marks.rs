@@ -13,7 +13,7 @@ use egui::{Button, Label, Painter, Pos2, Rect, RichText, Sense, Stroke, StrokeKi
 /// Columns of the buttons of parts of the body.
 const COLUMNS: usize = 4;
 
-/// Draws the marks, and while their tool is selected also their squares, the selected one brighter.
+/// Draws the body marks over the picture. While their tool is selected, their squares are drawn, too, the selected one brighter.
 pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
     let Some((shown, picture)) = shown(state, scale) else { return };
     let painter = ui.ctx().layer_painter(egui::LayerId::background()).with_clip_rect(picture_rect(state, scale));
@@ -30,7 +30,7 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
     }
 }
 
-/// The squares of the body marks, which other annotations leave free, points.
+/// The squares of the body marks, points, which other annotations do not cover.
 pub(super) fn areas(state: &PanelState, scale: f32) -> Vec<Rect> {
     let Some((shown, picture)) = shown(state, scale) else { return Vec::new() };
     let marks = body_marks::drawn(state.controls.body_marks(), shown.scene.picture_size().map(f64::from));
@@ -60,7 +60,7 @@ fn draw(painter: &Painter, place: impl Fn([f64; 2]) -> Pos2, scale: f32, drawn: 
     }
 }
 
-/// Shows the controls of the selected body mark, while the tool is selected.
+/// Shows the controls of the selected body mark while the tool for body marks is selected.
 pub(super) fn show(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
     if state.controls.tool() != Tool::BodyMark {
         return;

@@ -3,7 +3,7 @@
 use egui::Shape;
 use egui::epaint::ClippedShape;
 
-/// Left, top, right, bottom.
+/// Left, top, right and bottom edge of a rectangle, points.
 pub type Area = [f32; 4];
 pub type Colour = [u8; 4];
 
@@ -29,7 +29,7 @@ pub enum Kind {
         corners: Vec<[f32; 2]>,
         fill: Colour,
     },
-    /// A text: its area, and the height of its largest letter.
+    /// A text; `area` is what it covers, `size` the height of its largest letter.
     Text {
         area: Area,
         text: String,
@@ -40,7 +40,7 @@ pub enum Kind {
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct Drawn {
-    /// The area to which the shape is clipped.
+    /// The area outside of which the shape is not drawn.
     pub clip: Area,
     pub kind: Kind,
 }

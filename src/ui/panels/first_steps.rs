@@ -20,7 +20,7 @@ const ABOVE_AXES: f32 = 118.0;
 /// Between the card and the left edge, where a letter is, points.
 const BESIDE: f32 = 28.0;
 
-/// True if a picture of this size, pixels, has room for the hints.
+/// True if the hints of the first start fit into a picture of this size, pixels. `scale`: pixels per point.
 pub(crate) fn has_room(picture: [u32; 2], scale: f32) -> bool {
     let [width, height] = picture.map(|edge| edge as f32 / scale);
     width >= MIN_PICTURE[0] && height >= MIN_PICTURE[1]

@@ -1,6 +1,6 @@
 //! Icons: those of Lucide (<https://lucide.dev>, ISC licence, some of them MIT: docs/licences/lucide.txt), as lines in a square of 240 units. Written by tools/icons.
 
-/// Points of lines: right, down; 255 begins another line.
+/// The lines of an icon: coordinates of their points (to the right, down); the value 255 begins another line.
 pub(super) type Icon = &'static [u8];
 
 pub(super) const ANGLE: Icon = &[

@@ -28,18 +28,18 @@ const LOW_DRAWER: f32 = 150.0;
 /// Between the content and the edges of the inspector, points: on the right is the scroll bar.
 const MARGINS: [f32; 2] = [12.0, 14.0];
 
-/// The state of the inspector.
+/// The state of the inspector, the panel with the sliders.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Inspector {
     tab: InspectorTab,
-    /// Whether the drawer is open, in a window that has one.
+    /// True if the inspector is open, in a window in which it is a drawer.
     pub is_open: bool,
-    /// The index of the slider that is to be shown, after a search.
+    /// The index of the slider that a search selected and that has to be scrolled to; None if none was.
     pub sought: Option<usize>,
 }
 
 impl Inspector {
-    /// The part that is shown in a window.
+    /// The tab that is shown in a window with this division.
     pub(crate) fn tab(&self, room: &Room) -> InspectorTab {
         match self.tab {
             InspectorTab::Tools if !room.has_tools_tab => InspectorTab::Look,
@@ -47,12 +47,13 @@ impl Inspector {
         }
     }
 
-    /// True if the inspector is drawn over the picture.
+    /// True if the inspector is an open drawer, which covers a part of the picture.
     pub(super) fn is_drawn_over(&self, room: &Room) -> bool {
         room.has_drawer && self.is_open
     }
 
-    /// Executes a command for the inspector; false if the command is for another part. A tool selects the part with its options and results.
+    /// Executes a command about the inspector; returns false for other commands. The selection of a tool selects the tab with its options and
+    /// results.
     pub(crate) fn apply(&mut self, command: &Command, room: &Room) -> bool {
         self.sought = None;
         match *command {
@@ -77,7 +78,7 @@ impl Inspector {
         true
     }
 
-    /// Selects the part with the options and results of a tool.
+    /// Selects the tab with the options and results of a tool.
     pub(crate) fn follow(&mut self, tool: Tool) {
         self.tab = match tool {
             Tool::Rotate => return,
@@ -95,7 +96,7 @@ fn tabs(room: &Room) -> impl Iterator<Item = (InspectorTab, &'static str, &'stat
     TABS.into_iter().filter(move |(tab, ..)| has_tools || *tab != InspectorTab::Tools)
 }
 
-/// Shows the inspector beside the picture.
+/// Shows the inspector as a column beside the picture. `looks`: thumbnails of the presets.
 pub(super) fn show_column(
     ui: &mut Ui,
     state: &PanelState,
@@ -108,7 +109,7 @@ pub(super) fn show_column(
     column.show(ui, |ui| show(ui, state, width, TABS_HEIGHT[0], looks, execute));
 }
 
-/// Shows the inspector over the right part of the picture, in a small window.
+/// Shows the inspector as a drawer over a part of the picture, in a small window. `looks`: thumbnails of the presets.
 pub(super) fn show_drawer(
     ui: &mut Ui,
     state: &PanelState,

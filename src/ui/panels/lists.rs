@@ -16,13 +16,13 @@ use egui::{
 use std::ffi::OsStr;
 use std::path::Path;
 
-/// The list of files to open.
+/// The list of files to open, as it is shown.
 pub(in super::super) struct FilesShown<'a> {
     pub(in super::super) folder: &'a str,
-    /// Number of recent files, which are the first entries.
+    /// Number of recent files, which are the first entries of the list.
     pub(in super::super) recent: usize,
     pub(in super::super) names: &'a [String],
-    /// The path that is being typed, and why it was rejected.
+    /// The path that is being typed, and why it was rejected, if it was; None if no path is being typed.
     pub(in super::super) typed: Option<(&'a str, Option<&'a str>)>,
 }
 

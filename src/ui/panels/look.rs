@@ -68,7 +68,7 @@ fn colours(settings: &Settings) -> &'static [(Colour, &'static str)] {
     }
 }
 
-/// Shows the part in this width, points.
+/// Shows this tab of the inspector, `width` points wide.
 pub(super) fn show(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
     let settings = state.controls.settings();
     let modes = RENDERED.map(|mode| (mode, mode.title()));

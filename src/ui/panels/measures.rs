@@ -30,7 +30,7 @@ const MARKING: [(MeasureKind, &str); 2] = [(MeasureKind::Text, texts::TEXT), (Me
 const CROSS: f32 = 5.0;
 const HEAD: f64 = 12.0;
 
-/// Shows the buttons of the measuring tools in this width, points.
+/// Shows the buttons of the measuring tools, in rows `width` points wide.
 pub(super) fn show_tools(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
     names::group(ui, texts::MEASURE, |ui| {
         ui.add_space(2.0);
@@ -43,7 +43,7 @@ pub(super) fn show_tools(ui: &mut Ui, state: &PanelState, width: f32, execute: &
     });
 }
 
-/// Shows the buttons for texts, arrows and body marks.
+/// Shows the buttons of the tools for texts, arrows and body marks.
 pub(super) fn show_marks(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
     names::group(ui, texts::TAB_MARKS, |ui| {
         ui.add_space(2.0);
@@ -81,7 +81,7 @@ fn kind_button(
     }
 }
 
-/// Shows the list of results in this width, points; nothing if there is none.
+/// Shows the list of results, `width` points wide; nothing if there are none.
 pub(super) fn show_results(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
     let measures = state.controls.measures();
     let is_measuring = matches!(state.controls.tool(), Tool::Measure(_));
@@ -198,7 +198,7 @@ fn next_step(state: &PanelState, kind: MeasureKind) -> &'static str {
     }
 }
 
-/// Draws measurements and annotations over the picture, and the contour of a cut in progress.
+/// Draws measurements and annotations, and the contour of a cut in progress, over the picture.
 pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
     let Some((ShownPicture { scene, volume, .. }, picture)) = shown(state, scale) else { return };
     let (measures, outline) = (state.controls.measures(), state.controls.outline());

@@ -59,22 +59,22 @@ use egui::{
 use std::sync::Arc;
 use std::time::Duration;
 
-/// The result of a layout.
+/// The result of a layout of the panels.
 pub(super) struct PanelOutput {
     pub(super) panels: gpu::window::Panels,
     pub(super) commands: Vec<Command>,
-    /// The tree of the panels for a screen reader, while one listens.
+    /// The accessibility tree of the panels; None if no screen reader listens.
     pub(super) tree: Option<TreeUpdate>,
-    /// Time until the panels need another layout without an event.
+    /// Time after which the panels need another layout even without an event.
     pub(super) repaint_after: Duration,
-    /// The shapes, before they become triangles.
+    /// The shapes of the panels, before they are divided into triangles.
     #[cfg(test)]
     pub(super) drawn: Vec<drawn::Drawn>,
 }
 
 #[cfg(test)]
 impl PanelOutput {
-    /// The corners of all triangles, points, and their colours: red, green, blue, opacity.
+    /// The corners of all triangles of the panels, points, and their colours: red, green, blue, opacity.
     pub(super) fn corners(&self) -> Vec<([f32; 2], [u8; 4])> {
         let meshes = self.panels.shapes.iter().filter_map(|shape| match &shape.primitive {
             egui::epaint::Primitive::Mesh(mesh) => Some(mesh),
@@ -84,7 +84,7 @@ impl PanelOutput {
     }
 }
 
-/// The panels of one window.
+/// The panels of one window: controls, messages and annotations around and over the picture.
 pub(super) struct Panels {
     context: egui::Context,
     egui_input: EguiInput,
@@ -98,7 +98,7 @@ pub(super) struct Panels {
 }
 
 impl Panels {
-    /// `scale`: pixels per point, limited to 0.5..=4. A larger one enlarges everything.
+    /// `scale`: pixels per point, limited to 0.5..=4; a larger one enlarges everything.
     pub(super) fn new(scale: f32) -> Panels {
         let context = egui::Context::default();
         apply_theme(&context);
@@ -117,14 +117,14 @@ impl Panels {
         self.scale
     }
 
-    /// Starts again after the device with the textures was lost: all textures are sent again.
+    /// Makes the next layout send all textures again, because the device that had them was lost.
     pub(super) fn reset(&mut self) {
         let is_described = self.is_described;
         *self = Panels::new(self.scale);
         self.describe(is_described);
     }
 
-    /// Sets whether the panels are described to a screen reader, from the next layout on.
+    /// Sets whether later layouts describe the panels to a screen reader.
     pub(super) fn describe(&mut self, is_described: bool) {
         self.is_described = is_described;
         match is_described {
@@ -138,7 +138,7 @@ impl Panels {
         self.is_described
     }
 
-    /// Performs a screen reader's request for a control.
+    /// Does what a screen reader requests of a control, in the next layout.
     pub(super) fn act(&mut self, request: ActionRequest) {
         self.egui_input.events.push(Event::AccessKitActionRequest(request));
     }
@@ -155,8 +155,8 @@ impl Panels {
         self.egui_input.press(key, EguiModifiers::NONE);
     }
 
-    /// Handles a key that went down for the focused control: Tab goes to the next one, arrows move a slider, Space and Enter press a button, Escape
-    /// removes the focus. False if no control has the focus, or it does not use the key.
+    /// Passes a pressed key to the focused control: Tab goes to the next one, arrows move a slider, Space and Enter press a button, Escape
+    /// removes the focus. Returns false if no control has the focus, or if it does not use the key.
     pub(super) fn key(&mut self, key: Key, modifiers: Modifiers) -> bool {
         let plain = modifiers == Modifiers::default();
         let back = modifiers == Modifiers { shift: true, ..Modifiers::default() };
@@ -180,7 +180,8 @@ impl Panels {
         true
     }
 
-    /// Handles a key that walks through the open list. `is_grid`: entries also stand side by side. False if the key does not walk.
+    /// Passes a key on that moves the focus through the open list. `is_grid`: entries are also side by side. Returns false if the key does not
+    /// move it.
     pub(super) fn walk(&mut self, key: Key, modifiers: Modifiers, is_grid: bool) -> bool {
         let Some(key) = walking::key(key, is_grid).filter(|_| modifiers == Modifiers::default()) else { return false };
         self.gets_focus = true;
@@ -198,7 +199,7 @@ impl Panels {
         self.egui_input.input(input, self.scale);
     }
 
-    /// True if a panel covers this position, pixels: a press there belongs to the panel.
+    /// True if a panel covers this position (pixels of the window), so that a press there does not reach the picture.
     pub(super) fn covers(&self, at: [f64; 2]) -> bool {
         let point = pos2(at[0] as f32 / self.scale, at[1] as f32 / self.scale);
         self.context.layer_id_at(point).is_some_and(|layer| layer.order != egui::Order::Background)
@@ -209,7 +210,7 @@ impl Panels {
         self.egui_input.has_pending_input()
     }
 
-    /// Lays out the panels in a window of this size, pixels, at a time in s.
+    /// Lays out the panels in a window of this size, pixels. `time`: s since any fixed moment.
     pub(super) fn lay_out(&mut self, state: &PanelState, size: [u32; 2], time: f64) -> PanelOutput {
         let (events, modifiers) = self.egui_input.take();
         let points = vec2(size[0] as f32, size[1] as f32) / self.scale;
@@ -448,58 +449,58 @@ impl Edges {
     }
 }
 
-/// What the panels show.
+/// What the panels show in a layout.
 pub(super) struct PanelState<'a> {
     pub(super) controls: &'a Controls,
-    /// The scene that is drawn next or was drawn last; controls refer to it.
+    /// The scene to which controls refer: the one that is drawn next or was drawn last. None before the first.
     pub(super) scene: Option<&'a Scene>,
-    /// The shown picture, to which marks over it refer; none before the first.
+    /// The shown picture, to which marks over it refer; None before the first.
     pub(super) picture: Option<&'a ShownPicture>,
     pub(super) times: &'a Times,
     pub(super) room: Room,
     pub(super) visible: &'a Visible,
-    /// What the pictures show if not a patient.
+    /// What the pictures show if it is no patient, such as the phantom; otherwise None.
     pub(super) origin: Option<&'a str>,
-    /// Whether the hints of the first start are shown.
+    /// True if the hints of the first start are shown.
     pub(super) shows_first_steps: bool,
-    /// Whether the picture is drawn with nothing over it but what it shows, if that is no patient.
+    /// True if nothing is drawn over the picture except `origin`.
     pub(super) shows_only_origin: bool,
-    /// The question about what leaving would lose.
+    /// The question whether to save what leaving the program would lose; None while it is not shown.
     pub(super) leaving: Option<&'static Unsaved>,
-    /// The list of files to open, while it is shown.
+    /// The list of files to open; None while it is not shown.
     pub(super) files: Option<FilesShown<'a>>,
-    /// The open recordings, and the file that is being read.
+    /// The open recordings; `reading` is the file that is being read.
     pub(super) recordings: &'a [Named],
     pub(super) reading: Option<&'a Reading>,
-    /// The list of presets, while it is shown.
+    /// The list of presets; None while it is not shown.
     pub(super) presets: Option<PresetsShown<'a>>,
-    /// Whether thumbnails of looks and volumes are made.
+    /// True if thumbnails of presets and volumes are drawn.
     pub(super) has_small_pictures: bool,
-    /// All presets.
+    /// All presets, with their thumbnails, for the inspector.
     pub(super) looks: Vec<PresetTile<'a>>,
-    /// Thumbnails of the loop's volumes; none where they are not made yet.
+    /// The thumbnail of each volume of the cine loop; None for one that is not drawn yet.
     pub(super) loop_pictures: &'a [Option<Arc<Picture>>],
-    /// Whether the turntable runs.
+    /// True if the turntable runs.
     pub(super) is_turning: bool,
-    /// Name and progress of the running export.
+    /// Name and progress of the running export; None if none runs.
     pub(super) exporting: Option<(&'a str, Option<Progress>)>,
     pub(super) is_frozen: bool,
-    /// Whether frames come from a probe or a pipe.
+    /// True if frames come from a probe or a pipe.
     pub(super) is_live: bool,
-    /// Whether the picture with the effect of the user's action is late.
+    /// True if the picture with the effect of the user's last action takes long.
     pub(super) is_late: bool,
-    /// Time since the probe or the pipe ended; nothing is live since then.
+    /// Time since the probe or the pipe ended, since when the picture is not live; None if it has not.
     pub(super) ended: Option<Duration>,
     pub(super) cine: CineState,
-    /// The current rung of the quality ladder, and the frame budget.
+    /// Name of the current rung of the quality ladder, and the frame budget (None: no limit).
     pub(super) quality: (&'a str, Option<Duration>),
     pub(super) banner: Option<Banner>,
     pub(super) notes: &'a [Note],
-    /// The keys that end the program, for the help.
+    /// Name of the key combination that ends the program, for the help.
     pub(super) exit_key: &'a str,
-    /// Where to draw a pointer, pixels of the window; `None` if the windowing system draws it.
+    /// Where the pointer is drawn, pixels of the window; `None` if the window system draws it.
     pub(super) pointer: Option<[f64; 2]>,
-    /// The pointer by keyboard, while it is on.
+    /// How the pointer that keys move is drawn; None while it is off.
     pub(super) keyboard_pointer: Option<PointerMark>,
 }
 
@@ -511,7 +512,7 @@ impl PanelState<'_> {
     }
 }
 
-/// A message that lasts.
+/// A message that stays as long as its cause.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Banner {
     pub(super) title: String,
@@ -519,14 +520,14 @@ pub(super) struct Banner {
     pub(super) is_fault: bool,
 }
 
-/// A message about an event.
+/// A message about an event, which is shown for a few seconds.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Note {
     pub(super) text: String,
     pub(super) is_fault: bool,
 }
 
-/// The area that the panels leave for the picture in a window of this size: upper left corner and size, pixels.
+/// The area that the panels leave for the picture in a window of this size, pixels: upper left corner and size. `scale`: pixels per point.
 pub fn picture_area(size: [u32; 2], scale: f32, shows_panels: bool) -> ([u32; 2], [u32; 2]) {
     let edges = Edges::of(size.map(|n| n as f32 / scale), shows_panels);
     let Edges { above, left, right, below } = edges;
@@ -534,16 +535,16 @@ pub fn picture_area(size: [u32; 2], scale: f32, shows_panels: bool) -> ([u32; 2]
     ([left, above], [size[0].saturating_sub(left + right).max(1), size[1].saturating_sub(above + below).max(1)])
 }
 
-/// Division of a window between the panels and the picture.
+/// How a window is divided between the panels and the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Room {
-    /// Upper left corner and size of the picture, pixels.
+    /// Upper left corner and size of the picture, pixels of the window.
     pub(super) picture: ([u32; 2], [u32; 2]),
-    /// Whether there is a bar at the top.
+    /// True if there is a bar at the top.
     pub(super) has_top: bool,
-    /// Whether the inspector is a drawer over the picture, as there is no room beside it.
+    /// True if the inspector is a drawer over the picture, because there is no room beside it.
     pub(super) has_drawer: bool,
-    /// Whether the tools are a part of the inspector, as not all have room in the rail.
+    /// True if the tools are a tab of the inspector, because not all of them have room at the edge of the window.
     pub(super) has_tools_tab: bool,
 }
 

@@ -10,7 +10,7 @@ use crate::view;
 use egui::accesskit::{Action, Live, Node, Rect as Bounds, Role};
 use egui::{Context, Id, Key, Response, Stroke, StrokeKind, Ui};
 
-/// The viewpoints with their names in the panels.
+/// The viewpoints of a rendering with their names in the panels.
 pub(super) const VIEWPOINTS: [(Viewpoint, &str); 4] = [
     (Viewpoint::Front, texts::VIEW_FRONT),
     (Viewpoint::Left, texts::VIEW_LEFT),
@@ -23,18 +23,18 @@ fn node(context: &Context, id: Id, change: impl FnOnce(&mut Node)) {
     _ = context.accesskit_node_builder(id, change);
 }
 
-/// Adds the description of a control for a screen reader.
+/// Adds to a control what a screen reader says about it.
 pub(super) trait Tell {
-    /// A tooltip, which is the description in the tree.
+    /// Adds a tooltip, which is also the description of the control.
     fn tell(self, hint: &str) -> Response;
-    /// A name in place of the text on the control.
+    /// Sets a name that takes the place of the text on the control.
     fn named(self, name: &str) -> Response;
     fn with_role(self, role: Role) -> Response;
-    /// The value in words, with its unit.
+    /// Sets the value of the control in words, with its unit.
     fn with_value(self, value: &str) -> Response;
-    /// Whether what it opens is open.
+    /// Says whether the list or panel that the control opens is open.
     fn expanded(self, is_open: bool) -> Response;
-    /// Whether it is the tab whose content is shown.
+    /// Says whether the control is the tab whose content is shown.
     fn chosen(self, is_chosen: bool) -> Response;
 }
 
@@ -75,7 +75,7 @@ impl Tell for Response {
     }
 }
 
-/// Describes a progress bar; `share`: 0 to 1, if known.
+/// Describes a progress bar to a screen reader. `share`: progress from 0 to 1; None if not known.
 pub(super) fn progress(bar: &Response, share: Option<f32>) {
     node(&bar.ctx, bar.id, |node| {
         node.set_min_numeric_value(0.0);
@@ -87,7 +87,7 @@ pub(super) fn progress(bar: &Response, share: Option<f32>) {
     });
 }
 
-/// Describes the range and step of a control that is set like a slider.
+/// Describes the range and step of a control that is adjusted like a slider to a screen reader.
 pub(super) fn range(control: &Response, [low, high]: [f64; 2], step: f64) {
     node(&control.ctx, control.id, |node| {
         node.set_min_numeric_value(low);
@@ -97,7 +97,7 @@ pub(super) fn range(control: &Response, [low, high]: [f64; 2], step: f64) {
     });
 }
 
-/// Gives the content of a [`Ui`] a role and a name.
+/// Gives the content of a [`Ui`] a role and a name for screen readers.
 pub(super) fn name(ui: &Ui, role: Role, name: &str) {
     node(ui.ctx(), ui.unique_id(), |node| {
         node.set_role(role);
@@ -105,7 +105,7 @@ pub(super) fn name(ui: &Ui, role: Role, name: &str) {
     });
 }
 
-/// Adds the entries of a list with this name.
+/// Adds a list with this name for screen readers. `add` adds its entries.
 pub(super) fn list<R>(ui: &mut Ui, title: &str, add: impl FnOnce(&mut Ui) -> R) -> R {
     ui.scope(|ui| {
         name(ui, Role::List, title);
@@ -114,7 +114,7 @@ pub(super) fn list<R>(ui: &mut Ui, title: &str, add: impl FnOnce(&mut Ui) -> R) 
     .inner
 }
 
-/// Adds a group of controls with this name.
+/// Adds a group with this name for screen readers. `add` adds its controls.
 pub(super) fn group<R>(ui: &mut Ui, title: &str, add: impl FnOnce(&mut Ui) -> R) -> R {
     ui.scope(|ui| {
         name(ui, Role::Group, title);
@@ -123,14 +123,14 @@ pub(super) fn group<R>(ui: &mut Ui, title: &str, add: impl FnOnce(&mut Ui) -> R)
     .inner
 }
 
-/// Announces a message: a screen reader reads a fault at once, and others when it has finished.
+/// Announces a message to a screen reader, which reads a fault at once and others when it has finished.
 pub(super) fn announce(ui: &Ui, text: &str, is_fault: bool) {
     name(ui, if is_fault { Role::Alert } else { Role::Status }, text);
     let live = if is_fault { Live::Assertive } else { Live::Polite };
     node(ui.ctx(), ui.unique_id(), |node| node.set_live(live));
 }
 
-/// Describes in words what the picture shows.
+/// Describes to a screen reader in words what the picture shows.
 pub(super) fn picture(ui: &Ui, state: &PanelState, scale: f32) {
     let at = picture_rect(state, scale);
     let (title, about) = in_words(state);
@@ -192,7 +192,7 @@ fn view_in_words(scene: &Scene) -> String {
     }
 }
 
-/// True if the keyboard or a screen reader changes a slider. (egui also reports changes without any input.)
+/// True if a slider was changed by the keyboard or a screen reader. (egui also reports changes without any input.)
 pub(super) fn asks_for_value(ui: &Ui, slider: &Response) -> bool {
     let has_focus = slider.has_focus();
     ui.input(|input| {
@@ -209,7 +209,7 @@ fn keep_in_view(control: &Response) {
     }
 }
 
-/// Draws the frame around the focused control: bright with a dark edge, so that it is visible on every colour.
+/// Draws the frame around the focused control: bright with a dark outline, so that it is visible on every colour.
 pub(super) fn mark_focus(context: &Context) {
     let focused = context.memory(|memory| memory.focused()).and_then(|id| context.read_response(id));
     let Some(control) = focused else { return };

@@ -83,9 +83,9 @@ impl Message {
     }
 }
 
-/// Shows banner and notes in the picture, one above the other. If there is not enough room, newer notes displace older ones and then the banner,
-/// until they expire. `taken`: height at the lower edge of the picture that is in use. Returns the covered areas: side letters and markers are not
-/// drawn there, and the scale only if it has no other place.
+/// Shows the banner and the notes over the picture, one above the other. If there is not enough room, newer notes displace older ones and then
+/// the banner, until they end. `taken`: height at the lower edge of the picture that is in use, points. Returns the covered areas, points:
+/// letters of sides and markers are not drawn there, and the scale only if it has no other place.
 pub(super) fn show_notes(ui: &mut Ui, state: &PanelState, scale: f32, taken: f32) -> Vec<Rect> {
     if state.banner.is_none() && state.notes.is_empty() {
         return Vec::new();
@@ -437,15 +437,15 @@ fn help_line(ui: &mut Ui, row: &HelpRow, size: f32) {
     }
 }
 
-/// The primary button of a question.
+/// A button with this text as the primary button of a question.
 pub(super) fn first<'a>(text: RichText) -> Button<'a> {
     Button::new(text.color(ON_SELECTED)).fill(SELECTED)
 }
 
-/// Below this height of the window, points, lists and questions have their smallest size.
+/// Height of a window, points, below which lists and questions have their smallest size.
 pub(super) const LOW_WINDOW: f32 = 360.0;
 
-/// Asks whether to save what would be lost when the program ends.
+/// Shows the question whether to save what would be lost when the program ends.
 pub(super) fn ask_to_leave(ui: &Ui, unsaved: &Unsaved, execute: &mut dyn FnMut(Command)) {
     let screen = ui.ctx().content_rect();
     // Nothing behind it reacts.

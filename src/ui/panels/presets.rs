@@ -16,24 +16,24 @@ use egui::{
 };
 use std::sync::Arc;
 
-/// The list while it is shown.
+/// The list of presets, as it is shown.
 pub(crate) struct PresetsShown<'a> {
     pub tiles: Vec<PresetTile<'a>>,
-    /// Whether presets of the user can be saved.
+    /// True if the user can save presets.
     pub(crate) can_save: bool,
-    /// Why the user's presets cannot be read.
+    /// The reason why the user's presets cannot be read; None if they can.
     pub fault: Option<&'a str>,
-    /// The name that is being typed, and whether a preset is renamed.
+    /// The name that is being typed, and true if it renames a preset; None if no name is being typed.
     pub naming: Option<(&'a str, bool)>,
     pub(crate) can_restore: bool,
 }
 
-/// A preset of the list.
+/// A preset in the list, with its thumbnail.
 pub(crate) struct PresetTile<'a> {
     pub name: &'a str,
     pub hint: &'a str,
     pub picture: Option<Arc<Picture>>,
-    /// The index among the user's presets, if it is one of them.
+    /// The index among the user's presets; None for a built-in preset.
     pub own: Option<usize>,
 }
 
@@ -46,12 +46,12 @@ const NAME: f32 = 26.0;
 /// Height of the buttons below a preset of the user.
 const BUTTONS: f32 = 36.0;
 
-/// The textures of the thumbnails.
+/// The textures of thumbnails, each with its picture.
 #[derive(Default)]
 pub(super) struct Textures(Vec<(Arc<Picture>, TextureHandle)>);
 
 impl Textures {
-    /// The textures of the pictures of each list. Textures of other pictures are released.
+    /// The textures of the pictures in each list; None where there is no picture. Textures of other pictures are released.
     pub(super) fn of<const N: usize>(
         &mut self,
         context: &Context,
@@ -81,7 +81,7 @@ const COLUMNS: usize = 4;
 const ROWS: usize = 2;
 const SMALL_NAME: f32 = 16.0;
 
-/// Shows presets as thumbnails, and a button that opens the list in which they are saved, renamed and deleted.
+/// Shows presets as thumbnails, and a button that opens the list in which presets are saved, renamed and deleted. `textures`: the thumbnails.
 pub(super) fn show_strip(
     ui: &mut Ui,
     state: &PanelState,

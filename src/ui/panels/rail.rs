@@ -65,7 +65,7 @@ fn button_height(height: f32) -> Option<f32> {
     (each >= HEIGHTS[2]).then(|| each.min(HEIGHTS[0]).floor())
 }
 
-/// True if a rail of this height, points, has room for every tool.
+/// True if a rail (the column of tools) of this height, points, has room for every tool.
 pub(super) fn has_all(height: f32) -> bool {
     button_height(height).is_some()
 }
@@ -100,7 +100,7 @@ pub(super) fn show(ui: &mut Ui, state: &PanelState, height: f32, execute: &mut d
     });
 }
 
-/// Shows the tools in the inspector.
+/// Shows the tools as a grid in the inspector, `width` points wide.
 pub(super) fn show_grid(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
     names::group(ui, texts::TOOLS, |ui| {
         heading(ui, texts::TOOLS);
@@ -155,7 +155,7 @@ fn button(ui: &mut Ui, icon: Icon, name: &str, size: Vec2, is_chosen: bool) -> R
     response
 }
 
-/// Draws an icon in a square.
+/// Draws an icon into a square, points.
 pub(super) fn paint(painter: &egui::Painter, icon: Icon, square: Rect, colour: egui::Color32) {
     let stroke = Stroke::new((square.width() / 12.0).max(1.2), colour);
     for line in icon.split(|n| *n == u8::MAX) {
@@ -165,7 +165,7 @@ pub(super) fn paint(painter: &egui::Painter, icon: Icon, square: Rect, colour: e
     }
 }
 
-/// A button of this width with an icon and an optional text; `name`: its name for a screen reader.
+/// A button with an icon and a text, which may be empty. `name`: its name for a screen reader; `size`: points.
 pub(super) fn icon_button(
     ui: &mut Ui,
     icon: Icon,

@@ -12,11 +12,11 @@ use egui::{
     WidgetType, vec2,
 };
 
-/// The file that is being read.
+/// The name of the file that is being read, and its progress.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reading {
     pub name: String,
-    /// Progress 0..=1, if known, and its description.
+    /// Progress from 0 to 1; None if not known. `text` states it in words.
     pub share: Option<f32>,
     pub text: String,
 }
@@ -24,7 +24,7 @@ pub struct Reading {
 /// Width of the button that closes a recording, points.
 const CLOSE: f32 = 36.0;
 
-/// Shows the list of recordings, if more than one is open.
+/// Shows the list of open recordings, if more than one is open.
 pub(super) fn show_list(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
     if state.recordings.len() < 2 {
         return;
@@ -78,7 +78,7 @@ fn reading_place(state: &PanelState, scale: f32) -> ReadingPlace {
     ReadingPlace { has_bar, height, width, top, is_alone }
 }
 
-/// The area of the picture that [`show_reading`] covers, while a file is being read.
+/// The area that [`show_reading`] covers, points; None if no file is being read.
 pub(super) fn reading_area(state: &PanelState, scale: f32) -> Option<Rect> {
     state.reading?;
     let ReadingPlace { height, width, top, .. } = reading_place(state, scale);
@@ -86,7 +86,7 @@ pub(super) fn reading_area(state: &PanelState, scale: f32) -> Option<Rect> {
     Some(Rect::from_min_size(top - vec2(width / 2.0, 0.0), vec2(width, height)).expand2(vec2(16.0, 0.0)))
 }
 
-/// Shows the file that is being read, below the messages. Returns the height that it takes from them.
+/// Shows the progress of the file that is being read over the picture, below the messages. Returns the height that it takes from them, points.
 pub(super) fn show_reading(ui: &mut Ui, state: &PanelState, scale: f32, execute: &mut dyn FnMut(Command)) -> f32 {
     let Some(reading) = state.reading else { return 0.0 };
     let ReadingPlace { has_bar, height, width, top, is_alone } = reading_place(state, scale);

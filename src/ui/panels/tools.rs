@@ -12,12 +12,12 @@ use crate::texts;
 use crate::view;
 use egui::{Button, Label, RichText, Ui, vec2};
 
-/// The indices of the sliders for clip faces that exist in these settings.
+/// The indices of the two sliders for faces of clip planes; None for one that does not exist with these settings.
 pub(super) fn of_clip(settings: &Settings) -> [Option<usize>; 2] {
     ["cap.enabled", "cap.level"].map(|key| front(&[key], settings))
 }
 
-/// Shows, while there are clip planes, the switch and the level of the echoes on their faces.
+/// Shows, while there are clip planes, the switch for showing echoes on cut faces, and their level.
 pub(super) fn clip(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
     let there = of_clip(state.controls.settings());
     if there == [None; 2] {
@@ -32,13 +32,13 @@ pub(super) fn clip(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dy
     });
 }
 
-/// The index of the slider for the depth of the last cut, if it is shown.
+/// The index of the slider for the depth of the last cut; None if the slider is not shown.
 pub(super) fn depth_of_cut(state: &PanelState) -> Option<usize> {
     front(&["cuts.depth"], state.controls.settings()).filter(|_| state.controls.tool() == Tool::Cut)
 }
 
-/// Shows, with the tool for cuts, the side of a contour that is kept and the depth of the last cut; and a button that removes the cuts, if there are
-/// any.
+/// Shows, while the tool for cuts is selected, which side of a contour is kept and the depth of the last cut; and, if there are cuts, a button
+/// that removes them.
 pub(super) fn cuts(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
     let is_chosen = state.controls.tool() == Tool::Cut;
     let is_brush = state.controls.tool() == Tool::Brush;
@@ -71,7 +71,7 @@ pub(super) fn cuts(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dy
     });
 }
 
-/// Shows, with its tool, the next step for a curved plane; and a button that removes the plane, if there is one.
+/// Shows, while the tool for curved planes is selected, what to do next; and, if there is a curved plane, a button that removes it.
 pub(super) fn curve(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
     let (is_chosen, line) = (state.controls.tool() == Tool::Curve, state.controls.line());
     let has_curve = state.controls.settings().planes.curve.is_some();
@@ -110,8 +110,8 @@ pub(super) fn curve(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut d
     });
 }
 
-/// Shows, with the tool for the region, the switch of the start line, the depths of its handles and their number; without that tool only the switch,
-/// if the line is bent.
+/// Shows, while the tool for the region is selected, the switch of the start curve, the depths of its handles and their number; with other tools
+/// only the switch, if the start curve is bent.
 pub(super) fn start_line(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
     let Some(scene) = state.scene.filter(|scene| scene.renders()) else { return };
     let points = state.controls.settings().region.start_curve.as_deref();

@@ -254,7 +254,7 @@ fn clipped(ui: &Ui, text: &str, area: Rect) {
     ui.painter().galley(pos2(area.left(), area.center().y - galley.size().y / 2.0), galley, TEXT);
 }
 
-/// Shows the buttons of this bar in the inspector of a window without it.
+/// Shows the buttons of the bar at the top in the inspector, if the window has no such bar.
 pub(super) fn show_buttons(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
     if state.room.has_top {
         return;

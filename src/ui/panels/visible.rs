@@ -10,32 +10,32 @@ use crate::palette;
 const MAX_SEARCH: usize = 40;
 const MAX_NUMBER: usize = 10;
 
-/// The search of all commands and controls.
+/// The search of all commands and controls: its text and the selected result.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Search {
     pub text: String,
-    /// The index of the selected result.
+    /// The index of the selected result of the search.
     pub chosen: usize,
 }
 
-/// What is shown besides the picture.
+/// Which panels are shown besides the picture.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Visible {
-    /// Whether bars and inspector are shown.
+    /// True if bars and inspector are shown.
     pub panels: bool,
     pub help: bool,
     pub search: Option<Search>,
-    /// Whether the display of times is shown.
+    /// True if the display of times is shown.
     pub times: bool,
-    /// Whether the list of export formats is shown.
+    /// True if the list of export formats is shown.
     pub exports: bool,
     pub inspector: Inspector,
-    /// The index of the slider for which a number is being typed, and the typed text.
+    /// The index of the slider whose value is being typed, and the typed text; None if none is.
     pub value: Option<(usize, String)>,
 }
 
 impl Visible {
-    /// Executes a command that opens or closes something; false if it is another command.
+    /// Executes a command that opens or closes something; returns false for other commands.
     pub(crate) fn apply(&mut self, command: &Command, room: &Room) -> bool {
         match *command {
             Command::ToggleHelp => self.help = !self.help,
@@ -56,29 +56,29 @@ impl Visible {
         self.help || self.times || self.exports || self.search.is_some() || self.inspector.is_drawn_over(room)
     }
 
-    /// Closes the list of formats. False if it is not open.
+    /// Closes the list of export formats. Returns false if it is not shown.
     pub(crate) fn close_exports(&mut self) -> bool {
         std::mem::take(&mut self.exports)
     }
 
-    /// Closes one of these, in this order: a typed number, the search, the help. False if none is open.
+    /// Closes the first of these that is open: a value being typed, the search, the help. Returns false if none is.
     pub(crate) fn close_help(&mut self) -> bool {
         self.value.take().is_some() || self.search.take().is_some() || std::mem::take(&mut self.help)
     }
 
-    /// Closes the display of times. False if it is not shown.
+    /// Closes the display of times. Returns false if it is not shown.
     pub(crate) fn close_times(&mut self) -> bool {
         std::mem::take(&mut self.times)
     }
 
-    /// Closes the drawer. False if it is not open, or the window has none.
+    /// Closes the inspector if it is an open drawer. Returns false if it is not.
     pub(crate) fn close_drawer(&mut self, room: &Room) -> bool {
         let is_open = self.inspector.is_drawn_over(room);
         self.inspector.is_open &= !is_open;
         is_open
     }
 
-    /// The commands of a key for a typed number or the search; none if the key is for something else.
+    /// The commands of a key that belongs to a value being typed or to the search; None if it belongs to something else.
     pub(crate) fn key(&mut self, key: Key, modifiers: Modifiers) -> Option<Vec<Command>> {
         if modifiers.control || modifiers.alt {
             return None;

@@ -7,7 +7,7 @@ use egui::{FocusDirection, Id, Key, Response, Ui};
 /// Entries that Page up and Page down pass.
 const PAGE: usize = 10;
 
-/// The key of egui for a key that walks; none for others. In a grid, left and right walk too.
+/// The key of egui for a key that moves the focus through a list; None for other keys. In a grid, left and right do it, too.
 pub(super) fn key(key: InputKey, is_grid: bool) -> Option<Key> {
     Some(match key {
         InputKey::Up => Key::ArrowUp,
@@ -22,7 +22,7 @@ pub(super) fn key(key: InputKey, is_grid: bool) -> Option<Key> {
     })
 }
 
-/// A list of this layout that can be walked through.
+/// A list in this layout through which keys can move the focus.
 pub(super) struct Walk {
     id: Id,
     /// The entry that gets the keyboard focus now.
@@ -30,7 +30,7 @@ pub(super) struct Walk {
 }
 
 impl Walk {
-    /// Called before the entries are shown. `columns`: number of entries side by side.
+    /// Call it before the entries are shown. `count`: number of entries; `columns`: number of entries side by side.
     pub(super) fn new(ui: &Ui, title: &str, count: usize, columns: usize) -> Walk {
         let id = Id::new(("walk", title));
         // Where the keyboard was in the layout before; an entry that still has it says so again.
@@ -59,7 +59,7 @@ impl Walk {
         Walk { id, wanted }
     }
 
-    /// Called after the n-th entry is shown.
+    /// Call it after the n-th entry was shown.
     pub(super) fn entry(&self, n: usize, entry: &Response) {
         if self.wanted == Some(n) {
             entry.request_focus();

@@ -13,7 +13,7 @@ use egui::{
     Ui, WidgetInfo, WidgetType, pos2, vec2,
 };
 
-/// Distance between messages, points.
+/// Distance between two messages, points.
 pub(super) const BETWEEN_MESSAGES: f32 = 8.0;
 /// Distance of messages from the upper and from the lower edge of the picture, points.
 pub(super) const MESSAGE_EDGES: [f32; 2] = [12.0, 14.0];
@@ -23,17 +23,17 @@ const SLIDER_ROW: f32 = 34.0;
 /// Height of a slider, points; its knob has 0.8 of it.
 const KNOB: f32 = 26.0;
 
-/// The frame of a message with an edge of this colour.
+/// The frame of a message, with an outline of this colour.
 pub(super) fn message_frame(edge: Color32) -> Frame {
     Frame::new().fill(MESSAGE).inner_margin(Margin::symmetric(16, 10)).corner_radius(8).stroke(Stroke::new(2.0, edge))
 }
 
-/// The index of the first slider among these keys that exists in the mode.
+/// The index of the slider for the first of these keys that exists with these settings; None if none does.
 pub(super) fn front(keys: &[&str], settings: &Settings) -> Option<usize> {
     keys.iter().find_map(|key| SLIDERS.iter().position(|s| s.key == *key && s.applies(settings)))
 }
 
-/// A slider of the settings: name, rail, and value, which can be typed after a click.
+/// Shows the slider with the index `number`: name, rail, and value, which can be typed after a click.
 pub(super) fn slider(ui: &mut Ui, state: &PanelState, number: usize, name: &str, execute: &mut dyn FnMut(Command)) {
     let slider = &SLIDERS[number];
     let settings = state.controls.settings();
@@ -160,7 +160,7 @@ fn row(
     .inner
 }
 
-/// Placeholder for a control that the mode does not have.
+/// Shows a name in place of a control that the present mode does not have.
 pub(super) fn absent(ui: &mut Ui, name: &str) {
     let (area, response) = ui.allocate_exact_size(vec2(ui.available_width(), SLIDER_ROW), Sense::hover());
     let font = FontId::proportional(TEXT_SIZE);
@@ -170,7 +170,7 @@ pub(super) fn absent(ui: &mut Ui, name: &str) {
     response.on_hover_text(texts::NO_SUCH_CONTROL);
 }
 
-/// Buttons of which one is selected, under a title, in rows that fill this width, points.
+/// Shows buttons of which one is selected, under a title, in rows of `columns` buttons that are `width` points wide.
 pub(super) fn row_of<T: Copy>(
     ui: &mut Ui,
     title: &str,
@@ -198,12 +198,13 @@ pub(super) fn row_of<T: Copy>(
     });
 }
 
-/// A slider in mm for a value that is no setting. Returns the value if the user changes it.
+/// Shows a slider in mm for a value that is no setting. `before`: the present value. Returns the new value if the user changes it.
 pub(super) fn plain_slider(ui: &mut Ui, name: &str, before: f64, range: [f64; 2], hint: &str) -> Option<f64> {
     scale_slider(ui, name, before, (range, 0.5), texts::millimetres(before), hint)
 }
 
-/// A slider for a value that is no setting, with its range and step; `shown`: the displayed value. Returns the value if the user changes it.
+/// Shows a slider for a value that is no setting. `before`: the present value; `shown`: the value as displayed. Returns the new value if the
+/// user changes it.
 pub(super) fn scale_slider(
     ui: &mut Ui,
     name: &str,
@@ -229,7 +230,7 @@ pub(super) fn scale_slider(
     ((is_held || names::asks_for_value(ui, &slider)) && value != before).then_some(value)
 }
 
-/// A switch with its name; the whole row reacts. True if the user changed it.
+/// Shows a switch with its name; the whole row reacts. Returns true if the user changed it.
 pub(super) fn switch(ui: &mut Ui, on: &mut bool, name: &str, hint: &str) -> bool {
     switch_row(ui, on, name, hint).clicked()
 }

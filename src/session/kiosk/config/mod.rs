@@ -18,56 +18,57 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 use toml::de::{DeTable, DeValue};
 
-/// Default path of the configuration of the service.
+/// Default path of the configuration file of the service.
 pub const DEFAULT_PATH: &str = "/etc/echolume/echolume.toml";
-/// Path of the log in the example configuration.
+/// Path of the log file in the example configuration.
 pub(crate) const DEFAULT_LOG: &str = "/var/log/echolume/echolume.log";
-/// The source that needs no file.
+/// Value of `source` that stands for the built-in phantom.
 pub const PHANTOM: &str = "phantom";
 
-/// The configuration of a cart.
+/// The configuration of a kiosk, such as the program on an ultrasound cart.
 ///
-/// The keys at the top select the source. They are the flags of `echolume stream` with `_` for `-`, and are checked as those. Everything
-/// else is in tables.
+/// The keys at the top select the source. They are the flags of `echolume stream` with `_` for `-`, and are checked as those. Everything else is
+/// in tables.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Config {
     /// The version of this file's keys. Default: 1, the only one.
     version: FileVersion,
-    /// `phantom` (the default), a recording, or `igtl://HOST[:PORT]`.
+    /// The source of frames: `phantom` (the default), a recording, or `igtl://HOST[:PORT]`.
     pub source: String,
-    /// Geometry of the probe (TOML), if the source does not contain it. Default: none.
+    /// Path of the probe file (TOML) with the geometry, if the source does not state it. Default: none.
     pub probe: Option<PathBuf>,
-    /// Volumes per second of a recording or the phantom, above 0, at most 1e6. Default: as fast as possible; the phantom 1.
+    /// Volumes per second at which a recording or the phantom is played, above 0, at most 1e6. Default: as fast as possible; the phantom 1.
     pub rate: Option<f64>,
-    /// Play a recording at the times of its stamps. Default: false.
+    /// Play a recording at the times of its time stamps. Default: false.
     pub real_time: bool,
     /// Number of times that a recording is played, 1 or more. Default: 1.
     pub rounds: Option<u32>,
-    /// Play a recording repeatedly, for demonstrations. Default: false.
+    /// Play a recording again and again, for demonstrations. Default: false.
     #[serde(rename = "loop")]
     pub(crate) forever: bool,
-    /// OpenIGTLink: the TRANSFORM or the tool of TDATA that places 2D frames; `image`: their own matrix. Default: any TRANSFORM.
+    /// OpenIGTLink: the TRANSFORM or the tool of TDATA that gives the poses of 2D frames; `image`: the matrix of each image. Default: any
+    /// TRANSFORM.
     pub tool: Option<String>,
-    /// OpenIGTLink: the device whose images are taken, where there are several. Default: all.
+    /// OpenIGTLink: name of the device whose images are used, if there are several. Default: all.
     pub device_name: Option<String>,
-    /// OpenIGTLink: messages whose checksum is 0 are taken, unchecked. Default: false.
+    /// OpenIGTLink: accept messages with the checksum 0 without verifying it. Default: false.
     pub no_checksum: bool,
-    /// The part of each tracked frame that is ultrasound, pixels: x, y, width, height. Default: all of it.
+    /// The part of each tracked frame that is used, pixels: x, y, width, height. Default: all of it.
     pub clip: Option<[u32; 4]>,
-    /// Distance between the voxels that tracked frames are compounded into, 0.01 to 1000 mm. Default: between the frames' pixels.
+    /// Voxel spacing of the volume that tracked frames are compounded into, 0.01 to 1000 mm. Default: the distance between the frames' pixels.
     pub spacing: Option<f64>,
     /// Widest gap between tracked frames that is filled, 0 to 1000 mm. Default: 2.
     pub hole: Option<f64>,
-    /// Length of a freehand sweep, 0 to 1000 mm: its volume has room for it from the first frames on. Default: none is stated.
+    /// Length of a freehand sweep, 0 to 1000 mm, for which its volume has room from the first frames on. Default: not stated.
     pub extent: Option<f64>,
-    /// Presets of the scene, each over the one before. Default: none.
+    /// Names of presets of the scene; later ones take precedence. Default: none.
     pub preset: Vec<String>,
     /// Vulkan device, by number or part of its name. Default: the best.
     pub device: Option<String>,
-    /// The motor that moves the array. Default: none.
+    /// The motor that sweeps the array. Default: none.
     pub motor: Option<Motor>,
-    /// The content of a scene file, over the presets. Default: empty.
+    /// Settings as in a scene file, which take precedence over the presets. Default: empty.
     pub scene: toml::Table,
     pub display: Display,
     pub keys: Keys,
@@ -78,45 +79,45 @@ pub struct Config {
     locations: KeyLocations,
 }
 
-/// The motor of the probe: the flags of `echolume stream --motor`. `port` and `sweeps` are needed.
+/// The motor of the probe: the flags that `echolume stream --motor` has. `port` and `sweeps` are required.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Motor {
-    /// Serial port.
+    /// Serial port of the motor, for example `/dev/ttyUSB0`.
     pub port: Option<String>,
-    /// Angle from end to end, degrees. Default: 5 % wider than the frames.
+    /// Angle of the sweep from end to end, degrees. Default: 5 % wider than the frames.
     pub angle: Option<f64>,
-    /// Passes over the angle per second; each gives a volume.
+    /// Passes over the angle per second; each pass gives a volume.
     pub sweeps: Option<f64>,
     /// The motor's home is known: it was found before, and its controller has been on since. Default: false.
     pub homed: bool,
-    /// Time from a frame's last line to its arrival, 0 to 10000 ms. Default: 0.
+    /// Time from the last line of a frame to its arrival, 0 to 10000 ms. Default: 0.
     pub delay: Option<f64>,
-    /// Frames are stamped with the time of their first line, by the clock of this machine. Default: false.
+    /// The time stamp of a frame is the time of its first line on the clock of this machine. Default: false.
     pub stamps: bool,
-    /// Bits a second, 300 to 4000000. Default: 9600.
+    /// Baud rate of the serial port, bits a second, 300 to 4000000. Default: 9600.
     pub baud: Option<u32>,
-    /// `none`, `even` or `odd`. Default: none.
+    /// Parity of the serial port: `none`, `even` or `odd`. Default: none.
     pub parity: Option<String>,
-    /// 1 or 2. Default: 1.
+    /// Stop bits of the serial port: 1 or 2. Default: 1.
     pub stop_bits: Option<u8>,
     /// Longest wait for a reply of the controller, 20 to 10000 ms. Default: 500.
     pub timeout: Option<u64>,
 }
 
-/// The screen.
+/// Table `display`: the screen and the window.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Display {
-    /// Default: true.
+    /// Show the window in full screen. Default: true.
     pub full_screen: bool,
-    /// Show directly on the monitor (VK_KHR_display), without a windowing system. Default: false.
+    /// Draw directly on the monitor (VK_KHR_display), without a window system. Default: false.
     pub direct: bool,
-    /// A part of the name of the monitor. Default: the first.
+    /// A part of the name of the monitor to use. Default: the first monitor.
     pub monitor: Option<String>,
-    /// Size of a window that is not full-screen, pixels, each edge 64 to 16384. Default: 1280 x 800.
+    /// Width and height of a window that is not full-screen, pixels, 64 to 16384 each. Default: 1280 x 800.
     pub size: [u32; 2],
-    /// Default: fifo.
+    /// How pictures reach the screen. Default: fifo.
     pub present: Present,
     /// Show sliders and buttons at the start. Default: true.
     pub panels: bool,
@@ -125,11 +126,11 @@ pub struct Display {
     /// Frame budget: longest time of a picture while the view moves, 1 ms to 10 s; `none` (None): no limit. Default: 33 ms.
     #[serde(with = "optional_duration")]
     pub budget: Option<Duration>,
-    /// The error.json of `echolume report error` with the quality ladder for the budget. Default: the built-in ladder.
+    /// Path of the error.json of `echolume report error` from which the quality ladder for the budget is made. Default: the built-in ladder.
     pub report: Option<PathBuf>,
 }
 
-/// How pictures reach the screen.
+/// How pictures reach the screen: the present mode of the swapchain.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Present {
@@ -140,47 +141,48 @@ pub enum Present {
     Mailbox,
 }
 
-/// Keys of the keyboard.
+/// Table `keys`: key combinations of the kiosk.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Keys {
-    /// The keys that end the program; `none`: no keys. Default: ctrl+alt+q.
+    /// The key combination that ends the program; `none` (the value None): no combination does. Default: ctrl+alt+q.
     #[serde(with = "optional_chord")]
     pub exit: Option<Chord>,
 }
 
-/// The live stream.
+/// Table `live`: how live volumes are shown and kept.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Live {
-    /// Default: whole.
+    /// How arriving frames become visible. Default: whole.
     pub update: Update,
-    /// Number of volumes in the cine loop, 1 to 1000. Default: 20.
+    /// Largest number of volumes in the cine loop, 1 to 1000. Default: 20.
     pub cine_volumes: u32,
-    /// Memory for the cine loop, 16 to 65536 MiB; it limits the number of volumes. Default: 512.
+    /// Largest memory of the cine loop, 16 to 65536 MiB, which also limits the number of its volumes. Default: 512.
     pub cine_memory_mb: u32,
     /// Time between attempts to open the source, 100 ms to 10 min. Default: 2 s.
     #[serde(with = "duration")]
     pub retry: Duration,
-    /// Folder for recordings of all frames that arrive. Default: none, no recording.
+    /// Folder in which all frames that arrive are recorded. Default: none, no recording.
     pub record: Option<PathBuf>,
 }
 
-/// Files that the program writes.
+/// Table `files`: files that the program writes.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Files {
-    /// Folder for saved pictures and loops. Default: the current folder.
+    /// Folder for saved pictures and cine loops. Default: the current folder.
     pub pictures: Option<PathBuf>,
-    /// Log file. Default: standard error, which is the journal of a service.
+    /// Path of the log file. Default: none; the log goes to standard error, which is the journal of a service.
     pub log: Option<PathBuf>,
-    /// Size of one log file, 1 to 1024 MiB. Default: 10.
+    /// Largest size of one log file, 1 to 1024 MiB. Default: 10.
     pub log_size_mb: u32,
     /// Number of log files, including the current one, 1 to 100. Default: 5.
     pub log_files: u32,
-    /// File for metrics of Prometheus, rewritten every 15 s. Default: none.
+    /// Path of a file with metrics for Prometheus, rewritten every 15 s. Default: none.
     pub prometheus: Option<PathBuf>,
-    /// Recordings, pictures, workspaces and logs are for the user of the program alone, whatever the umask; false: they follow it. Default: true.
+    /// True: recordings, pictures, workspaces and logs can be read by the program's user alone, whatever the umask. False: the umask decides.
+    /// Default: true.
     pub private: bool,
 }
 
@@ -250,10 +252,10 @@ impl Default for Files {
 }
 
 impl Config {
-    /// Reads the file, of at most 1 MiB.
+    /// Reads a configuration file of at most 1 MiB.
     ///
     /// # Errors
-    /// One line: the file is missing, not a regular file, too long or not text, or see [`Config::parse`].
+    /// One line: the file is missing, not a regular file, too long or not text, or [`Config::parse`] refuses it.
     pub fn read(path: &Path) -> Result<Config, ConfigError> {
         let text = load::read(path, "configuration").map_err(|error| match error {
             LoadError::File { fault, .. } => ConfigError::of_file(path, fault),
@@ -262,7 +264,7 @@ impl Config {
         Config::parse(&text, path)
     }
 
-    /// Parses the text of a file at `path`, and checks everything that needs no source and no device.
+    /// Parses the text of a configuration, and checks everything that needs no source and no device. `path`: that of its file, for messages.
     ///
     /// # Errors
     /// One line that names the file, the line, the key and the allowed values.
@@ -283,7 +285,8 @@ impl Config {
         toml::to_string(self).map_err(|e| printable(&e.to_string()))
     }
 
-    /// The settings of the scene in layers: the preset of the phantom if that is the source, then the presets, then the scene.
+    /// The settings of the scene as layers, of which later ones take precedence: the preset of the phantom if that is the source, the presets,
+    /// the settings in `scene`.
     ///
     /// # Errors
     /// As for a scene file.
@@ -466,7 +469,7 @@ fn flag(key: &str) -> String {
 }
 
 impl Config {
-    /// The arguments of `echolume stream` for the same source, each as one word `--flag=value`.
+    /// The arguments of `echolume stream` that select the same source, each as one word `--flag=value`.
     pub fn source_arguments(&self) -> Vec<String> {
         let path = |path: &Path| path.to_string_lossy().into_owned();
         let clip = self.clip.map(|clip| clip.map(|n| n.to_string()).join(","));
@@ -506,7 +509,8 @@ impl Config {
         values.chain(switches.into_iter().filter(|(_, on)| *on).map(|(key, _)| flag(key))).collect()
     }
 
-    /// Converts a message about those arguments to one about the file: with keys instead of flags, and the line of the first key.
+    /// Converts an error message about the arguments of [`Config::source_arguments`] to one about the configuration file: with keys in place of
+    /// flags, and the line of the first key.
     pub fn flag_error(&self, message: &str) -> ConfigError {
         let mut text_with_keys = message.to_string();
         let mut first: Option<(usize, &str)> = None;
@@ -540,7 +544,7 @@ impl Config {
 /// Longest part of a message that comes from the file, characters.
 const MAX_MESSAGE: usize = 400;
 
-/// An error in a configuration, in one line: the file, the line and the key if they are known, and the fault.
+/// An error in a configuration file, as one line: the file, the line and the key if they are known, and the fault.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub struct ConfigError {
     path: PathBuf,

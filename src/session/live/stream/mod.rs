@@ -24,16 +24,16 @@ use std::time::{Duration, Instant};
 /// Longest wait for an event while a picture is being drawn. The end of the picture is noticed no later than that.
 const DRAWING_WAIT: Duration = Duration::from_micros(200);
 
-/// A step of the work before the first picture.
+/// What a stream does, or waits for, before its first picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StartStep {
-    /// Nothing has arrived from the source.
+    /// It waits for the source, from which nothing has arrived.
     Source,
     /// `done` of `count` pipelines are compiled.
     Compiling { done: usize, count: usize },
     /// `done` of `count` frames of the first volume have arrived.
     Frames { done: u64, count: u64 },
-    /// The first picture is drawn next.
+    /// It is about to draw the first picture.
     Picture,
 }
 
@@ -46,16 +46,16 @@ fn coarse(settings: &Settings) -> Settings {
     coarse
 }
 
-/// The result of a step.
+/// What a call of [`Stream::step`] did.
 #[derive(Debug)]
 pub enum Step {
     /// A picture is finished.
     Picture(FinishedPicture),
-    /// A frame or a change of settings was refused, or the source reported a fault: the reason. The stream goes on.
+    /// A frame or a change of settings was refused, or the source reported a fault, for the given reason. The stream goes on.
     Fault(String),
-    /// Anything else, or nothing, was done.
+    /// Other work was done, or there was nothing to do.
     Progress,
-    /// The source has ended, with the reason if it ended unexpectedly. Everything that arrived is in the last picture.
+    /// The source has ended; the reason if that was not expected. The last picture shows everything that arrived.
     End(Option<String>),
 }
 
@@ -69,7 +69,7 @@ pub enum StreamError {
     Scene(#[from] SceneError),
 }
 
-/// A live source that is rendered. The caller drives it by repeated calls of [`Stream::step`] on one thread.
+/// Renders a live source. The caller drives it by repeated calls of [`Stream::step`] on one thread.
 pub struct Stream {
     context: Arc<Context>,
     feed: Feed,
@@ -113,7 +113,7 @@ pub struct Stream {
 }
 
 impl Stream {
-    /// A stream of the frames of `feed`. Nothing is created on the device before the first frame header.
+    /// A stream that renders the frames of `feed`. Nothing is created on the device before the first frame header arrives.
     pub fn new(context: &Arc<Context>, feed: Feed, settings: Settings, options: StreamOptions) -> Stream {
         Stream {
             context: context.clone(),
@@ -143,7 +143,7 @@ impl Stream {
         }
     }
 
-    /// Does the next piece of work: finishes or begins a picture, or takes an event of the source. Waits at most `patience` for an event.
+    /// Does the next piece of work: finishes or begins a picture, or processes an event of the source, for which it waits at most `patience`.
     ///
     /// # Errors
     /// The device fails, or a new geometry cannot be drawn with the settings.
@@ -337,7 +337,7 @@ impl Stream {
         options
     }
 
-    /// The current step of the work before the first picture. None once a picture exists or is being drawn.
+    /// What the stream does before the first picture. None once a picture exists or is being drawn.
     pub fn start_step(&self) -> Option<StartStep> {
         let Some(session) = &self.session else {
             let progress = self.first_pipelines.progress();
@@ -460,8 +460,8 @@ impl Stream {
         }
     }
 
-    /// The basis of default settings that the source has given since the last call, for the caller to build on. Pictures already use the
-    /// settings that follow from it.
+    /// What default settings are derived from, if it was found since the last call. Pictures already use the derived settings; the caller may
+    /// derive its own from it.
     pub fn take_found(&mut self) -> Option<Defaults> {
         self.found.take()
     }
@@ -508,7 +508,7 @@ impl Stream {
     /// Continues on another device, or on the same one after it was lost. The volume on display is sent again from the cine loop.
     ///
     /// # Errors
-    /// The device cannot hold the slots of the geometry.
+    /// The device cannot hold the slots that the geometry needs.
     pub fn revive(&mut self, context: &Arc<Context>) -> Result<(), StreamError> {
         self.context = context.clone();
         self.losses += 1;
@@ -529,7 +529,7 @@ impl Stream {
         self.change_to(settings, None)
     }
 
-    /// As [`Stream::change`], for settings that temporarily replace `full` at lower quality.
+    /// As [`Stream::change`], for settings of lower quality that temporarily replace `full`.
     ///
     /// # Errors
     /// As for [`Stream::change`].
@@ -547,8 +547,8 @@ impl Stream {
         Ok(())
     }
 
-    /// Freezes the display, or continues. While it is frozen, frames that arrive are recorded but not shown. Frames of a recording go into
-    /// the loop while it has room, and then wait.
+    /// Freezes the display, or continues. While it is frozen, frames that arrive are recorded but not shown. Frames of a recording go into the
+    /// cine loop while that has room, and then wait.
     pub fn freeze(&mut self, is_frozen: bool) {
         if self.is_frozen == is_frozen {
             return;
@@ -567,7 +567,7 @@ impl Stream {
         self.is_frozen
     }
 
-    /// The most recent volumes, as they arrived.
+    /// The cine loop: the most recent complete volumes.
     pub fn cine(&self) -> &Cine {
         &self.cine
     }
@@ -610,9 +610,9 @@ impl Stream {
         }
     }
 
-    /// Compiles the pipelines of these settings in the background while no other pipeline is needed, in this order. They replace the
-    /// settings of an earlier call. Each entry has settings, and the settings at full quality that they replace, if any. Settings that
-    /// cannot be drawn are left out. Nothing happens before the first header, and without [`StreamOptions::wake`].
+    /// Compiles the pipelines of these settings in the background, in this order, while no other pipeline is needed. Each entry has settings,
+    /// and the settings at full quality that they replace, if any. A new call replaces the entries of an earlier one; settings that cannot be
+    /// drawn are left out. Nothing happens before the first header, and without [`StreamOptions::wake`].
     pub fn warm(&mut self, next: Vec<(Settings, Option<Settings>)>) {
         let (Some(session), Some(header)) = (&mut self.session, &self.header) else { return };
         let (header, options) = (Arc::new(header.clone()), self.options.clone());
@@ -628,12 +628,12 @@ impl Stream {
         session.warm(scenes);
     }
 
-    /// Forgets the settings of [`Stream::warm`] that are left.
+    /// Removes the settings of [`Stream::warm`] whose pipelines are not compiled yet.
     pub fn stop_warming(&self) {
         self.session.iter().for_each(|session| session.renderer.stop_warming());
     }
 
-    /// True after [`Stream::warm`], until the geometry or the device changes.
+    /// True if [`Stream::warm`] was called for the present geometry and device.
     pub fn has_warmed(&self) -> bool {
         self.session.as_ref().is_some_and(|session| session.has_warmed)
     }

@@ -22,7 +22,7 @@ impl Stream {
         self.session.as_ref().is_some_and(|session| session.phase.is_drawing())
     }
 
-    /// True if a step has nothing to do until the picture in flight makes progress.
+    /// True if a step has nothing to do until the picture that is being drawn makes progress.
     pub fn is_waiting(&self) -> bool {
         let Some(session) = self.session.as_ref().filter(|session| session.phase.is_drawing()) else { return false };
         // A device that fails is reported by the step.
@@ -35,7 +35,7 @@ impl Stream {
         self.end.is_none() && self.feed.disconnected().is_none()
     }
 
-    /// The reason why the source is not connected at present, on one line. None while it is connected.
+    /// The reason on one line why the source is not connected at present. None while it is connected.
     pub fn disconnected(&self) -> Option<String> {
         self.feed.disconnected()
     }
@@ -54,22 +54,22 @@ impl Stream {
         !is_busy && !self.is_replaying() && (self.feed.waiting() == 0 || self.is_held())
     }
 
-    /// Number of dispatches on the device so far, by all its users.
+    /// Number of dispatches on the device so far, of all renderers and windows that share it.
     pub fn dispatches(&self) -> u64 {
         self.context.counts.dispatches.load(Ordering::Relaxed)
     }
 
-    /// Time since the device last finished any work, while it is busy. None before the first frame.
+    /// Time for which the device has been busy without finishing anything; 0 if it is idle. None before the first frame.
     pub fn device_busy_for(&self) -> Option<Duration> {
         self.session.as_ref().map(|session| session.renderer.busy_for())
     }
 
-    /// When the last picture was begun.
+    /// Time at which the last picture was begun; None before the first frame.
     pub fn last_begun(&self) -> Option<Instant> {
         self.session.as_ref().map(|session| session.begun)
     }
 
-    /// Statistics since the stream was created. Latencies and pass times are those since they were last taken.
+    /// Statistics since the stream was created. Latencies and times of passes are those since statistics were last taken.
     pub fn statistics(&mut self) -> Result<Statistics, StreamError> {
         self.statistics.time = self.began.elapsed();
         let FeedCounts { lost, unrecorded, disconnected, .. } = self.feed_counts();
@@ -90,7 +90,10 @@ impl Stream {
         Ok(since)
     }
 
-    /// As [`Stream::take_statistics`], but waits for all work in flight: every pass of every frame is timed or counted as not timed.
+    /// As [`Stream::take_statistics`], after waiting for all work of the device: every pass of every frame is timed or counted as not timed.
+    ///
+    /// # Errors
+    /// The device fails.
     pub fn take_final_statistics(&mut self) -> Result<Statistics, StreamError> {
         let passes = self.session.as_mut().map_or(Ok(Vec::new()), |session| session.renderer.take_times())?;
         let mut since = self.take_statistics()?;
@@ -98,13 +101,13 @@ impl Stream {
         Ok(since)
     }
 
-    /// The counts since the stream was created, as of the last time that statistics were taken.
+    /// The counts since the stream was created as one line, as of the last time that statistics were taken.
     pub fn totals(&self) -> String {
         self.reported.totals()
     }
 
-    /// Number of complete volumes that arrived, shown or not. None if the source waits for pictures or has ended, and while the picture is
-    /// frozen.
+    /// Number of complete volumes that arrived, shown or not. None while the display is frozen, after the source has ended, and if the source
+    /// waits for pictures.
     pub fn live_volumes(&self) -> Option<u64> {
         let is_live = !self.is_frozen && self.end.is_none() && !self.feed.can_wait();
         self.pool().filter(|_| is_live).map(|pool| pool.counts().shown + pool.counts().dropped)
@@ -119,7 +122,7 @@ impl Stream {
         self.session.as_ref().map(|session| &session.pool).or(self.previous_pool.as_ref())
     }
 
-    /// Geometry and sample type of the frames; none before the first header.
+    /// The properties that all frames have in common; None before the first header.
     pub fn header(&self) -> Option<&Header> {
         self.header.as_ref()
     }
@@ -129,7 +132,7 @@ impl Stream {
         self.statistics.frames
     }
 
-    /// The counts of the feeds of all sources so far.
+    /// What the feeds of all sources lost so far.
     pub fn feed_counts(&self) -> FeedCounts {
         self.earlier_feeds.plus(self.feed.counts())
     }
@@ -139,7 +142,7 @@ impl Stream {
         self.session.as_ref()?.views.first().probe().map(|probe| probe.acquisition_time())
     }
 
-    /// The scene that is drawn; none before the first frame.
+    /// The scene that is drawn; None before the first frame.
     pub fn scene(&self) -> Option<&Scene> {
         self.session.as_ref().map(|session| session.renderer.scene())
     }
@@ -149,7 +152,7 @@ impl Stream {
         self.session.as_ref().and_then(Session::drawn_volume)
     }
 
-    /// The renderer, to read pictures and volumes from it; none before the first frame.
+    /// The renderer, for reading pictures and volumes back; None before the first frame.
     pub fn renderer(&mut self) -> Option<&mut Renderer> {
         self.session.as_mut().map(|session| &mut session.renderer)
     }
