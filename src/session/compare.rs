@@ -5,8 +5,8 @@ use crate::marked;
 use crate::picture::Picture;
 use plotters::prelude::{DrawingBackend, RGBColor, ShapeStyle};
 
-/// What lies between tiles.
-const GAP: u32 = 2;
+/// Width of what lies between tiles, pixels.
+pub const GAP: u32 = 2;
 const BETWEEN: [u8; 3] = [58, 64, 74];
 /// Colours of the difference: no difference, and the first or the second picture brighter by the whole scale. Blue and orange differ for every
 /// kind of colour vision.

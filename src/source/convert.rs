@@ -110,6 +110,7 @@ pub fn lattice(geometry: &Geometry, spacing: f64) -> Result<Grid, String> {
 }
 
 /// The samples of one volume in memory, with their geometry.
+#[derive(Clone)]
 pub struct Volume {
     geometry: Geometry,
     stored: StoredType,

@@ -1,5 +1,6 @@
 //! The commands of a user, given by gestures on the picture, keys and panels; and the key bindings with their descriptions in the help.
 
+pub use super::comparison::{CompareView, Link};
 pub use super::view::{Face, Viewpoint};
 
 use super::input::{Input, Key, Modifiers};
@@ -156,6 +157,16 @@ pub enum Command {
     StepRecording(i32),
     /// Closes the n-th open recording; `usize::MAX`: the one that is shown.
     CloseRecording(usize),
+    /// Compares the shown volume with the next open recording; if there is none, with itself as it is now. Ends the comparison if there is one.
+    Compare,
+    /// Chooses how the compared volume is shown.
+    CompareView(CompareView),
+    /// Moves the line of the wipe to this share of the picture's width.
+    MoveWipe(f64),
+    /// Cuts or ties a link between the shown and the compared volume.
+    ToggleLink(Link),
+    /// Moves the compared volume rigidly onto the shown one, or leaves it where it is.
+    Align,
     /// Stops reading the file that is being opened.
     CancelReading,
     /// Shows or hides the menu of export formats.
@@ -472,6 +483,7 @@ pub const KEY_BINDINGS: &[Binding] = &[
     control(Char('o'), keys::OPEN, Command::OpenFiles),
     control(Key::PageUp, keys::STEP_RECORDING, Command::StepRecording(-1)),
     control(Key::PageDown, keys::STEP_RECORDING, Command::StepRecording(1)),
+    on(Char('p'), keys::COMPARE, Command::Compare),
     control(Char('w'), keys::CLOSE_RECORDING, Command::CloseRecording(usize::MAX)),
     control(Char('e'), keys::EXPORT_THE_VOLUME, Command::Exports),
     control(Char('p'), keys::PRESETS, Command::Presets),

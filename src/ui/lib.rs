@@ -14,6 +14,7 @@ mod anatomy;
 mod cine_player;
 mod clipboard;
 pub mod command;
+mod comparison;
 pub mod console;
 mod controls;
 #[cfg(target_os = "linux")]
@@ -47,7 +48,8 @@ pub mod window;
 use echolume_base::{files, picture, progress_lines, statistics, text};
 use echolume_core::{mesh, passes, plan, scene};
 use echolume_lab::error_report;
-use echolume_session::{kiosk, live, marked, measure, user_presets, workspace};
+use echolume_segment as segment;
+use echolume_session::{compare, kiosk, live, marked, measure, user_presets, workspace};
 use {echolume_gpu as gpu, echolume_probe as probe, echolume_source as source};
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Every command and control by name, for the search of the window.
 
-use crate::command::{self, Command, InspectorTab, KEY_BINDINGS};
+use crate::command::{self, Command, CompareView, InspectorTab, KEY_BINDINGS, Link};
 use crate::controls::EXAMS;
 use crate::sliders::{GROUPS, SLIDERS};
 use crate::texts;
@@ -19,7 +19,7 @@ pub(crate) struct Entry {
 }
 
 /// What no key does.
-const WITHOUT_KEY: [(&str, &str, Command); 14] = [
+const WITHOUT_KEY: [(&str, &str, Command); 19] = [
     (texts::VIEW_3D, texts::VIEW_3D_HINT, Command::Rendering),
     (texts::EXCHANGE_LEFT_AND_RIGHT, texts::EXCHANGE_LEFT_AND_RIGHT_HINT, Command::ExchangeLeftAndRight),
     (texts::SAVE_RESULTS, texts::SAVE_RESULTS_HINT, Command::SaveMeasures),
@@ -34,6 +34,11 @@ const WITHOUT_KEY: [(&str, &str, Command); 14] = [
     (texts::MEASUREMENTS, texts::TAB_MEASURE_HINT, Command::InspectorTab(InspectorTab::Measure)),
     (texts::COLOUR, texts::COLOUR_HINT, Command::InspectorTab(InspectorTab::Look)),
     (texts::OPACITY_OF, texts::OPACITY_OF_HINT, Command::InspectorTab(InspectorTab::Look)),
+    (texts::FIND_TILES, texts::COMPARED_TILES_HINT, Command::CompareView(CompareView::Tiles)),
+    (texts::FIND_DIFFERENCE, texts::COMPARED_DIFFERENCE_HINT, Command::CompareView(CompareView::Difference)),
+    (texts::FIND_WIPE, texts::COMPARED_WIPE_HINT, Command::CompareView(CompareView::Wipe)),
+    (texts::FIND_ALIGN, texts::ALIGN_HINT, Command::Align),
+    (texts::FIND_LINK_LOOK, texts::LINK_LOOK_HINT, Command::ToggleLink(Link::Look)),
 ];
 
 /// All entries of the search: commands, presets, export formats, controls.

@@ -120,6 +120,14 @@ impl Console {
             Command::ShowRecording(n) => self.show_recording(n),
             Command::StepRecording(by) => self.step_recording(by),
             Command::CloseRecording(n) => self.close_recording(n, now),
+            Command::Compare => self.toggle_comparison(),
+            Command::CompareView(view) => {
+                self.comparison.iter_mut().for_each(|comparison| comparison.set_view(view));
+                self.resize_picture();
+            }
+            Command::MoveWipe(share) => self.comparison.iter_mut().for_each(|comparison| comparison.set_wipe(share)),
+            Command::ToggleLink(link) => self.comparison.iter_mut().for_each(|comparison| comparison.toggle_link(link)),
+            Command::Align => self.align_compared(),
             Command::CancelReading => _ = self.cancel_reading(),
             Command::Export(n) => self.export_volume(n),
             Command::CancelExport => self.exporter.cancel_export(),

@@ -3,6 +3,7 @@
 use super::presentation::PictureState;
 use super::quality::full_settings;
 use super::{Console, ConsoleError, LoopRequest};
+use crate::comparison::Comparison;
 use crate::gpu::window::PresentOutcome;
 use crate::live::metrics::SourceStatus;
 use crate::live::{Feed, FinishedPicture, Step, StreamError};
@@ -47,6 +48,7 @@ impl Console {
         self.advance_cine(now);
         self.send_settings(now);
         self.run_stream(now)?;
+        self.advance_comparison()?;
         self.quality.follow_volumes(self.stream.live_volumes(), now);
         let starts = self.start.follow(self.stream.start_step(), now);
         self.refreeze();
@@ -155,6 +157,7 @@ impl Console {
             self.quality.picture_took(picture.work, picture.took);
             self.measured.picture_took(picture.took);
         }
+        self.comparison.iter_mut().for_each(Comparison::picture_changed);
         self.start.picture_finished(picture.is_coarse);
         self.faults.picture_finished();
     }
@@ -225,6 +228,7 @@ impl Console {
             self.turntable.due(),
             self.exporter.exporting().map(|_| now + EXPORT_POLL),
             self.opening.due(self.reads_source(), now),
+            self.comparison_due(now),
         ]
         .into_iter()
         .flatten()

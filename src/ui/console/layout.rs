@@ -1,6 +1,7 @@
 //! Lays out the panels of the console and executes their commands.
 
 use super::Console;
+use crate::comparison::Comparison;
 use crate::gpu;
 use crate::panels::{Banner, PanelState, first_steps};
 use crate::shown_picture::ShownPicture;
@@ -50,6 +51,7 @@ impl Console {
             exit_key: exit_key.as_deref().unwrap_or_default(),
             pointer: self.presentation.pointer(),
             keyboard_pointer: self.hands.mark(room.picture),
+            compared: self.comparison.as_ref().map(Comparison::shown),
         };
         let time = now.saturating_duration_since(self.fixed.started).as_secs_f64();
         let output = self.panels.lay_out(&state, self.presentation.size(), time);

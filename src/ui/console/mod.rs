@@ -4,6 +4,7 @@
 mod activity;
 mod brushing;
 mod commands;
+mod comparing;
 mod connection;
 mod faults;
 mod first_steps;
@@ -51,6 +52,7 @@ use self::replay::Replay;
 use self::start::Start;
 use self::survey::Survey;
 use self::turntable::Turntable;
+use super::comparison::{CompareView, Comparison};
 use super::controls::Controls;
 use super::export::Exporter;
 use super::frame_budget::{self, Quality};
@@ -58,7 +60,7 @@ use super::panels::accesskit::{ActionRequest, TreeUpdate};
 use super::panels::{Panels, Room, Visible};
 use super::source_supervisor::{OpenSource, SourceSupervisor};
 use crate::gpu::window::Screen;
-use crate::gpu::{Context, GpuError};
+use crate::gpu::{Context, GpuError, Wake};
 use crate::kiosk::chord::Chord;
 use crate::live::metrics::LiveMetrics;
 use crate::live::{Feed, Stream, StreamError, StreamOptions};
@@ -95,6 +97,8 @@ pub struct Console {
     // Fields are dropped in this order: the screen, which is in the first, before the stream whose pictures it shows.
     presentation: Presentation,
     stream: Stream,
+    /// The volume that is compared with the shown one.
+    comparison: Option<Comparison>,
     context: Arc<Context>,
     connection: Connection,
     quality: PictureQuality,
@@ -124,6 +128,7 @@ pub struct Console {
 /// What never changes.
 struct Fixed {
     started: Instant,
+    wake: Wake,
     overlay: bool,
     exit: Option<Chord>,
     is_kiosk: bool,
@@ -189,6 +194,7 @@ impl Console {
         let mut console = Console {
             presentation: Presentation::new(size),
             stream: Stream::new(context, Feed::none(), controls.settings().clone(), stream_options),
+            comparison: None,
             context: context.clone(),
             connection: Connection::new(source, options.source, now),
             quality,
@@ -205,7 +211,7 @@ impl Console {
             presets: Presets::new(options.presets, small_pictures, wake.clone()),
             reel: Reel::new(wake.clone()),
             replay: Replay::new(frozen),
-            survey: Survey::new(wake),
+            survey: Survey::new(wake.clone()),
             turntable: Turntable::default(),
             render_start: RenderStart::default(),
             start: Start::new(now),
@@ -213,6 +219,7 @@ impl Console {
             measured: Measured::new(options.statistics_interval, metrics, now),
             fixed: Fixed {
                 started: now,
+                wake: wake.clone(),
                 overlay: options.overlay,
                 exit: options.exit,
                 is_kiosk: options.is_kiosk,
@@ -256,6 +263,7 @@ impl Console {
     /// The device cannot hold the slots of what is shown.
     pub fn revive(&mut self, context: &Arc<Context>, screen: Option<Screen>) -> Result<(), StreamError> {
         self.presentation.screen = None;
+        self.comparison = None;
         self.presets.device_lost();
         self.reel.forget();
         self.context = context.clone();
@@ -295,7 +303,12 @@ impl Console {
 
     /// What the panels leave and have in the window.
     fn room(&self) -> Room {
-        Room::of(self.presentation.size(), self.panels.scale(), self.visible.panels)
+        let room = Room::of(self.presentation.size(), self.panels.scale(), self.visible.panels);
+        match self.comparison.as_ref().filter(|_| self.fixed.overlay).map(|comparison| comparison.shown().view) {
+            None | Some(CompareView::Wipe) => room,
+            Some(CompareView::Tiles) => room.divided(2),
+            Some(CompareView::Difference) => room.divided(3),
+        }
     }
 
     /// Sets whether the panels are described to a screen reader.

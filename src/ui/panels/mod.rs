@@ -8,6 +8,7 @@ mod annotations;
 mod bar;
 mod body_marks;
 pub(super) mod colours;
+mod compared;
 mod curve;
 #[cfg(test)]
 pub(super) mod drawn;
@@ -40,6 +41,8 @@ pub(super) use self::visible::Visible;
 use super::command::Command;
 use super::input::{Button, Input, Key, Modifiers, Phase};
 use crate::cine_player::CineState;
+use crate::compare;
+use crate::comparison::Shown;
 use crate::controls::Controls;
 use crate::gpu;
 use crate::keyboard_pointer::PointerMark;
@@ -231,8 +234,10 @@ impl Panels {
         self.gets_focus &= self.has_pending_input();
         let pictures = |tiles: &[PresetTile]| tiles.iter().map(|tile| tile.picture.clone()).collect::<Vec<_>>();
         let listed = state.presets.as_ref().map_or(Vec::new(), |shown| pictures(&shown.tiles));
-        let [looks, thumbnails, of_loop] =
-            self.thumbnails.of(&self.context, [&pictures(&state.looks), &listed, state.loop_pictures]);
+        let compared =
+            state.compared.map(|shown| [shown.picture.clone(), shown.difference.clone()]).unwrap_or_default();
+        let [looks, thumbnails, of_loop, compared] =
+            self.thumbnails.of(&self.context, [&pictures(&state.looks), &listed, state.loop_pictures, &compared]);
         // egui may lay out twice, to place what it sees for the first time: the inputs are in the first.
         let output = self.context.run_ui(input, |ui| {
             let from_panels = commands.len();
@@ -273,6 +278,7 @@ impl Panels {
                 measures::paint(ui, state, self.scale);
                 body_marks::paint(ui, state, self.scale);
             }
+            compared::show(ui, state, &compared, self.scale, execute);
             if state.visible.times {
                 overlays::show_times(ui, state, self.scale);
             }
@@ -502,6 +508,8 @@ pub(super) struct PanelState<'a> {
     pub(super) pointer: Option<[f64; 2]>,
     /// How the pointer that keys move is drawn; None while it is off.
     pub(super) keyboard_pointer: Option<PointerMark>,
+    /// The volume that is compared with the shown one; None if none is.
+    pub(super) compared: Option<&'a Shown>,
 }
 
 impl PanelState<'_> {
@@ -538,8 +546,10 @@ pub fn picture_area(size: [u32; 2], scale: f32, shows_panels: bool) -> ([u32; 2]
 /// How a window is divided between the panels and the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Room {
-    /// Upper left corner and size of the picture, pixels of the window.
+    /// Upper left corner and size of the picture, pixels of the window; of the first tile if there are several.
     pub(super) picture: ([u32; 2], [u32; 2]),
+    /// Distance from a tile to the next, pixels; 0 if there is only one.
+    to_next: [u32; 2],
     /// True if there is a bar at the top.
     pub(super) has_top: bool,
     /// True if the inspector is a drawer over the picture, because there is no room beside it.
@@ -555,10 +565,30 @@ impl Room {
         let Edges { above, left, right, below } = Edges::of(points, shows_panels);
         Room {
             picture: picture_area(size, scale, shows_panels),
+            to_next: [0; 2],
             has_top: above > 0.0,
             has_drawer: right == 0.0 && below > 0.0,
             has_tools_tab: below > 0.0 && (left == 0.0 || !rail::has_all(points[1] - above - below)),
         }
+    }
+}
+
+impl Room {
+    /// This room with its picture divided into two or three tiles in a row or a column.
+    pub(super) fn divided(self, tiles: usize) -> Room {
+        let (corner, whole) = self.picture;
+        let size = compare::tile_size(tiles, whole);
+        let [columns, _] = compare::grid(tiles, whole);
+        let axis = usize::from(columns == 1);
+        let mut to_next = [0; 2];
+        to_next[axis] = size[axis] + compare::GAP;
+        Room { picture: (corner, size), to_next, ..self }
+    }
+
+    /// Upper left corner and size of a tile, pixels of the window; 0 is the picture.
+    pub(super) fn tile(&self, n: u32) -> ([u32; 2], [u32; 2]) {
+        let (corner, size) = self.picture;
+        ([0, 1].map(|a| corner[a] + n * self.to_next[a]), size)
     }
 }
 

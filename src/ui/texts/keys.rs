@@ -94,6 +94,7 @@ pub(crate) const SAVE_THE_PICTURE: &str = "save the picture";
 pub(crate) const SAVE_THE_RECORDING: &str = "save the loop";
 pub(crate) const SAVE_WORKSPACE: &str = "save the workspace";
 pub(crate) const OPEN: &str = "open a recording or a workspace";
+pub(crate) const COMPARE: &str = "compare with the next open recording or with this picture; end it";
 pub(crate) const STEP_RECORDING: &str = "previous, next open recording";
 pub(crate) const CLOSE_RECORDING: &str = "close the recording";
 pub(crate) const EXPORT_THE_VOLUME: &str = "export the volume";

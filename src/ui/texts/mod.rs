@@ -1,6 +1,7 @@
 //! Every text of the window, in English: a translation is another copy of this folder. Names of modes are in [`Mode`](crate::scene::Mode), names and
 //! hints of sliders are at their settings; faults that the panels show are worded by the modules that find them.
 
+mod comparing;
 mod exports;
 mod first_steps;
 pub mod hints;
@@ -11,6 +12,7 @@ mod panels;
 mod sides;
 mod sliders;
 
+pub(crate) use comparing::*;
 pub(crate) use exports::*;
 pub(crate) use first_steps::*;
 pub(crate) use measures::*;

@@ -1,0 +1,124 @@
+//! The comparison of the shown volume with another one.
+
+use super::{Console, ConsoleError};
+use crate::comparison::{Comparison, News, volume_of};
+use crate::live::StreamError;
+use crate::recordings::Named;
+use crate::source::convert::Volume;
+use crate::source::recorder::Header;
+use crate::texts;
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// Correlation of two aligned volumes below which the user is told to look.
+const UNLIKE: f64 = 0.5;
+
+impl Console {
+    /// Begins a comparison: with the next open recording, or else with the shown volume as it is now. Ends one that is there.
+    pub(super) fn toggle_comparison(&mut self) {
+        if self.comparison.take().is_none() {
+            let (settings, wake) = (self.controls.settings().clone(), self.fixed.wake.clone());
+            let begun = match self.next_recording() {
+                Some(file) => Comparison::with_file(&self.context, &file, &settings, &wake),
+                None => {
+                    self.shown_volume().ok_or_else(|| texts::WHY_NOTHING_TO_COMPARE.to_string()).and_then(|volume| {
+                        let name = texts::compared_as_it_was(self.shown_name());
+                        Comparison::with_volume(&self.context, volume, name, &settings, &wake)
+                    })
+                }
+            };
+            match begun {
+                Ok(mut comparison) => {
+                    comparison.name_first(self.shown_name());
+                    self.comparison = Some(comparison);
+                }
+                Err(fault) => self.notify(&texts::not_compared(fault), true),
+            }
+        }
+        self.resize_picture();
+    }
+
+    /// The open recording after the shown one, if there is another.
+    fn next_recording(&self) -> Option<PathBuf> {
+        let (file, is_shown) = self.opening.recording(self.opening.further(1)?)?;
+        (!is_shown && file.exists()).then_some(file)
+    }
+
+    fn shown_name(&self) -> String {
+        let named = self.opening.named().into_iter().find(|named| named.is_shown);
+        named.map_or_else(String::new, |Named { name, .. }| name)
+    }
+
+    /// The volume on display, or else the newest one in the cine loop, with its header.
+    fn shown_volume(&self) -> Option<(Header, Volume)> {
+        let volumes = self.stream.cine().volumes();
+        let shown = self.stream.cine_position().and_then(|at| volumes.get(at)).or(volumes.back())?;
+        let header = self.stream.header()?.clone();
+        let volume = volume_of(&header, shown.frames.iter().map(AsRef::as_ref));
+        Some((header, volume))
+    }
+
+    /// Moves the compared volume onto the shown one, or back.
+    pub(super) fn align_compared(&mut self) {
+        let onto = self.shown_volume().map(|(_, volume)| volume);
+        self.comparison.iter_mut().for_each(|comparison| comparison.align(onto.clone()));
+    }
+
+    /// Draws what is due of the compared volume.
+    ///
+    /// # Errors
+    /// The device is lost.
+    pub(super) fn advance_comparison(&mut self) -> Result<(), ConsoleError> {
+        let (size, volume) = (self.room().picture.1, self.stream.cine_position());
+        let Some(comparison) = &mut self.comparison else { return Ok(()) };
+        // What is drawn now: while the view moves, at the same quality.
+        let settings = self.stream.scene().map_or_else(|| self.controls.settings(), |scene| &scene.settings);
+        let news = match comparison.update(settings, size, volume) {
+            Ok((is_other, news)) => {
+                self.presentation.redraw_if(is_other);
+                news
+            }
+            Err(StreamError::Gpu(lost)) if lost.is_device_lost() => return Err(ConsoleError::DeviceLost(lost)),
+            Err(fault) => {
+                self.comparison = None;
+                self.resize_picture();
+                Some(News::Fault(fault.to_string()))
+            }
+        };
+        match news {
+            None => {}
+            Some(News::Aligned(found)) if found.correlation < UNLIKE => {
+                self.notify(&texts::hardly_aligned(found.correlation), true);
+            }
+            Some(News::Aligned(found)) => {
+                let moved = [found.motion.shift.length(), found.motion.angle()];
+                self.notify(&texts::aligned(moved, found.correlation), false);
+            }
+            Some(News::Fault(fault)) => self.notify(&texts::not_compared(fault), true),
+        }
+        self.draw_difference();
+        Ok(())
+    }
+
+    /// Makes the difference of both pictures, if it is shown and both are drawn.
+    fn draw_difference(&mut self) {
+        let Some(comparison) = self.comparison.as_mut().filter(|comparison| comparison.lacks_difference()) else {
+            return;
+        };
+        if self.stream.is_drawing() {
+            return;
+        }
+        // A device that fails here fails for the picture, too.
+        let first =
+            self.stream.renderer().filter(|renderer| renderer.has_drawn()).map(|renderer| renderer.end_picture());
+        if let Some(Ok(first)) = first {
+            comparison.make_difference(&first);
+            self.presentation.redraw();
+        }
+    }
+
+    /// When the comparison is to be updated without an event.
+    pub(super) fn comparison_due(&self, now: Instant) -> Option<Instant> {
+        self.comparison.as_ref()?.due(now)
+    }
+}

@@ -1,0 +1,161 @@
+//! The compared volume: its picture beside that of the shown one or over it, their difference, and the buttons of the comparison.
+
+use super::colours::{BACKING, MARK, TEXT, UNCOLOURED, WEAK_TEXT};
+use super::names::{self, Tell};
+use super::{PanelState, ROW_HEIGHT, SMALL_TEXT, TOUCH_SIZE, picture_rect};
+use crate::command::Command;
+use crate::comparison::{CompareView, Link, Shown};
+use crate::texts;
+use egui::accesskit::Role;
+use egui::{
+    Align2, Area, Button, CursorIcon, FontId, Frame, Id, Margin, Order, Painter, Rect, RichText, Sense, Stroke,
+    TextureId, Ui, WidgetInfo, WidgetType, pos2, vec2,
+};
+
+/// The views with their names and hints.
+const VIEWS: [(CompareView, &str, &str); 3] = [
+    (CompareView::Tiles, texts::COMPARED_TILES, texts::COMPARED_TILES_HINT),
+    (CompareView::Difference, texts::COMPARED_DIFFERENCE, texts::COMPARED_DIFFERENCE_HINT),
+    (CompareView::Wipe, texts::COMPARED_WIPE, texts::COMPARED_WIPE_HINT),
+];
+
+/// The links with their names and hints.
+fn about(link: Link) -> (&'static str, &'static str) {
+    match link {
+        Link::View => (texts::LINK_VIEW, texts::LINK_VIEW_HINT),
+        Link::Planes => (texts::LINK_PLANES, texts::LINK_PLANES_HINT),
+        Link::Look => (texts::LINK_LOOK, texts::LINK_LOOK_HINT),
+        Link::Volume => (texts::LINK_VOLUME, texts::LINK_VOLUME_HINT),
+    }
+}
+
+/// Distance of names and buttons from the edges of a tile, points.
+const EDGE: f32 = 10.0;
+
+/// Paints the compared picture and the difference, and shows the buttons. `textures`: of both, None while it is not drawn.
+pub(super) fn show(
+    ui: &Ui,
+    state: &PanelState,
+    textures: &[Option<TextureId>],
+    scale: f32,
+    execute: &mut dyn FnMut(Command),
+) {
+    let Some(shown) = state.compared else { return };
+    let painter = ui.painter();
+    let first = picture_rect(state, scale);
+    let tile = |n: u32| {
+        let ([x, y], [w, h]) = state.room.tile(n);
+        let [x, y, w, h] = [x, y, w, h].map(|n| n as f32 / scale);
+        Rect::from_min_size(pos2(x, y), vec2(w, h))
+    };
+    let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
+    let at = if shown.view == CompareView::Wipe { wipe(ui, first, shown, textures, execute) } else { tile(1) };
+    if shown.view != CompareView::Wipe {
+        match textures.first().copied().flatten() {
+            Some(texture) => _ = painter.image(texture, at, whole, UNCOLOURED),
+            None => {
+                _ = painter.text(
+                    at.center(),
+                    Align2::CENTER_CENTER,
+                    texts::NOT_DRAWN_YET,
+                    FontId::proportional(SMALL_TEXT),
+                    WEAK_TEXT,
+                )
+            }
+        }
+    }
+    name(painter, at, &texts::tile_b(&shown.name), true);
+    name(painter, first, &texts::tile_a(shown.first.as_str()), shown.view != CompareView::Wipe);
+    if shown.view == CompareView::Difference {
+        if let Some(texture) = textures.get(1).copied().flatten() {
+            painter.image(texture, tile(2), whole, UNCOLOURED);
+        }
+        name(painter, tile(2), texts::TILE_DIFFERENCE, true);
+    }
+    // Over the picture that no gesture is made on.
+    let over = if shown.view == CompareView::Wipe { first } else { tile(1) };
+    buttons(ui, shown, over, execute);
+}
+
+/// Names a tile in its upper left corner; where it is covered by the other picture, above that corner's letter.
+fn name(painter: &Painter, tile: Rect, text: &str, is_alone: bool) {
+    let font = FontId::proportional(SMALL_TEXT);
+    let below = if is_alone { 0.0 } else { SMALL_TEXT + 8.0 };
+    let galley = painter.layout_no_wrap(text.to_string(), font, TEXT);
+    let galley_size = galley.size().min(tile.size() - vec2(2.0 * EDGE, 2.0 * EDGE));
+    let at = pos2(tile.left() + EDGE, tile.bottom() - EDGE - galley_size.y - below);
+    let painter = painter.with_clip_rect(tile.intersect(painter.clip_rect()));
+    painter.rect_filled(Rect::from_min_size(at, galley_size).expand(4.0), 3.0, BACKING);
+    painter.galley(at, galley, TEXT);
+}
+
+/// Paints the compared picture to the right of the line of the wipe, with a handle on it. Returns the area that it covers.
+fn wipe(ui: &Ui, area: Rect, shown: &Shown, textures: &[Option<TextureId>], execute: &mut dyn FnMut(Command)) -> Rect {
+    let share = shown.wipe as f32;
+    let at = area.left() + share * area.width();
+    let right = area.with_min_x(at);
+    if let Some(texture) = textures.first().copied().flatten() {
+        let part = Rect::from_min_max(pos2(share, 0.0), pos2(1.0, 1.0));
+        ui.painter().image(texture, right, part, UNCOLOURED);
+    }
+    ui.painter().line_segment([pos2(at, area.top()), pos2(at, area.bottom())], Stroke::new(2.0, TEXT));
+    let handle = Rect::from_center_size(pos2(at, area.center().y), vec2(0.5 * TOUCH_SIZE, TOUCH_SIZE));
+    Area::new(Id::new(texts::WIPE_LINE)).order(Order::Middle).fixed_pos(handle.min).constrain(false).show(
+        ui.ctx(),
+        |ui| {
+            let (area_of_handle, response) = ui.allocate_exact_size(handle.size(), Sense::drag());
+            response.widget_info(|| WidgetInfo::labeled(WidgetType::Slider, true, texts::WIPE_LINE));
+            let painter = ui.painter();
+            painter.rect(
+                area_of_handle.shrink2(vec2(6.0, 4.0)),
+                6.0,
+                MARK,
+                Stroke::new(1.0, TEXT),
+                egui::StrokeKind::Inside,
+            );
+            let response = response.on_hover_cursor(CursorIcon::ResizeHorizontal).tell(texts::WIPE_LINE_HINT);
+            if let Some(place) = response.interact_pointer_pos().filter(|_| response.dragged()) {
+                execute(Command::MoveWipe(f64::from((place.x - area.left()) / area.width())));
+            }
+        },
+    );
+    right
+}
+
+/// Shows the buttons of the comparison at the upper edge of an area.
+fn buttons(ui: &Ui, shown: &Shown, over: Rect, execute: &mut dyn FnMut(Command)) {
+    let place = over.center_top() + vec2(0.0, EDGE);
+    let area = Area::new(Id::new(texts::COMPARISON)).order(Order::Middle).pivot(Align2::CENTER_TOP).fixed_pos(place);
+    area.show(ui.ctx(), |ui| {
+        names::name(ui, Role::Group, texts::COMPARISON);
+        Frame::new().fill(BACKING).inner_margin(Margin::same(4)).corner_radius(6).show(ui, |ui| {
+            ui.set_max_width((over.width() - 2.0 * EDGE).max(80.0));
+            ui.spacing_mut().item_spacing = vec2(4.0, 4.0);
+            ui.horizontal_wrapped(|ui| {
+                let mut button = |text: &str, (name, hint): (&str, &str), is_on: bool, command: Command| {
+                    let words = RichText::new(text).size(SMALL_TEXT);
+                    let size = vec2(0.0, ROW_HEIGHT - 6.0);
+                    let response = ui.add(Button::selectable(is_on, words).min_size(size));
+                    if response.tell(hint).named(name).clicked() {
+                        execute(command);
+                    }
+                };
+                for (view, name, hint) in VIEWS {
+                    button(name, (name, hint), shown.view == view, Command::CompareView(view));
+                }
+                for (link, is_on) in Link::ALL.into_iter().zip(shown.links) {
+                    let (name, hint) = about(link);
+                    button(name, (name, hint), is_on, Command::ToggleLink(link));
+                }
+                let align = if shown.is_aligning { texts::ALIGNING } else { texts::ALIGN };
+                button(align, (texts::ALIGN, texts::ALIGN_HINT), shown.is_aligned || shown.is_aligning, Command::Align);
+                button(
+                    texts::CLOSE_BUTTON,
+                    (texts::END_COMPARISON, texts::END_COMPARISON_HINT),
+                    false,
+                    Command::Compare,
+                );
+            });
+        });
+    });
+}

@@ -1,0 +1,55 @@
+//! The comparison of two volumes.
+
+use std::fmt::Display;
+
+pub(crate) const COMPARISON: &str = "Comparison";
+pub(crate) const COMPARED_TILES: &str = "Tiles";
+pub(crate) const COMPARED_TILES_HINT: &str = "Both pictures beside each other.";
+pub(crate) const COMPARED_DIFFERENCE: &str = "Difference";
+pub(crate) const COMPARED_DIFFERENCE_HINT: &str =
+    "Also their difference in brightness: orange where A is brighter, blue where B is, in levels of 255.";
+pub(crate) const COMPARED_WIPE: &str = "Wipe";
+pub(crate) const COMPARED_WIPE_HINT: &str = "One picture over the other: drag the line between them.";
+pub(crate) const FIND_TILES: &str = "Compare: both pictures beside each other";
+pub(crate) const FIND_DIFFERENCE: &str = "Compare: show the difference";
+pub(crate) const FIND_WIPE: &str = "Compare: wipe from one picture to the other";
+pub(crate) const FIND_ALIGN: &str = "Compare: align both volumes";
+pub(crate) const FIND_LINK_LOOK: &str = "Compare: link windows, filters and light";
+pub(crate) const WIPE_LINE: &str = "Line of the wipe";
+pub(crate) const WIPE_LINE_HINT: &str = "Drag: A is on its left, B on its right.";
+pub(crate) const LINK_VIEW: &str = "View";
+pub(crate) const LINK_VIEW_HINT: &str = "B is seen from where A is, with its region.";
+pub(crate) const LINK_PLANES: &str = "Planes";
+pub(crate) const LINK_PLANES_HINT: &str = "The planes of B are those of A.";
+pub(crate) const LINK_LOOK: &str = "Look";
+pub(crate) const LINK_LOOK_HINT: &str =
+    "B has the windows, filters and light of A. Off: B keeps what it has, to compare two settings.";
+pub(crate) const LINK_VOLUME: &str = "Loop";
+pub(crate) const LINK_VOLUME_HINT: &str = "B shows the volume at the same position in its loop as A.";
+pub(crate) const ALIGN: &str = "Align";
+pub(crate) const ALIGN_HINT: &str =
+    "Moves B rigidly onto A, by least squares of the echoes; again: leaves it where it is.";
+pub(crate) const ALIGNING: &str = "Aligning";
+pub(crate) const END_COMPARISON: &str = "End the comparison";
+pub(crate) const END_COMPARISON_HINT: &str = "Shows A alone (P).";
+pub(crate) const NOT_DRAWN_YET: &str = "B is not drawn yet";
+pub(crate) const WHY_NOTHING_TO_COMPARE: &str = "there is no whole volume yet";
+pub(crate) fn compared_as_it_was(name: impl Display) -> String {
+    format!("{name}, as it was")
+}
+pub(crate) fn tile_a(name: impl Display) -> String {
+    format!("A  {name}")
+}
+pub(crate) fn tile_b(name: impl Display) -> String {
+    format!("B  {name}")
+}
+pub(crate) const TILE_DIFFERENCE: &str = "A \u{2212} B";
+pub(crate) fn not_compared(fault: impl Display) -> String {
+    format!("Not compared: {fault}")
+}
+pub(crate) fn aligned([shift, angle]: [f64; 2], correlation: f64) -> String {
+    format!("Aligned: B is moved by {shift:.1} mm and turned by {angle:.1}°; correlation {correlation:.2}")
+}
+pub(crate) fn hardly_aligned(correlation: f64) -> String {
+    format!("Aligned, but the volumes are hardly alike (correlation {correlation:.2}): look whether B lies on A")
+}
