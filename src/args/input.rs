@@ -512,7 +512,7 @@ pub fn open_device_until(
     })
 }
 
-/// As [`open_device`], for statistics of compiled pipelines: no pipeline is taken from the cache of an earlier run.
+/// As [`open_device`], for statistics of compiled pipelines: no pipeline is taken from the cache of an earlier run or stored in it.
 #[cfg(feature = "lab")]
 pub fn open_device_for_statistics(choice: Option<DeviceChoice>) -> Result<Arc<Context>, Failure> {
     let device = choice.unwrap_or_default();

@@ -118,7 +118,10 @@ impl<'a, B: DrawingBackend> Canvas<'a, B> {
         Ok([w, h].map(|n| f64::from(n) / f64::from(self.medium.scale)))
     }
 
-    /// Returns the text, shortened with an ellipsis if it is wider than `max_width` pixels.
+    /// Returns the text, shortened with an ellipsis if it is wider than `max_width` pixels in letters of `size` pixels.
+    ///
+    /// # Errors
+    /// As of [`Canvas::measure`].
     pub fn cut(&self, text: &str, size: u32, max_width: f64) -> Result<String, String> {
         let mut cut = text.to_string();
         while self.measure(&cut, size)?[0] > max_width && cut.chars().count() > 1 {

@@ -44,7 +44,7 @@ pub enum Failure {
 }
 
 impl Failure {
-    /// The message without its kind.
+    /// Why the command ends, in one line, without the variant, which decides the exit code.
     pub fn message(self) -> String {
         let (Failure::Input(message)
         | Failure::Failed(message)

@@ -11,7 +11,7 @@ use crate::verify::Findings;
 use crate::verify::{compare_picture, render};
 use std::sync::Arc;
 
-/// Which Vulkan device is used, and how long it is waited for.
+/// Which Vulkan device is used, and how long it may take for a submission before it is given up.
 #[derive(Clone)]
 pub struct DeviceOptions {
     pub device: Option<DeviceChoice>,

@@ -12,7 +12,7 @@ use std::time::SystemTime;
 pub struct Device {
     pub name: String,
     pub driver: String,
-    /// The Vulkan version that it supports.
+    /// The newest Vulkan version that the device supports, such as 1.3.280.
     pub api: String,
     /// True if it computes on the CPU.
     pub is_software: bool,

@@ -37,7 +37,7 @@ pub fn tile_size(tiles: usize, size: [u32; 2]) -> [u32; 2] {
     [0, 1].map(|a| ((size[a].saturating_sub((grid[a] - 1) * GAP)) / grid[a]).max(1))
 }
 
-/// Lays tiles of the same size over a picture of this size, by rows, each with its name in the lower left corner.
+/// Lays at most [`MAX_TILES`] tiles, each of [`tile_size`], by rows on a picture of `size` pixels, each with its name in its lower left corner.
 ///
 /// # Errors
 /// One line: a name cannot be drawn.
@@ -58,7 +58,7 @@ pub struct Difference {
     pub picture: Picture,
     /// Both ends of the scale, levels of 255: 16, 32, 64, 128 or 255. Of the pixels that are black in neither picture at most 0.2 % differ by more.
     pub end: u16,
-    /// Root of the mean square, levels.
+    /// Root mean square of the difference over all pixels, levels of 255.
     pub rms: f64,
 }
 

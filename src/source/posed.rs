@@ -199,11 +199,12 @@ pub(super) enum Opened {
 }
 
 impl Opened {
-    /// Makes one freehand volume of pictures with poses; other frames stay unchanged. Pictures that all have the same pose are a series in time
-    /// and stay unchanged, too. All pictures are read once for their poses.
+    /// Makes one freehand volume of the 2D pictures of a file that announces poses; pictures without a valid one are left out. Frames of other
+    /// files stay unchanged, and so do pictures that all have the same pose, as a series in time. All pictures are read once for their poses.
     ///
     /// # Errors
-    /// The file cannot be read, no picture has a pose, or arguments for a freehand volume are given where there is none.
+    /// The file cannot be read, it announces poses but no picture has a valid one, the volume is too large, or arguments for a freehand volume are
+    /// given where there is none.
     pub fn new(path: &Path, mut frames: Box<dyn Source>, said: FreehandArguments) -> Result<Opened, InputError> {
         let header = frames.header();
         let grid = match &header.forward {

@@ -3,8 +3,8 @@
 use super::{Rays, Scene};
 use glam::DVec3;
 
-/// Converts between pixels of the rendered part of the picture, its rays, and points in space. Positions are in pixels of the picture from its upper
-/// left corner.
+/// Converts between positions on the picture, the rays of its rendered part, and points in space, mm. Positions are in pixels from the picture's upper
+/// left corner; the centre of the first pixel is at (0.5, 0.5).
 pub struct Picker<'a> {
     rays: &'a Rays,
     /// Columns and rows of the picture before the rendered part; in a pair, the surface.

@@ -52,8 +52,9 @@ pub struct Tile {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Section {
     pub line: Line,
-    /// The point (0, 0) of the line's coordinates, mm in space, at the level of the middle of the tile. `axes`: the two axes of the reference plane.
+    /// The place in space, mm, of the point (0, 0) of the line's coordinates, at the height that the middle of the tile shows.
     pub origin: DVec3,
+    /// Unit vectors in space along which the line's coordinates increase: right and down on the reference plane.
     pub axes: [DVec3; 2],
 }
 
@@ -102,7 +103,8 @@ pub fn cell(edge: u32, n: u32, count: u32) -> u32 {
 }
 
 impl Scene {
-    /// True if the planes beside a rendering are cut from the section volume, which has all of the sector whatever is rendered.
+    /// True if there are planes beside a rendering, cut from the section volume, which has the whole sector whatever region is rendered. False: there are
+    /// none, or they are cut from the rendered volume.
     pub fn has_sections(&self) -> bool {
         self.settings.layout.has_planes() && !self.is_flat() && self.section_smooth.is_some()
     }
@@ -234,14 +236,15 @@ impl Scene {
         middle - turned * (right * from_face.dot(right) + down * from_face.dot(down))
     }
 
-    /// The place in space, mm, of a point given by its coordinates on a plane, mm right and down.
+    /// The place in space, mm, of a point given by its coordinates on a plane, mm right and down: lateral and depth on A, elevation and depth on B,
+    /// lateral and -elevation on C. A plane that is turned turns them about the middle of the insonified region.
     pub fn place_on_plane(&self, name: PlaneName, [across, along]: [f64; 2]) -> DVec3 {
         let (plane, origin) = (self.plane(name), self.plane_origin(name));
         let place = origin + plane.right * across + plane.down * along;
         place + plane.normal * (plane.at - place).dot(plane.normal)
     }
 
-    /// The coordinates on a plane, mm right and down, of a place in space, mm, projected onto it.
+    /// The coordinates on a plane, as of [`Scene::place_on_plane`], of a place in space, mm, projected onto it.
     pub fn point_on_plane(&self, name: PlaneName, place: DVec3) -> [f64; 2] {
         let (plane, from) = (self.plane(name), place - self.plane_origin(name));
         [from.dot(plane.right), from.dot(plane.down)]
@@ -511,7 +514,8 @@ impl Tiling {
         tile.plane.at + tile.plane.right * from_middle(x, 0) + tile.plane.down * from_middle(y, 1)
     }
 
-    /// The place in space, mm, that a position on the picture shows on a tile; for a curved plane, the nearest one that its line reaches.
+    /// The place in space, mm, that a position on the picture, pixels, shows on a tile's plane, also outside the tile. For a curved plane, positions to
+    /// the left or right of its line have the places of the line's end.
     pub fn point(&self, tile: &Tile, at: [f64; 2]) -> DVec3 {
         let [x, y]: [f64; 2] =
             std::array::from_fn(|a| at[a] - f64::from(tile.corner[a]) - f64::from(tile.size[a]) / 2.0);

@@ -137,7 +137,8 @@ impl Screen {
         self.shown
     }
 
-    /// The times from presentation to the monitor that were measured since the last call. Empty if the device cannot measure them.
+    /// The times from handing a picture to the presentation to its first pixel on the monitor, as measured since the last call. Empty if the device
+    /// cannot measure them.
     pub fn take_latencies(&mut self) -> Vec<Duration> {
         self.chain.take_latencies()
     }

@@ -41,7 +41,7 @@ impl Budget {
     }
 }
 
-/// A source of error in a scene: a dial that makes the picture more or less accurate.
+/// A source of error in a scene: a dial whose setting decides how accurate the picture is, with its own setting and its two finest.
 pub struct Source {
     pub name: &'static str,
     /// Label of the scene's own setting of the dial.

@@ -142,9 +142,9 @@ fn keeps_surfaces(report: &Report, choice: &Combination) -> bool {
 /// Changes of several dials at once: index of the dial, and index of its point.
 pub type Changes = Vec<(usize, usize)>;
 
-/// At most `most` combinations that may lie on the Pareto front, spread evenly over their predicted time. The prediction adds squares of errors, as
-/// for independent errors, and multiplies the time by the factor of each change. The first combination is the scene with its own settings. With a
-/// bound, combinations near it come first.
+/// At most `most` combinations, apart from the first on the predicted Pareto front of error and time. The prediction adds squares of errors, as for
+/// independent errors, and multiplies the time by the factor of each change. The first combination is the scene with its own settings. With a bound,
+/// half of the others are those predicted nearest to it, and come next. The rest are spread evenly by rank, from the fastest to the most accurate.
 pub fn proposals(dials: &[Dial], bound: Option<Bound>, most: usize) -> Vec<Changes> {
     let turned: Vec<usize> =
         (0..dials.len()).filter(|d| dials[*d].kind == Kind::Numerical && default(&dials[*d]).is_some()).collect();

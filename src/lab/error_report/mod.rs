@@ -188,8 +188,9 @@ pub struct Point {
     pub is_default: bool,
 }
 
-/// Errors of a picture, and of the surface if it shows one. Pixels whose rays hit another surface than in the reference, or none, are left out of the
-/// errors of the picture, and so are their neighbours. Their shares are in `mm`.
+/// Errors of a picture against a reference, and of the surface if it shows one. Pixels that hit a surface in only one of the two, or surfaces further
+/// apart than [`Scene::cliff`](crate::scene::Scene::cliff), are left out of the errors of the picture, and so are their neighbours. `mm` has the shares
+/// of such pixels, without the neighbours.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Errors {
@@ -308,7 +309,7 @@ impl Measure {
 }
 
 impl Dial {
-    /// True if its settings differ in look, so that their differences are not errors.
+    /// True if the dial's settings differ in look, so that differences between their pictures are not errors.
     pub fn is_look(&self) -> bool {
         self.kind == Kind::Look
     }

@@ -140,7 +140,7 @@ pub struct Ceilings {
     /// Samples that the shader interpolates from eight texels.
     #[serde(default)]
     pub exact: Option<Ceiling>,
-    /// Texel fetches, or loads from storage images if the device uses those.
+    /// Reads of single texels, in the way that is faster on the device: texel fetches, or loads from storage images on a software device.
     pub fetch: Ceiling,
 }
 

@@ -81,9 +81,9 @@ impl Conditions {
 /// GPU times, ns, one entry per repeat.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Times {
-    /// Stages 2-4, which the thesis timed.
+    /// Stages 2-4 of one picture, which the thesis timed; ns, by repeat.
     pub picture: Vec<f64>,
-    /// Stage 1 of all frames of a volume.
+    /// Stage 1 of all frames of a volume together; ns, by repeat.
     pub preprocess: Vec<f64>,
 }
 

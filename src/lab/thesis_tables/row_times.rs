@@ -140,11 +140,11 @@ fn broken(error: &SceneError) -> GpuError {
     GpuError::Broken(format!("the scene that measures: {error}"))
 }
 
-/// The scene of a row. It has only the filters that the conditions of the thesis name, and no shadow. The coarse detector is off, so that a
-/// ray takes all of its samples. If rays are composited, the filters have the sigmas and the largest window of preset `thesis`.
+/// The scene of a row. It has only the filters that the conditions name, and no shadow. The coarse detector and empty-space skipping are off, so
+/// that a ray takes all of its samples. If rays are composited, the filters have the sigmas of preset `thesis` and windows that grow to 21 pixels.
 ///
 /// # Errors
-/// None for the conditions of [`tables`].
+/// The conditions are outside the limits of a scene; those of [`tables`] never are.
 pub fn scene(conditions: &Conditions) -> Result<Scene, SceneError> {
     let n = conditions.volume;
     let mut settings = Settings { mode: Mode::Surface, ..Settings::default() };

@@ -43,7 +43,8 @@ pub struct StreamOptions {
     pub paced: bool,
 }
 
-/// A function that returns, for a scene at full quality, the settings that may replace its own while the view moves.
+/// A function that returns, for a scene at full quality, the settings of lower quality of which any one may replace its own while the view moves.
+/// Their order does not matter.
 pub type Lowered = Arc<dyn Fn(&Scene) -> Vec<Settings> + Send + Sync>;
 
 impl Default for StreamOptions {

@@ -45,7 +45,7 @@ pub struct Statistics {
     pub volumes: VolumeCounts,
     /// Latency from the arrival of each frame to the end of the first picture that shows it, us.
     pub latency: Histogram<u64>,
-    /// The same latencies, s, in bins with fixed limits.
+    /// The latencies of `latency`, but in s and in bins with fixed limits.
     pub latencies: histogram::Histogram,
     pub passes: Vec<PassTime>,
     /// Number of passes and copies that could not be timed.

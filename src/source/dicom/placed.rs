@@ -19,7 +19,7 @@ pub(super) struct Placed {
     pub order: Vec<usize>,
     /// The part of each picture that is read: first column, first row, columns and rows.
     pub part: [usize; 4],
-    /// True if the file states the distance between its pixels.
+    /// True if the file states the distance between its pixels, so that `--voxel-spacing` is refused.
     pub has_spacing: bool,
     /// Time stamp of each frame, s, by its index in `order`; no entry if it has none.
     pub times: BTreeMap<usize, f64>,

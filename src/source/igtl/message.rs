@@ -82,7 +82,7 @@ pub struct Text {
     pub text: String,
 }
 
-/// A message of a type that the program does not use. The checksum of its body was verified.
+/// A message of a type that the program does not use. Its body was received, but is not kept.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Other {
     pub device: String,

@@ -147,7 +147,7 @@ pub enum Truth {
     Vessels(VesselTree),
 }
 
-/// A ball of blood in a muscular wall, whose radius changes with time.
+/// A ball of blood, whose radius changes with time, in a muscular wall: the ground truth of the phantom's heart.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HeartTruth {
     pub centre: DVec3,

@@ -44,7 +44,8 @@ const LEAST_SHARE: u32 = 40;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Unveiled {
     pub outcome: Outcome,
-    /// Row at which rendering starts, for each column and slice of the volume, the column fastest. All 0 if the pocket was not recognised.
+    /// Row, which may be fractional, at which rendering starts, by the near face of the pocket of fluid: for each column and slice of the volume, the
+    /// column fastest. All 0 if the pocket was not recognised.
     pub rows: Vec<f32>,
 }
 

@@ -18,7 +18,7 @@ pub const MAX_BRUSH_POINTS: usize = 512;
 #[serde(deny_unknown_fields)]
 pub struct Cut {
     /// Corners of the closed contour, 3 to 512: mm to the right of `view.at` and up, in the plane through it that faces the view. What the contour
-    /// winds about is inside, also where it crosses itself. Absent with `brush`.
+    /// winds about is inside, also where it crosses itself. Required without `brush`, absent with it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub contour: Vec<[f64; 2]>,
     /// The view at which the contour was drawn. Absent: from the probe down.

@@ -88,7 +88,7 @@ impl Sides {
         all.max_by(|a, b| a.direction().dot(direction).total_cmp(&b.direction().dot(direction))).unwrap_or_default()
     }
 
-    /// The letters at the first and the last end of the axis. None if the sides are not known.
+    /// The letters of the patient's sides (L, R, A, P, H, F) at the low and the high end of the axis. None if the sides are not known.
     pub fn letters(self) -> Option<[&'static str; 2]> {
         Some(match self {
             Sides::None => return None,

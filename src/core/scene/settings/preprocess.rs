@@ -273,7 +273,7 @@ pub struct PeronaMalik {
     /// Edge constant k: differences above it are preserved. In 0..1 on slices and pictures, in mm on distances. Infinity preserves none
     /// (the heat equation), 0 preserves all.
     pub edge: f64,
-    /// Conductance function.
+    /// Conductance function: how the diffusion falls with the difference of neighbouring values.
     pub conductance: Conductance,
     /// Diffusion time of one step, pixels^2: lambda of the explicit scheme, at most 1/4, where a checkerboard, the highest frequency, only flips its sign at
     /// each step; at 1/5 three fifths of it are left. tau of AOS, unlimited; of RKL1 at most 200.

@@ -294,7 +294,8 @@ pub struct Surface {
     pub start_depth: Option<f64>,
     /// Detection rule.
     pub detector: Detector,
-    /// Detectors adaptive and lasting: an edge counts at once if its difference exceeds this many standard deviations of the noise in front of it.
+    /// Detectors `adaptive` and `lasting`: how many standard deviations of the noise in front of an edge its difference must exceed. A weaker edge
+    /// counts only if the ray has no other.
     pub noise: f64,
     /// Length of an edge, mm: the difference is the mean echo over this length behind a place minus the mean echo over this length in front
     /// of it, at any step of the rays. The detector takes at least 4 and at most 256 samples of this length. `samples`: 4 steps of the

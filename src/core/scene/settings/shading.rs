@@ -66,7 +66,7 @@ pub struct Bilateral {
     pub mm: Option<f64>,
     /// Standard deviation of the distance, mm.
     pub distance: f64,
-    /// Number of repetitions.
+    /// How many times the filter is applied.
     #[serde(default = "once")]
     pub repeat: u32,
 }
@@ -85,7 +85,7 @@ fn once() -> u32 {
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Light {
-    /// Direction from the surface to a distant light.
+    /// Direction from the surface to a distant light, in the axes that `follows` names. Its length does not matter, but must not be 0.
     pub direction: DVec3,
     /// What the direction is relative to.
     pub follows: Follows,
