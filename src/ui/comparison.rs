@@ -29,6 +29,17 @@ pub enum CompareView {
     Wipe,
 }
 
+impl CompareView {
+    /// The number of tiles that the room for the picture is divided into.
+    pub(super) fn tiles(self) -> usize {
+        match self {
+            CompareView::Wipe => 1,
+            CompareView::Tiles => 2,
+            CompareView::Difference => 3,
+        }
+    }
+}
+
 /// What the compared volume has in common with the shown one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Link {

@@ -11,13 +11,16 @@ use egui::epaint::{ImageData, ImageDelta, Primitive};
 use egui_ash_renderer::Renderer;
 use egui_ash_renderer::allocator::DefaultAllocator;
 use egui_ash_renderer::vulkan::{create_vulkan_descriptor_set, create_vulkan_descriptor_set_layout};
+use half::f16;
 use std::collections::HashMap;
 use std::sync::Arc;
 
 /// Number of textures at a time. egui has one for its glyphs, the panels one for each small picture: of looks, and of volumes of the loop.
 const MAX_TEXTURES: u32 = 160;
-/// What egui expects: its colours are in sRGB.
-const FORMAT: vk::Format = vk::Format::R8G8B8A8_SRGB;
+/// Linear, with the precision of dark greys.
+const FORMAT: vk::Format = vk::Format::R16G16B16A16_SFLOAT;
+/// The library's shader raises what it reads to the power of 1 / 2.2. A texture in sRGB has another curve: dark greys would be 8 levels of 255 brighter.
+const GAMMA: f64 = 2.2;
 
 /// The textures of the panels, by egui's texture ids.
 pub(super) struct PanelTextures {
@@ -120,7 +123,14 @@ impl PanelTextures {
     ) -> Result<(), GpuError> {
         let ImageData::Color(image) = &delta.image;
         let size = [image.width() as u32, image.height() as u32];
-        let bytes: Vec<u8> = image.pixels.iter().flat_map(|colour| colour.to_array()).collect();
+        let half = |value: f64| f16::from_f64(value).to_le_bytes();
+        let share = |level: u8| f64::from(level) / 255.0;
+        let linear: [[u8; 2]; 256] = std::array::from_fn(|level| half(share(level as u8).powf(GAMMA)));
+        let texel = |colour: &egui::Color32| {
+            let [red, green, blue, opacity] = colour.to_array();
+            [linear[usize::from(red)], linear[usize::from(green)], linear[usize::from(blue)], half(share(opacity))]
+        };
+        let bytes: Vec<u8> = image.pixels.iter().flat_map(texel).flatten().collect();
         let at = match delta.pos {
             Some(at) => at.map(|n| n as u32),
             None => {

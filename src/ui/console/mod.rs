@@ -52,7 +52,7 @@ use self::replay::Replay;
 use self::start::Start;
 use self::survey::Survey;
 use self::turntable::Turntable;
-use super::comparison::{CompareView, Comparison};
+use super::comparison::Comparison;
 use super::controls::Controls;
 use super::export::Exporter;
 use super::frame_budget::{self, Quality};
@@ -304,11 +304,8 @@ impl Console {
     /// What the panels leave and have in the window.
     fn room(&self) -> Room {
         let room = Room::of(self.presentation.size(), self.panels.scale(), self.visible.panels);
-        match self.comparison.as_ref().filter(|_| self.fixed.overlay).map(|comparison| comparison.shown().view) {
-            None | Some(CompareView::Wipe) => room,
-            Some(CompareView::Tiles) => room.divided(2),
-            Some(CompareView::Difference) => room.divided(3),
-        }
+        let compared = self.comparison.as_ref().filter(|_| self.fixed.overlay);
+        compared.map_or(room, |comparison| room.divided(comparison.shown().view.tiles()))
     }
 
     /// Sets whether the panels are described to a screen reader.

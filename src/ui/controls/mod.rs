@@ -315,6 +315,11 @@ impl Controls {
             | Command::StepRecording(_)
             | Command::CloseRecording(_)
             | Command::CancelReading
+            | Command::Compare
+            | Command::CompareView(_)
+            | Command::MoveWipe(_)
+            | Command::ToggleLink(_)
+            | Command::Align
             | Command::Exports
             | Command::Export(_)
             | Command::CancelExport

@@ -149,12 +149,7 @@ fn buttons(ui: &Ui, shown: &Shown, over: Rect, execute: &mut dyn FnMut(Command))
                 }
                 let align = if shown.is_aligning { texts::ALIGNING } else { texts::ALIGN };
                 button(align, (texts::ALIGN, texts::ALIGN_HINT), shown.is_aligned || shown.is_aligning, Command::Align);
-                button(
-                    texts::CLOSE_BUTTON,
-                    (texts::END_COMPARISON, texts::END_COMPARISON_HINT),
-                    false,
-                    Command::Compare,
-                );
+                button(texts::CLOSE, (texts::END_COMPARISON, texts::END_COMPARISON_HINT), false, Command::Compare);
             });
         });
     });

@@ -574,8 +574,11 @@ impl Room {
 }
 
 impl Room {
-    /// This room with its picture divided into two or three tiles in a row or a column.
+    /// This room with its picture divided into up to three tiles in a row or a column.
     pub(super) fn divided(self, tiles: usize) -> Room {
+        if tiles < 2 {
+            return self;
+        }
         let (corner, whole) = self.picture;
         let size = compare::tile_size(tiles, whole);
         let [columns, _] = compare::grid(tiles, whole);

@@ -58,6 +58,8 @@ pub(super) struct Shown {
     /// The names of the presets of the user, while the list of presets is shown; and the name that is being typed.
     pub(super) presets: Option<(Vec<String>, Option<String>)>,
     pub(super) start_lines: Vec<StartLine>,
+    /// The volume that is compared with the shown one.
+    pub(super) compared: Option<crate::comparison::Shown>,
     /// That of no windowing system, and that by keyboard.
     pub(super) pointers: (Option<[f64; 2]>, Option<PointerMark>),
     /// What the last layout said.
@@ -112,6 +114,7 @@ impl Shown {
             presets: None,
             start_lines: Vec::new(),
             pointers: (None, None),
+            compared: None,
             tree: BTreeMap::new(),
             focus: None,
             corners: Vec::new(),
@@ -175,6 +178,8 @@ impl Shown {
             |(n, name): (usize, &String)| Named { name: name.clone(), path: format!("/data/{name}"), is_shown: n == 1 };
         let recordings: Vec<Named> = self.recordings.iter().enumerate().map(named).collect();
         let room = Room::of(self.size, scale, self.visible.panels);
+        let tiles = self.compared.as_ref().map(|shown| shown.view.tiles());
+        let room = tiles.map_or(room, |tiles| room.divided(tiles));
         let picture = ShownPicture {
             scene: self.kept.clone().unwrap_or_else(|| self.scene.clone()),
             volume: 2,
@@ -216,6 +221,7 @@ impl Shown {
             exit_key: "",
             pointer: self.pointers.0,
             keyboard_pointer: self.pointers.1,
+            compared: self.compared.as_ref(),
         };
         let output = self.panels.lay_out(&state, self.size, self.time);
         self.corners = output.corners();
