@@ -11,18 +11,19 @@ const MISSED: f64 = 0.006;
 /// Bits of a word of marks, four rows of eight pixels, whose pixels are those of the lattice.
 const OF_LATTICE: u32 = 0x0055_0055;
 
-/// Statistics of the errors that the pixels of a picture state (`ray.tolerance`). Shares are 0..1.
+/// Statistics of the errors that the renderer estimates for each pixel of a picture with `ray.tolerance`. Shares are 0..1 of all pixels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stated {
     /// The tolerance of each pixel, levels of 8 bits.
     pub tolerance: f64,
     /// Share of the pixels whose rays meet only empty bricks. They have no error.
     pub certain: f64,
-    /// Share of the pixels whose estimated error is at most the tolerance, less the share for which estimates are known to be too small.
+    /// Share of the pixels whose estimated error is above 0 and at most the tolerance, less `MISSED`, the share of those whose true error is above it
+    /// in tests.
     pub estimated: f64,
     /// Share of the pixels that have a ray of their own. The others are interpolated from neighbouring rays.
     pub with_rays: f64,
-    /// The largest error that a pixel states, levels of 8 bits.
+    /// The largest estimated error of a pixel, levels of 8 bits.
     pub largest: f64,
 }
 

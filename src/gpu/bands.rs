@@ -82,7 +82,7 @@ pub(crate) enum BandLimit {
 }
 
 impl BandLimit {
-    /// The limit of a device; `None` if nothing is divided.
+    /// The limit for the submissions to a device; `None` if no dispatch is divided.
     pub fn new(bands: Bands, is_software: bool) -> Option<BandLimit> {
         match bands {
             Bands::Measured { losses: 0 } if is_software => None,
@@ -93,7 +93,7 @@ impl BandLimit {
         }
     }
 
-    /// The limit of a device whose queue also draws a window's panels, between the bands. `None` if nothing is divided.
+    /// As [`BandLimit::new`], for a device whose queue also draws a window's panels, between the bands.
     pub fn paced(bands: Bands, is_software: bool) -> Option<BandLimit> {
         match bands {
             Bands::Measured { losses } if is_software => Some(BandLimit::Time {

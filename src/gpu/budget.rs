@@ -8,9 +8,9 @@ use ash::vk;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct HeapBudget {
     pub size: u64,
-    /// The most that this process can use of the heap at present.
+    /// The most that this process can use of the heap at present, bytes, including what it uses already.
     pub budget: u64,
-    /// What this process uses of the heap now.
+    /// What this process uses of the heap now, bytes.
     pub used: u64,
     pub is_device_local: bool,
 }

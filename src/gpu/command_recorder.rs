@@ -51,7 +51,7 @@ pub(crate) struct SlotParts {
 /// Layout of copied texels in a buffer, as in VkBufferImageCopy.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct BufferLayout {
-    /// Byte offset of the first texel.
+    /// Byte offset of the first texel in the buffer.
     pub offset: u64,
     /// Texels from the beginning of one row to the next; 0: rows follow each other without gaps.
     pub row_length: u32,
@@ -155,7 +155,7 @@ impl CommandRecorder {
         Ok(())
     }
 
-    /// Waits until the last submission is done, then begins a new recording.
+    /// Waits until this recorder's last submission is done, then begins a new recording.
     pub fn begin(&mut self, queues: &mut DeviceQueues) -> Result<(), GpuError> {
         queues.timings.cpu_of(None);
         queues.begin(self.queue);
@@ -235,7 +235,7 @@ impl CommandRecorder {
         }
     }
 
-    /// Adds up the times of the last submission and of those that were set aside, as far as they are done. Each is added once.
+    /// Waits for this recorder's last submission, and adds its times and those that were set aside to the queues' timings. Each is added once.
     pub fn collect(&mut self, queues: &mut DeviceQueues) -> Result<(), GpuError> {
         let (bits, period) =
             (self.context.queue(self.queue).valid_bits, self.context.candidate.limits.timestamp_period);
@@ -255,8 +255,8 @@ impl CommandRecorder {
         Ok(())
     }
 
-    /// Waits for the last submission, and keeps its time stamps for a later [`CommandRecorder::collect`]. If too many are kept already, its work is
-    /// counted as not timed.
+    /// Waits for this recorder's last submission, and keeps its time stamps for a later [`CommandRecorder::collect`]. If too many are kept already,
+    /// its work is counted as not timed.
     pub fn set_aside(&mut self, queues: &mut DeviceQueues) -> Result<(), GpuError> {
         self.wait(queues)?;
         if self.collected_to == self.done_at {
@@ -276,12 +276,12 @@ impl CommandRecorder {
         Ok(())
     }
 
-    /// Blocks until the last submission is done.
+    /// Blocks until this recorder's last submission is done.
     pub fn wait(&self, queues: &DeviceQueues) -> Result<(), GpuError> {
         queues.timelines.of(self.queue).wait(self.done_at)
     }
 
-    /// True if the last submission is done.
+    /// True if this recorder's last submission is done.
     pub fn is_done(&self, queues: &DeviceQueues) -> Result<bool, GpuError> {
         queues.timelines.of(self.queue).is_done(self.done_at)
     }

@@ -130,11 +130,11 @@ pub(crate) struct Presentation {
 /// A simultaneous reading of the device's clock (`ticks`) and the host's.
 pub(super) struct ClockReading {
     pub ticks: u64,
-    /// The host's monotonic clock, ns; None if the driver does not read it in the same call.
+    /// The host's monotonic clock, ns, as the driver read it together with `ticks`; None if it reads only the device's clock.
     pub monotonic: Option<u64>,
-    /// The host's clock in the middle of the call.
+    /// The host's clock in the middle of the call that read `ticks`.
     pub at: Instant,
-    /// Largest time between the readings, ns.
+    /// Largest time between the reading of `ticks` and that of the host's clock, ns.
     pub deviation: u64,
 }
 
@@ -313,7 +313,7 @@ impl Context {
         !self.layer_misses_waits() || self.queue_count() == 1
     }
 
-    /// Bytes of device memory that this context has allocated.
+    /// Bytes of device memory that this context's buffers and images hold now.
     pub fn allocated(&self) -> u64 {
         let allocator = self.allocator.lock().unwrap_or_else(|e| e.into_inner());
         allocator.as_ref().map_or(0, |allocator| allocator.generate_report().total_allocated_bytes)

@@ -144,7 +144,7 @@ impl Faults {
         self.waits.load(Ordering::Relaxed)
     }
 
-    /// While `holds` was last set to true, a picture in flight counts as not done, as on a slow device.
+    /// After a call with `holds` true, until one with false, a picture in flight counts as not done, as on a slow device.
     pub fn hold_pictures(&self, holds: bool) {
         self.holds_pictures.store(holds, Ordering::Relaxed);
     }

@@ -255,8 +255,8 @@ impl PassTimer {
         done
     }
 
-    /// Runs all iterations of the pass in one submission, and waits. Returns the device's time for all of them, ns, or `None` if the device
-    /// has no time stamps. A repeated pass works on the results of its previous run.
+    /// Runs the pass, with as many dispatches in a row as it has in a picture, in one submission, and waits. Returns the device's time for all of
+    /// them, ns, or `None` if the device has no time stamps. The slots hold what the previous run left in them.
     ///
     /// # Errors
     /// The device fails.
@@ -296,8 +296,8 @@ impl Drop for PassTimer {
     }
 }
 
-/// Times of `count` consecutive runs of a pass, ns, each with all its iterations, on slots that hold zeros. Empty if the device has no time
-/// stamps. An additional first run, in which drivers compile, is not counted.
+/// Times of `count` consecutive runs of a pass, ns, each with as many dispatches in a row as in a picture, on slots that hold zeros. Empty if the
+/// device has no time stamps. An additional first run, in which drivers compile, is not counted.
 ///
 /// # Errors
 /// As for [`PassTimer::new`].

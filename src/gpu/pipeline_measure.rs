@@ -83,7 +83,7 @@ pub fn measure(
     measure_targets(context, &pipelines, &targets)
 }
 
-/// Time to compile the pipelines of a pass in a scene, without any cache.
+/// Sum of the times to compile each pipeline of a pass in a scene once, without any cache.
 ///
 /// # Errors
 /// A shader does not compile.

@@ -34,12 +34,12 @@ pub struct Pipeline {
     pub handle: vk::Pipeline,
     /// Compile time, and whether the pipeline came from a pipeline cache (`None` if the driver does not report it).
     pub compilation: (Duration, Option<bool>),
-    /// Time of an invocation, measured on the pipeline's last dispatches.
+    /// Time of one invocation, ns, measured on the pipeline's last dispatches.
     pub time: Arc<InvocationTime>,
 }
 
-/// What determines a pipeline: shader, specialization constants, and for each input its format and whether it is read as a storage image or a texel
-/// buffer. The last may differ between slots, because a lookup table may be too large for a texel buffer.
+/// What determines a pipeline: shader, specialization constants, and for each input its format, and true if it is read as a storage image or a texel
+/// buffer, false if in another way. The last may differ between slots, because a lookup table may be too large for a texel buffer.
 pub type Key = (&'static str, Vec<(&'static str, i32)>, Vec<(Format, bool)>);
 
 /// The input of a compilation: SPIR-V as the device gets it, its reflected declarations, and the values of specialization constants by name.

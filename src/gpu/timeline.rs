@@ -251,7 +251,7 @@ impl Timelines {
         self.0.iter().try_for_each(Timeline::wait_all)
     }
 
-    /// How long the device has been busy without finishing a submission of some queue; zero if it is idle.
+    /// How long a queue of the device has been busy without finishing a submission, the longest of all queues; zero if all are idle.
     pub fn busy_for(&self) -> Duration {
         self.0.iter().map(Timeline::busy_for).max().unwrap_or_default()
     }

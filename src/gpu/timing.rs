@@ -322,7 +322,7 @@ impl Timings {
         }
     }
 
-    /// Adds the stamps of one command buffer.
+    /// Adds up the times between the stamps of one recording, by name, and their spans if those are kept. `period`: ns per tick.
     pub fn add(&mut self, stamps: &[Stamp], valid_bits: u32, period: f32) {
         if let (Some(spans), Some(first)) = (&mut self.spans, stamps.first()) {
             spans.set_anchor(first.from);

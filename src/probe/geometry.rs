@@ -111,7 +111,7 @@ impl Probe {
         matches!(self.array, Array::Curved { .. }) && self.lines.first().abs().max(self.lines.last().abs()) >= PI / 2.0
     }
 
-    /// Y of the wobble axis, mm: Ra - Rw. 0 unless the motion is a fan.
+    /// Y of the wobble axis, mm: radius of the array minus wobble radius (Ra - Rw). 0 unless the motion is a fan.
     pub fn axis_depth(&self) -> f64 {
         match self.motion {
             Motion::Fan { wobble_radius } => self.array_radius() - wobble_radius,
@@ -119,7 +119,8 @@ impl Probe {
         }
     }
 
-    /// In-plane map: point (x, y) of a fractional (sample, line), mm.
+    /// In-plane map: point (x lateral, y depth), mm, of a fractional (sample, line). The origin is the apex of a curved array, or the face of a
+    /// linear one.
     pub fn plane_point(&self, sample: f64, line: f64) -> (f64, f64) {
         let range = self.first_range() + sample * self.sample_pitch;
         let at = self.lines.at(line);
@@ -157,14 +158,15 @@ impl Probe {
         }
     }
 
-    /// Point in space of fractional indices, mm: the in-plane map followed by the sweep map.
+    /// Point in space (lateral, depth, elevation), mm, of fractional indices: the in-plane map followed by the sweep map.
     pub fn to_space(&self, at: Indices) -> DVec3 {
         let (x, y) = self.plane_point(at.sample, at.line);
         let position = self.slice_position(at.line, at.slice);
         self.sweep_map(x, y, position)
     }
 
-    /// Sweep map: point in space of an in-plane point (x, y) at a slice position, mm.
+    /// Sweep map: point in space (lateral, depth, elevation), mm, of an in-plane point (x, y) of [`Probe::plane_point`] at a slice position, rad or
+    /// mm. Position 0 has elevation 0.
     pub fn sweep_map(&self, x: f64, y: f64, position: f64) -> DVec3 {
         match self.motion {
             Motion::Fan { .. } => {

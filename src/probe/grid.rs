@@ -10,9 +10,9 @@ const MAX_LENGTH: f64 = 1e6;
 /// Voxels on an axis-aligned Cartesian grid, as in a volume that was scan-converted elsewhere.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Grid {
-    /// Number of voxels along x (fastest), y and z. A frame is one slice of constant z.
+    /// Number of voxels along x (lateral, fastest), y (depth) and z (elevation). A frame is one slice of constant z.
     pub size: [usize; 3],
-    /// Distance between voxels, mm.
+    /// Distance between voxels along x, y and z, mm.
     pub spacing: [f64; 3],
     /// Position of the centre of voxel (0, 0, 0), mm.
     pub origin: [f64; 3],

@@ -39,13 +39,13 @@ impl fmt::Display for ResolvedSize {
 /// What is one unit of each size at the middle of the region, mm.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pitches {
-    /// Distance of neighbouring samples of a line; 0 for a Cartesian volume, which has no lines.
+    /// Distance of neighbouring samples of a line, mm; 0 for a Cartesian volume, which has no lines.
     pub sample: f64,
-    /// Distance of neighbouring pixels of a slice: the mean of both axes.
+    /// Distance of neighbouring pixels of a slice, mm: the mean of both axes.
     pub slice_pixel: f64,
-    /// Distance of neighbouring slices; 0 if there is only one.
+    /// Mean distance of neighbouring slices at the middle of the region, mm; 0 if there is only one.
     pub slice: f64,
-    /// Distance of neighbouring rays of a picture with full resolution.
+    /// Distance of neighbouring rays of a picture with full resolution at the middle of the region, mm.
     pub ray: f64,
 }
 
@@ -166,7 +166,7 @@ impl Resolver {
         Conditioning { low_pass, low_pass_mm: None, ..c.clone() }
     }
 
-    /// Converts a Gaussian's deviation across slices to slices. `key`: path of the setting.
+    /// Converts a Gaussian's standard deviation across slices from mm to slices, if it is given in mm. `key`: path of the setting.
     pub fn smooth(&mut self, key: &'static str, smooth: Smooth) -> Smooth {
         let Some(mm) = smooth.elevation_mm else { return smooth };
         let elevation = self.length(key, mm, Unit(self.pitches.slice, "slices"), MAX_DEVIATION);
@@ -189,7 +189,7 @@ impl Resolver {
         }
     }
 
-    /// Converts the filters of the distance map, for a picture with full resolution.
+    /// Converts sizes in mm of the filters of the distance map to pixels of that map, one ray each, for a picture with full resolution.
     pub fn distance(&mut self, d: &Distance) -> Distance {
         let unit = self.of_rays();
         let median = match d.median_mm.map(|mm| self.window("distance.median_mm", mm, unit)) {

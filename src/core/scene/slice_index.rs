@@ -14,15 +14,16 @@ const MAX_TERMS: usize = 10;
 /// limits.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct SlicePolynomial {
-    /// Lowest and highest position t, a little beyond the sweep: mm, or for a fan the tangent of half the angle about the wobble axis.
+    /// Lowest and highest argument t of the polynomial, a little beyond the outermost slices: the slice position in mm, or for a fan the tangent of
+    /// half its angle about the wobble axis.
     pub limits: [f64; 2],
     pub offset: f64,
     pub terms: Vec<f64>,
 }
 
 impl Scene {
-    /// Number of terms of the polynomial that replaces the sweep's look-up table. 0 where the table is used: it was asked for, a fan is wider than
-    /// 180 degrees, more than 10 terms would be needed, or there is no sweep.
+    /// Number of terms of the polynomial for the slice index at a slice position, which replaces a look-up table. 0 where the table is used: it was
+    /// asked for, a fan is wider than 180 degrees, more than 10 terms would be needed, or there is no sweep.
     pub fn slice_terms(&self) -> usize {
         match self.probe() {
             Some(probe) if self.settings.ray.slice_index == SliceIndex::Auto => term_count(probe),
@@ -30,7 +31,7 @@ impl Scene {
         }
     }
 
-    /// The polynomial that replaces the sweep's look-up table. None where the table is used.
+    /// The polynomial for the slice index at a slice position, which replaces a look-up table. None where the table is used.
     pub(crate) fn slice_polynomial(&self) -> Option<SlicePolynomial> {
         let count = self.slice_terms();
         self.probe().filter(|_| count > 0).map(|probe| polynomial(probe, count))

@@ -10,7 +10,8 @@ use glam::DVec3;
 /// Least lateral distance of neighbouring points, as a share of the distance from the first to the last: a micrometre of a curve over 100 mm.
 const LEAST_GAP: f64 = 1e-5;
 
-/// The start curve: the depth at which rendering starts as a smooth function of the lateral position, at any elevation.
+/// The start curve: the depth at which rendering starts as a smooth function of the lateral position, at any elevation. Depths are counted as those
+/// of the points that it is made from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StartCurve {
     /// Lateral, and depth from wherever depths count: mm, ascending.
@@ -32,7 +33,7 @@ impl StartCurve {
         StartCurve { points: points.to_vec(), slopes: (0..points.len()).map(slope).collect() }
     }
 
-    /// The depth at which rendering starts at a lateral position, mm; counted like the depths of the points.
+    /// The depth at which rendering starts at a lateral position, mm; counted like the depths of the points of [`StartCurve::new`].
     pub fn depth(&self, lateral: f64) -> f64 {
         let behind = self.points.partition_point(|point| point[0] <= lateral);
         let Some(n) = behind.checked_sub(1) else { return self.points.first().map_or(0.0, |first| first[1]) };

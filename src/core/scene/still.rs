@@ -10,7 +10,7 @@ const MAX_EXTINCTION: f64 = 40.0;
 /// A distant light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DistantLight {
-    /// Unit direction to the light.
+    /// Unit direction to the light, in space (lateral, depth, elevation).
     pub towards: DVec3,
     /// Irradiance (red, green, blue) on a surface that faces the light.
     pub irradiance: [f64; 3],

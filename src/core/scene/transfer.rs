@@ -128,8 +128,8 @@ pub fn entries(volume: &Volume) -> Result<usize, String> {
     }
 }
 
-/// Red, green, blue and absorption at `entries` equidistant sample values from 0 to 1 (at least 2). Below `threshold` the absorption
-/// is 0.
+/// Red, green, blue and absorption over one reference length at `entries` (at least 2) equidistant sample values from 0 to 1. Below `threshold` the
+/// absorption is 0.
 pub fn table(points: &[TransferPoint], threshold: f64, entries: usize) -> Vec<[f64; 4]> {
     table_by(points, threshold, entries, Absorption::of_length(1.0))
 }

@@ -11,7 +11,7 @@ use glam::DVec3;
 
 impl Scene {
     /// The cameras of `count` pictures of one turn; the first is the scene's camera. From each to the next, and from the last to the first, the view
-    /// turns by 360 / `count` degrees about the picture's vertical axis through the target.
+    /// direction turns right by 360 / `count` degrees about the picture's vertical axis through the target.
     ///
     /// # Errors
     /// The mode shows planes, which do not turn with the view; or, as [`Scene::new`], the region has no volume.

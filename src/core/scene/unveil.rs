@@ -15,9 +15,9 @@ const SMOOTH: f64 = 1.2;
 /// every machine.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct FluidLattice {
-    /// Texels of a cell along columns and rows. Across slices a cell has one texel.
+    /// Number of the volume's texels in a cell of the lattice along columns and rows. Across slices a cell has one texel.
     pub cell: [usize; 2],
-    /// Number of cells along columns, rows and slices.
+    /// Number of cells of the lattice along columns, rows and slices.
     pub size: [usize; 3],
     /// Size of a cell along columns, rows and slices in the middle of the region, mm.
     pub pitch: [f64; 3],

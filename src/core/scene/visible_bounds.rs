@@ -136,7 +136,7 @@ impl Scene {
     }
 
     /// The scene with a stage 1 that also serves `full` and `others`, which draw the same volume with the same filters. What depends on the number of
-    /// samples follows `full`, so that changing from one of these scenes to another needs no frame again.
+    /// samples of a ray follows `full`, so that changing from one of these scenes to another needs no frame again.
     pub fn sharing(self, full: &Scene, others: &[&Scene]) -> Scene {
         let all = || others.iter().copied().chain([full, &self]);
         let visible_bounds = all().map(|scene| scene.visible_bounds).fold(self.visible_bounds, VisibleBounds::with);

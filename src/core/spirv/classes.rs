@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 const WORKGROUP: u32 = ::spirv::StorageClass::Workgroup as u32;
 const VOTES: &str = "votes of a subgroup";
 
-/// The classes of instructions that occur in a module. Empty if the words are no module.
+/// The classes of instructions that occur in a module, in words such as "arithmetic of floats". Empty if the words are no module.
 pub fn classes(words: &[u32]) -> BTreeSet<&'static str> {
     decode(words).unwrap_or_default().iter().filter_map(|i| class(i.opcode, i.operands)).collect()
 }

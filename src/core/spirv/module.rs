@@ -41,14 +41,14 @@ pub(super) const MAX_BOUND: u32 = 0x3f_ffff;
 pub(super) const HEADER_WORDS: usize = 5;
 pub(super) const BOUND: usize = 3;
 
-/// The hash of each shader's expanded source, one line a shader.
+/// One line for each shader: the SHA-256, in hexadecimal, of compiler options, macros and expanded source; then its name in [`EMBEDDED`].
 pub const SOURCES: &str = include_str!("../../../spirv/SOURCES");
 
 /// Word of a module's header that names the tool that made it; the lower half is the tool's version.
 const GENERATOR: usize = 2;
 
-/// Changes the tool version in the header of a module, which does not affect the code, but invalidates the driver's cache entry. `number` differs
-/// between runs of the program.
+/// Changes the tool version in the header of a module, which does not affect the code, but invalidates the driver's cache entry. `number`, of which
+/// 15 bits count, must differ between runs of the program.
 pub fn set_tool_version(words: &mut [u32], number: u16) {
     if let Some(word) = words.get_mut(GENERATOR) {
         // Versions from 0x8000 on are later than any that a driver works around.
@@ -66,7 +66,7 @@ pub fn words(bytes: &[u8]) -> Vec<u32> {
     bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
 }
 
-/// The embedded shader of this name, as bytes.
+/// The bytes of the embedded shader with this name in [`EMBEDDED`]. None if there is no such shader.
 pub fn embedded(name: &str) -> Option<&'static [u8]> {
     EMBEDDED.iter().find(|(n, _)| *n == name).map(|(_, bytes)| *bytes)
 }

@@ -22,7 +22,7 @@ pub(crate) struct PipelineCache {
 }
 
 impl PipelineCache {
-    /// Opens a cache with the data that the folder has for this driver, or an empty one. Never fails.
+    /// Opens a cache with the data that the folder has for this driver, or an empty one. Without a folder there is no cache. Never fails.
     pub fn open(device: &ash::Device, identity: &DriverIdentity, folder: Option<&Path>) -> PipelineCache {
         let file = folder.map(|folder| CacheFile::new(folder, identity));
         let mut cache = PipelineCache {
@@ -53,7 +53,8 @@ impl PipelineCache {
         cache
     }
 
-    /// The handle for vkCreateComputePipelines; null without a cache. Several threads may use it at the same time.
+    /// The handle for vkCreateComputePipelines; null without a folder, or if the driver could not create a cache. Several threads may use it at the
+    /// same time.
     pub fn handle(&self) -> vk::PipelineCache {
         self.handle
     }

@@ -26,7 +26,7 @@ const VULKAN_VERSION: u32 = 1;
 
 static CRC: Crc<u64, Table<16>> = Crc::<u64, Table<16>>::new(&CRC_64_ECMA_182);
 
-/// The CRC-64 of some bytes.
+/// The CRC-64 (ECMA-182) of some bytes.
 pub fn checksum(data: &[u8]) -> u64 {
     CRC.checksum(data)
 }

@@ -64,7 +64,7 @@ impl Renderer {
         self.queues.timelines.is_paced()
     }
 
-    /// How long the device has been busy without finishing a submission; zero if it is idle.
+    /// How long a queue of the device has been busy without finishing a submission, the longest of all queues; zero if all are idle.
     pub fn busy_for(&self) -> Duration {
         self.queues.timelines.busy_for()
     }
@@ -169,7 +169,8 @@ impl Renderer {
 }
 
 impl Renderer {
-    /// The start surface that the CPU last found in the volume that is shown. None if the scene does not search for one (`unveil`).
+    /// The start surface that the CPU last found in the volume that is shown. None if it has not searched that volume yet, or if the scene asks for
+    /// no search (`unveil`).
     pub fn unveiled(&self) -> Option<&Unveiled> {
         self.volumes.unveiled().filter(|_| self.program.scene.unveils())
     }

@@ -145,7 +145,7 @@ impl Drawing {
     }
 
     /// Submits what was recorded of the picture so far, waits for it, and copies an image slot to the host. The recording goes on afterwards.
-    /// `place`: slot and volume image. None for a slot that is no image.
+    /// `name`: of the buffer, for messages. `place`: slot and volume image. None for a slot that is no image.
     pub fn fetch(
         &mut self,
         queues: &mut DeviceQueues,
@@ -246,7 +246,7 @@ impl Drawing {
         Ok(())
     }
 
-    /// Adds up the times of the last picture, if it is done.
+    /// Waits for the last picture, and adds its times to the queues' timings.
     pub fn collect(&mut self, queues: &mut DeviceQueues) -> Result<(), GpuError> {
         self.recorder.collect(queues)
     }

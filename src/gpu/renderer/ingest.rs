@@ -154,7 +154,7 @@ impl Ring {
         Ok(Ring { entries, at: 0, staging, batch: None, context: context.clone(), time_stamps, spans })
     }
 
-    /// Makes the ring again for frames of another size, and drops the batch. The device must be idle.
+    /// Makes the staging buffers again for frames of another size, and drops the batch. The device must be idle.
     pub fn restart(&mut self, scene: &Scene, queues: &DeviceQueues) -> Result<(), GpuError> {
         self.batch = None;
         *self = Ring::new(&self.context, scene, queues, self.time_stamps, self.spans)?;

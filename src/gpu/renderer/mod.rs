@@ -237,9 +237,8 @@ impl Renderer {
 }
 
 impl Renderer {
-    /// Sends one frame to stage 1, which writes slice `slice` of volume image `image`. `bytes` are samples of the stored type, line by
-    /// line. Returns when the bytes are copied, and waits only if the ring is full. A frame that is not visible in this scene is skipped
-    /// and counted.
+    /// Sends one frame to stage 1, which writes slice `slice` of volume image `image`. `bytes` are samples of the stored type, line by line. Returns
+    /// when the bytes are copied, and waits only if all staging buffers are in use. A frame that is not visible in this scene is skipped and counted.
     ///
     /// Consecutive slices, up or down, go through stage 1 together. A frame waits for its successors until the batch is full, no visible
     /// slice can follow, another slice arrives, [`Renderer::submit_frames`] is called, the volume is read, or the scene changes.

@@ -14,7 +14,7 @@ pub(super) struct Volumes {
     shown: u32,
     /// By volume image and slice: the passes over the volume have not processed it yet.
     unprocessed: Vec<Vec<bool>>,
-    /// The smallest region that stage 1 has filtered for any frame since the last reset.
+    /// The texels of every frame that stage 1 has filtered, as last noted.
     filtered: VisibleBounds,
     /// What the CPU found and the device has: the slot that holds it, and the volume image that it was found in.
     found: Vec<(Slot, u32)>,
@@ -65,7 +65,7 @@ impl Volumes {
         self.found.retain(|(_, of)| *of != image);
     }
 
-    /// The smallest region that stage 1 has filtered for any frame since [`Volumes::set_filtered`].
+    /// The region of the last [`Volumes::set_filtered`]; before the first call, the region visible at the start.
     pub fn filtered(&self) -> VisibleBounds {
         self.filtered
     }
@@ -103,7 +103,7 @@ impl Volumes {
         due
     }
 
-    /// Notes that the slots hold the results of searches in the shown volume image.
+    /// Notes that these slots hold what the CPU searched for in the shown volume image.
     pub fn found(&mut self, slots: &[Slot]) {
         self.found.retain(|(slot, _)| slot.is_multibuffered() || !slots.contains(slot));
         self.found.extend(slots.iter().map(|slot| (*slot, self.shown)));

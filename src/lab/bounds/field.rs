@@ -38,7 +38,7 @@ impl<'a> Field<'a> {
         Field { line, volume, window, range }
     }
 
-    /// What is proven of the part of the ray between two positions, mm, with `from` at most `to`.
+    /// What is proven of the part of the line between two positions on it, mm from its `base` along its direction; `from` is at most `to`.
     pub fn content(&self, from: f64, to: f64) -> Content {
         match &self.line.scene.geometry {
             Geometry::Cartesian(_) => Content::Within { values: self.along_a_line(from, to), surely_inside: true },

@@ -25,7 +25,7 @@ impl Medium {
         Medium { points, threshold, absorption, tint: None, fade: None }
     }
 
-    /// The medium with a tint: at s mm along the ray its colours are multiplied by start + rate s.
+    /// The medium with a tint: at s mm from the start of the ray its colours are multiplied by start + rate s.
     pub fn tinted(self, start: [Interval; 3], rate: [Interval; 3]) -> Medium {
         Medium { tint: Some([start, rate]), ..self }
     }
@@ -148,7 +148,8 @@ impl Bounds {
 }
 
 /// The bounds of a ray. Parts of the ray are halved until the widest channel is narrower than `target`, `enough` is true for the bounds, or there are
-/// `most` parts. `hints`: positions in rising order, mm, at which parts end at first, such as the faces of cells; the bounds hold for any hints.
+/// `most` parts. `hints`: positions on the field's line in rising order, mm, at which parts end at first. The first and last are the ray's ends;
+/// the bounds hold for any others, such as the faces of cells.
 pub fn bounds(
     field: &Field,
     medium: &Medium,

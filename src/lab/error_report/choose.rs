@@ -69,9 +69,9 @@ pub fn choose(report: &Report, measure: Measure, bound: Bound, refused: &[usize]
     }
 }
 
-/// The combinations that may be the fastest with an error of at most `error`, as indices of [`Report::choices`]: those that keep it and whose
-/// confidence interval of the time overlaps that of the fastest. The fastest is first; there are at most [`MAX_CONTENDERS`]. More runs have to decide
-/// between them.
+/// The combinations that may be the fastest with an error by `measure` of at most `error`, as indices of [`Report::choices`]: those that keep it and
+/// whose confidence interval of the time overlaps that of the fastest. The fastest is first; there are at most [`MAX_CONTENDERS`]. More runs have to
+/// decide between them.
 pub fn contenders(report: &Report, measure: Measure, error: f64, refused: &[usize]) -> Vec<usize> {
     let mut kept: Vec<Candidate> =
         candidates(report, measure).filter(|c| c.error <= error && !refused.contains(&c.index)).collect();

@@ -89,7 +89,7 @@ pub enum Field {
 }
 
 impl Field {
-    /// The value of the field at a position, voxels.
+    /// The value of the field at a position, voxels from the centre of the ball.
     pub fn at(self, p: DVec3) -> f64 {
         let waves = (0.43 * p.x + 0.21 * p.y).sin() + (0.34 * p.y - 0.27 * p.z + 1.0).sin() + (0.39 * p.z + 0.5).cos();
         let value = 0.55 + 0.09 * waves + 0.03 * (p.x / RADIUS);

@@ -12,7 +12,7 @@ use crate::machine::Device;
 use crate::thesis_tables::Spread;
 use quality::Quality;
 
-/// A rectangle of a slice, mm: lateral positions, and depths counted as in `region.depth`.
+/// A rectangle of a slice, mm: first and last lateral position, and first and last depth, below the probe's face as in `region.depth`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Area {
     pub lateral: [f64; 2],
@@ -71,6 +71,7 @@ pub struct Report {
 
 impl Report {
     /// For every filter, the index in `Subject::rows` of the candidate whose slice is most similar to the clean one (SSIM), in the order of the rows.
+    /// It is for the first subject with a clean slice; empty if there is none.
     pub fn chosen(&self) -> Vec<usize> {
         let Some(subject) = self.subjects.iter().find(|s| s.clean.is_some()) else { return Vec::new() };
         let ssim = |n: &usize| subject.rows[*n].quality.ssim.unwrap_or(f64::NEG_INFINITY);

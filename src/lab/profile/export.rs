@@ -45,7 +45,7 @@ pub fn csv(profile: &Profile) -> String {
     text
 }
 
-/// All times of a profile as CSV: a line for each repeat of every pass and span.
+/// All times of a profile, ns, as CSV: a line for each repeat of every pass, host span, and of `device`, `wall` and `cpu` as in [`csv`].
 pub fn csv_samples(profile: &Profile) -> String {
     let mut text = String::from("kind,stage,name,repeat,ns\n");
     let lists = [("pass", &profile.passes), ("host", &profile.host)];

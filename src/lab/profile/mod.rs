@@ -39,7 +39,7 @@ pub struct Profile {
     pub repeats: usize,
     /// Number of repeats that are run first and not measured.
     pub warm_up: usize,
-    /// Rotation of the view from each repeat to the next, deg.
+    /// Growth of the view's azimuth from each repeat to the next, deg.
     #[serde(default)]
     pub turn: f64,
     /// The times of the passes, in running order.
@@ -80,7 +80,7 @@ pub struct Sizes {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Acquisition {
-    /// Travel time of sound for all lines of all slices, s.
+    /// Travel time of sound from the face to the last sample and back, summed over all lines of all slices, s.
     pub seconds: f64,
     /// Speed of sound, m/s.
     pub sound_speed: f64,
@@ -137,7 +137,7 @@ pub struct Ceilings {
     pub copy: Ceiling,
     /// Texture samples through the device's filter.
     pub sampling: Ceiling,
-    /// Samples that the shader interpolates from eight texels.
+    /// Samples that the shader interpolates from eight texels. None if that was not measured.
     #[serde(default)]
     pub exact: Option<Ceiling>,
     /// Reads of single texels, in the way that is faster on the device: texel fetches, or loads from storage images on a software device.

@@ -23,7 +23,7 @@ pub struct ProfileOptions {
     pub warm_up: usize,
     /// True: the frames go through stage 1 only once, so that only the later stages are measured.
     pub still: bool,
-    /// Rotation of the view before each repeat, also those of the warm-up, deg.
+    /// Growth of the view's azimuth from each repeat to the next, also in the warm-up, deg.
     pub angle_step: f64,
     /// Description of the input, for the profile.
     pub input: String,

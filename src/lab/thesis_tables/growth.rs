@@ -60,7 +60,7 @@ fn columns(rows: &[Growth]) -> usize {
     rows.iter().map(|r| r.counts.len()).max().unwrap_or(0)
 }
 
-/// A table of text, one line per starting window, in per cent.
+/// A table of text, one line per row, with the share of the pixels whose window's edge grew by 0, 2, 4 ... pixels, in per cent.
 pub fn table(rows: &[Growth]) -> String {
     let mut text = format!("{:<11} {:>6} {:>7} {:>7}", "centre", "sigma", "window", "largest");
     for n in 0..columns(rows) {
@@ -80,7 +80,7 @@ pub fn table(rows: &[Growth]) -> String {
     text
 }
 
-/// The rows as CSV with shares in 0..1. A window that cannot grow that far has an empty field.
+/// The same shares as in [`table`] as CSV, in 0..1. A window that cannot grow that far has an empty field.
 pub fn csv(rows: &[Growth]) -> String {
     let mut text = "centre,sigma,window,largest".to_string();
     (0..columns(rows)).for_each(|n| text.push_str(&format!(",grew {}", 2 * n)));

@@ -16,7 +16,7 @@ use growth::Grown;
 pub(crate) const SECTOR_ANGLE: f64 = 77.0;
 /// Angle over the frames of a volume, deg.
 pub(crate) const FAN_ANGLE: f64 = 61.0;
-/// Depth of a scan line, mm.
+/// Depth of a scan line from the face to its last sample, mm.
 pub const DEPTH: f64 = 160.0;
 /// Samples of a scan line.
 pub const SAMPLES: usize = 512;

@@ -20,9 +20,9 @@ const LOOK_AHEAD: usize = 8;
 pub struct MotorStatus {
     /// Type and firmware of the module, for example `TMCM-1140 firmware 1.16`.
     pub module: String,
-    /// Angle of the array in the sweep, degrees. It is valid only after [`Drive::home`].
+    /// Angle of the array, degrees; 0 is the middle of the sweep. It is valid only after [`Drive::home`].
     pub angle: f64,
-    /// Speed of the array, deg/s.
+    /// Speed of the array, deg/s; positive towards larger angles.
     pub speed: f64,
     pub home_switch: bool,
     pub left_limit: bool,

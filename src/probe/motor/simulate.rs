@@ -141,7 +141,7 @@ impl Simulator {
         locked(&self.shared.module).is_moving()
     }
 
-    /// The true angle of the simulated array in the sweep, degrees.
+    /// The true angle of the simulated array, degrees; 0 is the middle of the sweep.
     pub fn angle(&self) -> f64 {
         locked(&self.shared.module).angle()
     }

@@ -92,7 +92,7 @@ impl Direction {
 pub struct Position {
     /// Time of the reading, s, on a clock that positions and frames share.
     pub time: f64,
-    /// Angle of the array in the sweep, degrees.
+    /// Angle of the array, degrees; 0 is the middle of the sweep.
     pub angle: f64,
     /// Direction of the pass during which the position was read.
     pub direction: Direction,

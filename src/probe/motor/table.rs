@@ -245,7 +245,8 @@ impl MotorTable {
         (self.speed_register(speed).round() as i32).max(1)
     }
 
-    /// Converts a velocity in the module's unit to a speed of the array, deg/s.
+    /// Converts a velocity in the module's unit to a speed of the array, deg/s. The velocity is positive towards larger
+    /// positions, the speed towards larger angles.
     pub fn speed(&self, velocity: i32) -> f64 {
         f64::from(velocity) / self.speed_scale() / self.steps_per_degree() * self.sign()
     }
