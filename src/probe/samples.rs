@@ -84,7 +84,7 @@ impl StoredType {
         }
     }
 
-    /// Appends a value to `bytes` as a little-endian sample, rounded if the type is an integer.
+    /// Appends a value to `bytes` as a little-endian sample. For an integer type it is rounded and limited to the range of the type; NaN becomes 0.
     pub fn append(self, value: f64, bytes: &mut Vec<u8>) {
         match self {
             StoredType::U8 => bytes.push(value.round() as u8),

@@ -30,7 +30,7 @@ pub struct Search {
     pub smoothing: f64,
     /// Radius of the morphological opening, mm: necks thinner than twice the radius do not connect bodies, and belong to none.
     pub opening: f64,
-    /// A position (mm) within the only body that is searched for. None: all bodies are searched for.
+    /// A position within the only body that is searched for, mm in the coordinates of the grid. None: all bodies are searched for.
     pub seed: Option<DVec3>,
     /// Smallest volume of a body, mm^3; smaller ones are ignored.
     pub least: f64,
@@ -40,7 +40,7 @@ pub struct Search {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Body {
     pub label: u8,
-    /// Mean position of its labelled voxels, mm.
+    /// Mean position of its labelled voxels, mm in the coordinates of the grid.
     pub centroid: DVec3,
     /// Volume of its labelled voxels, mm^3.
     pub labelled: f64,
@@ -55,7 +55,7 @@ pub struct Body {
 pub struct Found {
     pub labels: Labels,
     pub bodies: Vec<Body>,
-    /// Level of the echo that bounded the bodies, in the scale of `Scale::searched`.
+    /// Level of the echo at which the bodies were found, the given one or the one that replaced it, in the scale of `Scale::searched`.
     pub level: f64,
     /// Number of bodies that have no label because there are more than 255.
     pub left_out: usize,

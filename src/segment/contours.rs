@@ -15,8 +15,8 @@ use std::f64::consts::{PI, TAU};
 /// Most points of all contours.
 const MAX_POINTS: usize = 65_536;
 
-/// Sets a label in all voxels of the body that contours describe. Several contours in one plane bound the same section; one within another is a
-/// hole. Returns the number of voxels that did not have this label before.
+/// Sets a label in all voxels of the body that contours describe, mm in the coordinates of the labels' grid. Several contours in one plane bound
+/// the same section; one within another is a hole. Returns the number of voxels that did not have this label before.
 ///
 /// # Errors
 /// One line: fewer than two planes, a contour without area, planes that are neither parallel nor share an axis, too many points.

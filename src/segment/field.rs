@@ -80,7 +80,7 @@ impl Scale {
     }
 
     /// The quantity that bodies are searched in, for a sample at `share` (0..=1) of the sample range: the echo itself if linear, otherwise the
-    /// amplitude of the echo, in which speckle is weaker than in its power.
+    /// amplitude of the echo, in which speckle is weaker than in its power; 0..=1.
     pub fn searched(self, share: f64) -> f64 {
         match self {
             Scale::Linear => self.echo(share),
@@ -89,7 +89,7 @@ impl Scale {
     }
 }
 
-/// The echo at each voxel of a grid, 0..=1.
+/// The quantity that bodies are searched in ([`Scale::searched`]), 0..=1, at each voxel of a grid; unknown outside the insonified region.
 #[derive(Clone, Debug)]
 pub struct Field {
     grid: Grid,

@@ -32,7 +32,7 @@ pub fn write(labels: &Labels, path: &Path, name: impl Fn(u8) -> String) -> Resul
     segmentation::write(path, labels.grid(), labels.world(), &segments, label, || ())
 }
 
-/// Reads a segmentation: its labels, on a grid as that of a volume whose axes have the same directions in the world, and its segments.
+/// Reads a segmentation: its labels, on the grid on which a volume with the same lattice in the world is drawn, and its segments.
 ///
 /// # Errors
 /// The file is no volume of one layer of bytes, or cannot be read.

@@ -35,7 +35,7 @@ pub(crate) struct Region {
 }
 
 impl Region {
-    /// The box of voxels whose centres lie between two corners, mm; None if there are none.
+    /// The box of voxels whose centres lie between two corners, mm in the coordinates of the grid; None if there are none.
     pub fn within(grid: &Grid, [low, high]: [DVec3; 2]) -> Option<Region> {
         let index = |at: DVec3| (at - DVec3::from(grid.origin)) / DVec3::from(grid.spacing);
         let (from, to) = (index(low), index(high));

@@ -39,18 +39,19 @@ const UNKNOWNS: usize = 8;
 /// A motion that was found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Registered {
-    /// Moves the moving volume's body onto that of the fixed one.
+    /// Maps positions in the moving volume's space to those of the same tissue in the fixed volume's. It turns about the [`centre`] of the fixed one.
     pub motion: Rigid,
     /// Correlation of the smoothed levels where the volumes overlap, -1..=1.
     pub correlation: f64,
-    /// Share of the fixed volume that the moved one covers, 0..=1.
+    /// Share of the fixed volume's insonified region that the moved volume covers, 0..=1.
     pub overlap: f64,
 }
 
 /// Finds the motion that takes the body of `moving` to where it is in `fixed`. Both geometries have their own space, in mm.
 ///
 /// # Errors
-/// One line: volumes that take too much memory, a volume without any structure, or volumes that do not overlap by a quarter.
+/// One line: volumes that take too much memory, a volume without any structure, or an overlap of less
+/// than a quarter of the fixed volume.
 pub fn register(fixed: &Volume, moving: &Volume) -> Result<Registered, String> {
     let finest = SPACINGS[SPACINGS.len() - 1];
     let grids = [fixed, moving].map(|volume| convert::lattice(volume.geometry(), finest));
@@ -80,7 +81,7 @@ pub fn register(fixed: &Volume, moving: &Volume) -> Result<Registered, String> {
     Ok(Registered { motion, correlation: fit.sums.correlation(), overlap: fit.overlap })
 }
 
-/// The point about which motions of a volume turn: the middle of the box around its insonified region, mm.
+/// The middle of the box around the insonified region of a volume, mm. Motions onto a fixed volume turn about that of the fixed volume.
 pub fn centre(geometry: &Geometry) -> DVec3 {
     let (low, high) = match geometry {
         Geometry::Sweep(probe) => probe.bounds(),

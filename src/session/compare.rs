@@ -56,7 +56,8 @@ pub fn beside(mut tiles: Vec<(String, Picture)>, size: [u32; 2]) -> Result<Pictu
 #[derive(Clone, Debug, PartialEq)]
 pub struct Difference {
     pub picture: Picture,
-    /// Both ends of the scale, levels of 255: 16, 32, 64, 128 or 255. Of the pixels that are black in neither picture at most 0.2 % differ by more.
+    /// The scale runs from -`end` to `end`, levels of 255: 16, 32, 64, 128 or 255. Of the pixels that are black in neither picture at most 0.2 % differ by
+    /// more.
     pub end: u16,
     /// Root mean square of the difference over all pixels, levels of 255.
     pub rms: f64,
@@ -136,7 +137,8 @@ impl Drawing for Scale {
     }
 }
 
-/// The first picture up to a share of the width, the second beyond it, and a line between them.
+/// The first picture on the left, the second on the right, and a line between them. `share`: position of the line from the left, 0..=1 of the
+/// width.
 ///
 /// # Errors
 /// One line: pictures of different sizes.

@@ -23,7 +23,7 @@ pub struct Target {
     /// Map from voxels to the world (LPS).
     pub world: World,
     pub sample: SampleType,
-    /// Value of voxels outside the insonified region, in the units of the file.
+    /// Value of voxels outside the insonified region, in the units of the original file's values.
     pub outside: f64,
     /// None: a volume with the values of the original file is written. Some: a DICOM secondary capture of 8 bits, with the stored values that
     /// become 0 and 255.
@@ -160,7 +160,7 @@ impl Volume {
         self.frames[at[2]].get(n..n + self.stored.bytes()).map_or(0.0, |bytes| self.stored.value(bytes))
     }
 
-    /// The stored value at a point in space, mm; None outside the insonified region.
+    /// The stored value at a point in space, mm, interpolated trilinearly; None outside the insonified region.
     pub fn at(&self, place: DVec3) -> Option<f64> {
         let index = match &self.geometry {
             Geometry::Sweep(probe) => self.indices(probe, place),
@@ -188,8 +188,8 @@ impl Volume {
         Some(sum)
     }
 
-    /// The volume as a sweep or lattice of another geometry would hold it, of a body that was moved: a sample is the value at the place where
-    /// `back` puts its own place, `outside` where that is outside the insonified region. The result is again of stored values.
+    /// The volume of a moved body, as a sweep or lattice of another geometry would hold it. `back` maps a position in that geometry, mm, to the
+    /// position in this volume whose stored value is taken; `outside`: the stored value where that is outside the insonified region.
     pub fn moved_onto(&self, geometry: &Geometry, back: impl Fn(DVec3) -> DVec3 + Sync, outside: f64) -> Volume {
         let mut moved = Volume::new(geometry.clone(), self.stored);
         let [samples, lines, slices] = moved.size;

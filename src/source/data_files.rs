@@ -59,7 +59,7 @@ pub(super) struct Pattern {
     /// Least number of characters, and of digits.
     width: usize,
     digits: usize,
-    /// The whole numbers after the pattern.
+    /// The whole numbers that follow the pattern in the header, in their order: a range of file numbers.
     pub numbers: Vec<i64>,
 }
 

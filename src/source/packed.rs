@@ -91,7 +91,7 @@ impl<'a> InputFile<'a> {
         Ok(InputFile { path, packed: start == GZIP, bytes: metadata.len(), part: None })
     }
 
-    /// A part of this file as a file of its own: `length` bytes from `offset`. It must lie within the file.
+    /// A part of this file as a file of its own: `length` unpacked bytes from `offset` on. It must lie within the unpacked file.
     pub fn window(&self, offset: u64, length: u64) -> InputFile<'a> {
         InputFile { part: Some((offset, length)), ..*self }
     }
@@ -151,7 +151,7 @@ pub(super) struct Pixels {
     pub path: PathBuf,
     /// Offset in the file of the first byte that is read.
     pub offset: u64,
-    /// Number of bytes in the file, compressed or not.
+    /// Number of bytes from `offset` on that are read, as they are in the file, compressed or not.
     pub length: u64,
     pub encoding: Encoding,
     /// Number of decompressed bytes that come before the samples; 0 if they are not compressed.

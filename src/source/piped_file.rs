@@ -33,7 +33,7 @@ pub(super) struct PipedFile {
 }
 
 impl PipedFile {
-    /// True if a file that begins with these bytes is such a stream.
+    /// True if a file that begins with these bytes is a saved stream of frames.
     pub fn is_one(start: &[u8]) -> bool {
         start.starts_with(b"{")
     }

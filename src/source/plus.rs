@@ -37,7 +37,7 @@ pub(super) struct PlusFrames {
     not_ok: BTreeSet<usize>,
     /// Sizes of pixels, mm.
     spacings: BTreeMap<usize, [f64; 3]>,
-    /// True if there is any such field, so that the frames are a series in time.
+    /// True if the file has any field `Seq_Frame...`, so that its frames are a series in time.
     pub is_sequence: bool,
 }
 

@@ -64,20 +64,20 @@ const SLICE: Duration = Duration::from_millis(4);
 #[derive(Clone, Debug, Default)]
 pub(super) struct Shown {
     pub view: CompareView,
-    /// Where the wipe's line is, a share of the picture's width.
+    /// Position of the wipe's line from the left, 0..=1 of the picture's width.
     pub wipe: f64,
     /// Whether each link of [`Link::ALL`] holds.
     pub links: [bool; 4],
-    /// Names of the shown and of the compared volume.
+    /// Name of the shown volume; `name`: that of the compared one.
     pub first: String,
     pub name: String,
-    /// Its picture; None until it is drawn.
+    /// The compared volume's picture; None until it is drawn.
     pub picture: Option<Arc<Picture>>,
     /// The difference of both pictures; None unless it is shown and both are drawn.
     pub difference: Option<Arc<Picture>>,
-    /// Whether it is moved onto the shown volume.
+    /// Whether the compared volume is moved onto the shown one.
     pub is_aligned: bool,
-    /// Whether that motion is being searched for.
+    /// Whether the motion of the compared volume onto the shown one is being searched for.
     pub is_aligning: bool,
 }
 
@@ -193,7 +193,7 @@ impl Comparison {
         self.shown.difference = None;
     }
 
-    /// Sets where the wipe's line is, a share of the picture's width.
+    /// Sets the position of the wipe's line from the left, 0..=1 of the picture's width.
     pub(super) fn set_wipe(&mut self, share: f64) {
         self.shown.wipe = share.clamp(0.0, 1.0);
     }

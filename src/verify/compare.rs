@@ -168,9 +168,9 @@ const MAX_TILE_SHARE: f64 = 0.5;
 
 /// How far two pictures of 8 bits are apart. A channel value is far off if it differs by more than 8 levels.
 pub(crate) struct PictureDifference {
-    /// Mean difference of the values that are not far off, levels.
+    /// Mean difference of the channel values that are not far off, levels of 255.
     pub mean: f64,
-    /// Share (0..1) of the values that are far off.
+    /// Share (0..1) of all channel values that are far off.
     pub far: f64,
     pub largest: u8,
     /// Largest share (0..1) of pixels with a value that is far off, in any tile of 8 x 8 pixels.
@@ -217,7 +217,9 @@ fn worst_tile(expected: &Picture, got: &Picture) -> f64 {
     tiles.iter().map(|[far, all]| f64::from(*far) / f64::from((*all).max(1))).fold(0.0, f64::max)
 }
 
-/// Records how far a picture is from the expected one, and adds a fault if that is too much. `input`: description of the scene, for the report.
+/// Records how far a picture is from the expected one. Adds a fault if the sizes differ, or if the mean difference, the share of values that are
+/// off by more than 8 levels, or the share of pixels with such a value in any tile exceeds its limit. `input`: description of the
+/// scene, for the report.
 pub fn compare_picture(findings: &mut Findings, input: &str, expected: &Picture, got: &Picture) {
     if (expected.width, expected.height, expected.rgba.len()) != (got.width, got.height, got.rgba.len()) {
         return findings.expect(false, || {

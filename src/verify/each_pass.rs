@@ -39,7 +39,8 @@ pub struct DispatchComparison {
     pub comparison: Comparison,
 }
 
-/// Dispatches one pass alone on inputs of a kind (one of [`KINDS`]), and computes its reference. `seed`: of the random numbers in the inputs.
+/// Dispatches one pass alone on inputs of a kind (one of [`KINDS`]), and computes its reference. `iteration`: which of the
+/// pass's dispatches in a row, from 0. `seed`: of the random numbers in the inputs.
 ///
 /// # Errors
 /// The device fails.
@@ -385,7 +386,8 @@ fn empty_space_of(scene: &Scene, slot: Slot, volume: &Texels) -> Texels {
     slots.remove(&slot).unwrap_or_else(|| Texels::untouched([0; 3], 1))
 }
 
-/// Dispatch arguments for a part of the visible slices of a scene. It is not the first slice, and frames come in a batch.
+/// Arguments of a dispatch for a part of the visible slices of a scene, from the middle one on. A pass for single frames gets at most a batch.
+/// `iteration`: which of the pass's dispatches in a row, from 0.
 pub fn dispatch_args_of(scene: &Scene, pass: &Pass, iteration: u32) -> DispatchArgs {
     let visible = scene.visible_bounds.slices();
     let slice = (visible.start + visible.end) / 2;

@@ -77,7 +77,7 @@ fn difference(a: &Picture, b: &Picture) -> [f64; 2] {
     [mean, most]
 }
 
-/// The largest differences of all pictures that were compared.
+/// The largest of the mean differences of all compared pictures, and the largest of the 99th percentiles of their differences, levels of 8 bits.
 #[derive(Default)]
 pub struct LargestDifference {
     pictures: usize,

@@ -121,9 +121,9 @@ fn volume_waited_for(
     Ok((renderer.picture()?, renderer.read(Slot::Volume)?))
 }
 
-/// Sends volumes one after the other, each into the volume image that `into` returns for its number, while the previous volume is rendered. If the
-/// images alternate, the volumes do not mix; sent into the image that is being rendered, they would. Returns the numbers of pictures that were
-/// compared and that differ.
+/// Renders `rounds` pictures on `queues` queues from two volume images in turn. During each, the next volume is sent into the volume image that
+/// `into` returns for the round, from 0. If the images alternate, the volumes do not mix; sent into the image that is being rendered, they would.
+/// Returns the numbers of pictures that were compared and that differ.
 ///
 /// # Errors
 /// The device fails.

@@ -208,7 +208,7 @@ fn every_scene(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     Ok(findings)
 }
 
-/// Checks that render every view on the device under test and on the device of `other`, and compare the pictures.
+/// Checks, one for each view, that render it on the device under test and on the device of `other`, and compare the pictures by [`compare_picture`].
 ///
 /// # Errors
 /// One line: a built-in scene is invalid.

@@ -48,8 +48,8 @@ pub struct FilterPrecision {
 }
 
 impl FilterPrecision {
-    /// The smallest and the largest result that exact weights give within the precision of the position. `share`: position as shares of the volume's
-    /// size, clamped to the edge.
+    /// The smallest and the largest result that exact weights give within the precision of the position. `share`: position along x, y
+    /// and z as shares (0..1) of the volume's size; beyond the outermost texels their values continue.
     pub fn bounds(self, volume: &Texels, share: [f64; 3]) -> [f64; 2] {
         let [[low, high], _] = self.both_bounds(volume, share);
         [low, high]
@@ -122,15 +122,15 @@ fn blend(volume: &Texels, low: [i64; 3], at: [f64; 3]) -> f64 {
     sum
 }
 
-/// The judgement of many samples. `outside`: how many are outside the interval of their allowed values; `used`: of the others, the largest distance
-/// from the middle of that interval, as a share of half of it.
+/// The judgement of many samples. `outside`: how many are outside the interval of the values that rounded weights allow; `used`: of the others, the
+/// largest distance from the middle of that interval, as a share of half its length.
 #[derive(Debug, Default)]
 pub struct Judged {
     pub outside: usize,
-    /// Number of samples in the interval that are only explained by rounded weights.
+    /// Number of samples that rounded weights allow and exact ones do not; 0 if these are so many that they count as `outside`.
     pub rounded: usize,
     pub used: f64,
-    /// The worst sample: position in the output, nearest allowed value, and actual value. None if none is outside.
+    /// The worst sample: column and row in the output, nearest allowed value, and actual value. None if none is outside.
     pub worst: Option<([usize; 2], f64, f64)>,
 }
 

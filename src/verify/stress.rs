@@ -86,7 +86,7 @@ struct Stress<'a> {
     pipelines: usize,
 }
 
-/// Runs the stress test for `seconds` s.
+/// Runs the stress test for `seconds` s. `before_picture` is called with the renderer and the volume image before each picture.
 ///
 /// # Errors
 /// The device fails.

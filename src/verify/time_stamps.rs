@@ -70,8 +70,9 @@ fn bits_and_period(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     Ok(findings)
 }
 
-/// Checks the spans of one picture: the host spans `submit` and `wait`, and the device spans in running order. Returns two shares (0..1) of the time
-/// from submission to the end of the wait: how much of it device spans cover, and how much of their length lies outside of it.
+/// Checks the spans of one picture: the host spans `submit` and `wait`, and the device spans in running order. Returns two shares of the time
+/// from submission to the end of the wait: the sum of all device spans, and the longer of the times by which they begin before it or end after
+/// it.
 ///
 /// # Errors
 /// One line: what is wrong with the spans.

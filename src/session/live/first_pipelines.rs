@@ -42,7 +42,7 @@ impl FirstPipelines {
     }
 
     /// True if the pipelines of these settings are compiled, or will be when the geometry begins. Otherwise `begin` starts the compilation.
-    /// `settings`: as drawn, and at full quality.
+    /// `settings`: as drawn, and at full quality. `begin` returns None if there is nothing to compile in advance; then the result is true.
     ///
     /// # Errors
     /// The error with which a renderer of the settings would fail, a lost device, or the error of `begin`.

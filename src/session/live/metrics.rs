@@ -39,7 +39,7 @@ pub struct Conditions {
     pub source: SourceStatus,
 }
 
-/// State of the source, and of the display that is frozen or not.
+/// Whether the source is connected, whether the display is frozen, and how often the source could not be opened.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SourceStatus {
     pub is_connected: bool,

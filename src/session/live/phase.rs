@@ -32,9 +32,9 @@ pub(super) struct InFlight {
 #[derive(Debug)]
 pub(super) struct Replay {
     pub volume: CineVolume,
-    /// Number of frames sent so far.
+    /// Number of frames of the volume that were sent so far.
     pub sent: usize,
-    /// Index of the volume image that the frames are sent to.
+    /// Index of the volume image that the volume is sent to.
     pub image: u32,
 }
 
@@ -50,8 +50,8 @@ impl Phase {
         *self = Phase::Drawing { picture, replay };
     }
 
-    /// Notes that the picture is done, and returns it, or a default one if none was being drawn. `queued`: number of events to take before the
-    /// next picture.
+    /// Notes that the picture is done, and returns it, or a default one if none was being drawn. `queued`: number of events to take from the feed
+    /// before the next picture.
     pub fn finish(&mut self, queued: usize) -> InFlight {
         match std::mem::take(self) {
             Phase::Drawing { picture, replay } => {

@@ -143,7 +143,7 @@ pub(super) struct Session {
 
 impl Session {
     /// Starts without volumes. `compiles_async`: pipelines of changed settings are compiled in the background. `to_restore`: number of a volume
-    /// of the cine loop to show first.
+    /// of the cine loop to show first; None: the first one to show arrives from the source.
     pub fn new(
         views: Views,
         renderer: Renderer,

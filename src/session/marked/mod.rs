@@ -37,10 +37,11 @@ pub enum Demo {
     Always,
 }
 
-/// The picture as it is saved: with its measurements and body marks, and, if `marks.bar` of its settings is set, with marks and a bar of text.
+/// The picture as it is saved: as by [`marked`] if `marks.bar` of its settings is set, otherwise as by [`measured`], or unchanged if there is
+/// nothing to draw.
 ///
-/// `volume`: number of the volume that it shows; measurements of other volumes are dimmed. `start`: the start surface, if one was found. `demo`:
-/// None if the volume may be of a patient.
+/// `volume`: number of the volume that it shows; measurements of other volumes are dimmed. None: not known, no measurement is dimmed. `start`: the
+/// start surface, if one was found. `demo`: None if the volume may be of a patient.
 ///
 /// # Errors
 /// One line: the picture is not of this scene's size, or the drawing failed.
@@ -62,8 +63,9 @@ pub fn as_set<'a>(
     }
 }
 
-/// The picture with its marks and a bar of text. `volume` and `start`: as for [`as_set`]. `time`: time of the picture, for the bar. `origin`:
-/// what the picture shows, such as "Demo data (phantom)"; None for patients.
+/// The picture as by [`measured`], with the patient's sides and the probe's marker on its tiles, and with a bar of text below it. `volume` and
+/// `start`: as for [`as_set`]. `time`: time of the picture, for the bar. `origin`: what the picture shows, such as "Demo data (phantom)"; None for
+/// patients.
 ///
 /// # Errors
 /// One line: the picture is not of this scene's size, or the drawing failed.

@@ -60,7 +60,7 @@ pub fn drawn(marks: &[BodyMark], picture: [f64; 2]) -> Vec<Drawn> {
 }
 
 /// The index of the body mark at a pixel of the picture, and the part of it that is there. `reach`: largest distance from the probe at which the
-/// pixel counts as on it, pixels. Of overlapping marks the last one counts, which is drawn on top. None if there is no mark.
+/// pixel counts as on it, pixels. Of overlapping marks the last one counts, which is drawn on top. None if there is none at the pixel.
 pub fn part_at(marks: &[BodyMark], picture: [f64; 2], pixel: [f64; 2], reach: f64) -> Option<(usize, Part)> {
     let part = |drawn: &Drawn| {
         let [a, b] = drawn.probe;

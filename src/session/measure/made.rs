@@ -5,7 +5,8 @@ use crate::scene::{Scene, Settings};
 /// Largest distance of a point that counts as on a plane, mm. Coordinates are stored to a tenth of a micrometre.
 const ON_PLANE: f64 = 1e-3;
 
-/// Describes the plane of the picture in which all points of a measurement lie, by its centre (lateral, depth, elevation, mm) and its normal.
+/// Describes the plane of the picture in which all points of a measurement lie, by its centre and its normal. Points and centre are lateral, depth
+/// from the probe's face and elevation, mm.
 /// For points on the rendered surface (`on_surface`) it states the angles of the view instead. Empty if no plane contains them.
 pub fn plane(scene: &Scene, points: &[[f64; 3]], on_surface: bool) -> String {
     if on_surface {

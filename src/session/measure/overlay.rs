@@ -34,7 +34,7 @@ pub struct Drawn {
 }
 
 /// The drawings of all measurements over the picture of a scene. `all`: the list in [`crate::scene::Settings::measure`]; `volume`: number of the
-/// volume that the picture shows, if it is known.
+/// volume that the picture shows. None: not known, all measurements count as made on it.
 pub fn drawn(scene: &Scene, volume: Option<u32>, all: &[Measurement]) -> Vec<Drawn> {
     if all.is_empty() {
         return Vec::new();
@@ -69,8 +69,8 @@ pub fn drawn(scene: &Scene, volume: Option<u32>, all: &[Measurement]) -> Vec<Dra
     found
 }
 
-/// The drawings of an unfinished measurement, as if `hover`, the position of the pointer, were its next point. `number`: that of its label;
-/// `on_section`: the pointer is on a curved plane.
+/// The drawings of an unfinished measurement, as if `hover`, the place under the pointer (lateral, depth from the probe's face, elevation, mm),
+/// were its next point; None: without it. `number`: that of its label; `on_section`: the pointer is on a curved plane.
 pub fn preview(
     scene: &Scene,
     number: usize,

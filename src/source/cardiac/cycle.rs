@@ -89,7 +89,8 @@ impl Cycle {
         }
     }
 
-    /// The frames of the volume at a phase (an index from 0 up to `phases`), by slice. All have the time stamp of that phase within the cycle.
+    /// The frames of the volume at a phase (an index from 0 up to `phases`), by slice. The time stamp of all
+    /// is that of the phase, s from the start of the cycle.
     pub fn volume(&self, phase: usize) -> Vec<Frame> {
         let share = phase as f64 / self.phases as f64;
         let (begin, end) = (self.rhythm.phases[0], self.rhythm.phases[0] + self.rhythm.cycles());

@@ -128,7 +128,7 @@ pub(super) enum PixelData {
 /// A piece of compressed pixels.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fragment {
-    /// Offset in the file, bytes.
+    /// Offset in the file of the first compressed byte, bytes.
     pub at: u64,
     pub length: u64,
     /// The first bytes of the fragment, zeros after its end.

@@ -13,7 +13,8 @@ const SAME_DIRECTION: f64 = 1e-4;
 /// A picture that is a slice of a volume, with its position and orientation.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Plane {
-    /// Position of the centre of the first pixel, mm.
+    /// Position of the centre of the first pixel, mm. All vectors here are in the patient's space, or in that of the volume if the
+    /// file does not place it in the patient.
     pub position: DVec3,
     /// Unit vector along a row, towards larger columns; `column` is the one towards larger rows.
     pub row: DVec3,

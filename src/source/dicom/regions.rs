@@ -87,7 +87,7 @@ pub(super) struct Flat {
     pub part: [usize; 4],
     /// Distance between pixels (x, y), mm. None if nothing states it.
     pub spacing: Option<[f64; 2]>,
-    /// Position in the plane of the first pixel of the part, mm.
+    /// Position (x, y) of the first pixel of the part, mm from the origin that the region states; 0 without a region with a scale.
     pub origin: [f64; 2],
     pub remarks: Vec<(String, String)>,
     /// One line for each statement of the file that is wrong.

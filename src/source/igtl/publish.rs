@@ -15,7 +15,7 @@ use std::net::SocketAddr;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 
-/// Names of the devices in the messages: of pictures and of volumes.
+/// Name of the device in messages with pictures; [`VOLUME`]: in those with volumes.
 pub const PICTURE: &str = "EcholumePicture";
 pub const VOLUME: &str = "EcholumeVolume";
 /// Most voxels of a volume, one byte each: 255 MiB. Clients take 256 MiB in one message, with its headers.

@@ -84,10 +84,9 @@ pub(super) struct Header<'a> {
     stated: Stated,
     /// Keys with values that are read: those of PLUS for a whole sequence, and `axis N index ...`.
     values: HashMap<String, String>,
-    /// It has keys of segments.
     /// Keys of segments, in lower case, with their values.
     segments: HashMap<String, String>,
-    /// What keys of PLUS state of single frames.
+    /// What the keys `Seq_Frame...` of PLUS state, each of one frame.
     pub frames: PlusFrames,
     /// The lines after `data file: LIST`, each the name of a data file.
     pub list: Vec<String>,

@@ -204,7 +204,8 @@ impl Head {
         }
     }
 
-    /// Distance of a position (mm) from the skin at a time (s), mm, negative inside. It is exact on the skin and correct to first order near it.
+    /// Distance of a position (mm in the space of the probe) from the skin at a time (s), mm, negative inside. It is exact on the skin and correct
+    /// to first order near it.
     pub fn distance(&self, place: Vec3, time: f64) -> f32 {
         // Far from the skin the slope is that of the bounds, not of the surface.
         const NEAR: f32 = 2.0;
@@ -214,7 +215,7 @@ impl Head {
         if here.abs() > NEAR { here } else { here / gradient(place, distance).length().clamp(0.5, 2.0) }
     }
 
-    /// The tissue's label at a position, mm in space, and a time, s.
+    /// The tissue's label at a position, mm in the space of the probe, and a time, s.
     pub fn label(&self, place: Vec3, time: f64) -> Label {
         let pose = self.pose(time);
         match self.tissue(place, &pose) {

@@ -108,12 +108,12 @@ pub struct PhantomOptions {
     pub gap: f64,
     /// Level of clutter in body head, a haze of reverberations and side lobes everywhere, dB re full scale, -60..=0. None: no clutter.
     pub clutter_db: Option<f64>,
-    /// The bodies head and vessels: how the body was moved before the sweep. Its place without is that of the other bodies.
+    /// How the body head or vessels was moved before the sweep, in the coordinates of [`Probe`]. Other bodies cannot be moved.
     pub moved: Rigid,
 }
 
 impl PhantomOptions {
-    /// The middle of the head, mm.
+    /// The point between the eyes of the head that is not moved, mm in the coordinates of [`Probe`]: 55 mm below the array's face.
     pub const CENTRE: DVec3 = DVec3::new(0.0, ARRAY_RADIUS + 55.0, 0.0);
 }
 

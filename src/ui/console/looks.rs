@@ -13,7 +13,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 impl Console {
-    /// The thumbnails of the presets, in the order of their list; empty if none was drawn.
+    /// The thumbnails of the presets, in the order of their list; None for one that is not drawn yet. Empty if none was requested.
     pub fn thumbnails(&self) -> &[Option<Arc<Picture>>] {
         self.presets.thumbnails()
     }

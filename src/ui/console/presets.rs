@@ -308,7 +308,7 @@ impl Presets {
         Some(Vec::new())
     }
 
-    /// The thumbnails of the presets, in the order of the list; empty if none was drawn.
+    /// The thumbnails of the presets, in the order of the list; None for one that is not drawn yet. Empty if none was requested.
     pub(super) fn thumbnails(&self) -> &[Option<Arc<Picture>>] {
         self.thumbnails.pictures()
     }

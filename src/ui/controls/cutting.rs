@@ -33,7 +33,7 @@ pub(super) fn in_the_way(now: &Scene, settings: &Settings) -> Option<&'static st
 }
 
 impl Controls {
-    /// The contour of a cut that is being drawn: positions in pixels of the picture.
+    /// The contour of a cut that is being drawn: positions in pixels from the picture's upper left corner; empty if none is being drawn.
     pub fn outline(&self) -> &[[f64; 2]] {
         &self.outline
     }

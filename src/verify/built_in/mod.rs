@@ -242,7 +242,7 @@ pub fn wobbler() -> Probe {
     }
 }
 
-/// The same probe with frames at uneven angles.
+/// The given probe with frames at uneven angles.
 pub fn uneven(mut probe: Probe) -> Probe {
     let at = |k: usize| probe.slices.at(k as f64) + 0.012 * (1.7 * k as f64).sin();
     probe.slices = Axis::from_table((0..probe.slices.len()).map(at).collect());

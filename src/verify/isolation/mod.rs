@@ -36,7 +36,7 @@ const LINES: usize = 4;
 /// How many workers in a row may fail to start before no more are started.
 const MAX_STARTS: u32 = 3;
 
-/// A function that returns the name of the first signal that asked this process to end; None so far.
+/// A function that returns the name of the first signal that asked this process to end; None if none has.
 pub type Signal<'a> = &'a dyn Fn() -> Option<&'static str>;
 /// A function that prints a line that a worker wrote outside the protocol.
 pub type Echo = Arc<dyn Fn(&str) + Send + Sync>;

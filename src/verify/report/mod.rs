@@ -38,7 +38,7 @@ pub struct Run {
     pub format: String,
     /// Name, version and build of the program.
     pub program: String,
-    /// When the run was made, RFC 3339.
+    /// When the run ended, RFC 3339.
     pub date: String,
     pub device: Device,
     pub level: Level,
@@ -245,7 +245,8 @@ impl Figure {
         Ok(Figure { what: what.into(), value, allowed: None, unit: Unit::Ns, samples, fleeting: false })
     }
 
-    /// The figure of a time that was measured once. It is compared with that of a baseline by a generous ratio.
+    /// The figure of a time that was measured once. Beside a baseline, only a factor above 3 that makes more than 0.1 s
+    /// counts as a change.
     pub fn single_time(what: impl Into<String>, time: Duration) -> Figure {
         let value = time.as_nanos() as f64;
         Figure { what: what.into(), value, allowed: None, unit: Unit::Ns, samples: Vec::new(), fleeting: false }

@@ -23,7 +23,7 @@ pub(super) struct Script<'a> {
     pub name: String,
     pub text: String,
     pub case: &'a Case,
-    /// True if the dispatch is a single layer of the reproduced one.
+    /// True if the script has only one layer of the image arrays of the reproduced dispatch.
     pub is_of_layer: bool,
     /// Name of the file that holds the uniform block.
     pub params: String,

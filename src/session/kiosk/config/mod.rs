@@ -469,7 +469,7 @@ fn flag(key: &str) -> String {
 }
 
 impl Config {
-    /// The arguments of `echolume stream` that select the same source, each as one word `--flag=value`.
+    /// The arguments of `echolume stream` that select the source of this configuration, each as one word `--flag=value`.
     pub fn source_arguments(&self) -> Vec<String> {
         let path = |path: &Path| path.to_string_lossy().into_owned();
         let clip = self.clip.map(|clip| clip.map(|n| n.to_string()).join(","));

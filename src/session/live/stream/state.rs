@@ -106,14 +106,14 @@ impl Stream {
         self.reported.totals()
     }
 
-    /// Number of complete volumes that arrived, shown or not. None while the display is frozen, after the source has ended, and if the source
-    /// waits for pictures.
+    /// Number of complete volumes that arrived, shown or dropped. None before the first header, while the display is frozen, after the source has
+    /// ended, and if the source waits for pictures.
     pub fn live_volumes(&self) -> Option<u64> {
         let is_live = !self.is_frozen && self.end.is_none() && !self.feed.can_wait();
         self.pool().filter(|_| is_live).map(|pool| pool.counts().shown + pool.counts().dropped)
     }
 
-    /// Number of volumes that were shown.
+    /// Number of volumes of all sources that were shown so far, without those that the cine loop showed again.
     pub fn volumes_shown(&self) -> u64 {
         self.pool().map_or(0, |pool| pool.counts().shown)
     }
@@ -127,7 +127,7 @@ impl Stream {
         self.header.as_ref()
     }
 
-    /// Number of frames that were taken from the feed.
+    /// Number of frames that were taken from the feeds of all sources so far.
     pub fn frames(&self) -> u64 {
         self.statistics.frames
     }
