@@ -3,17 +3,26 @@
 use super::{Console, ConsoleError};
 use crate::comparison::{Comparison, News, volume_of};
 use crate::live::StreamError;
+use crate::picture::Picture;
 use crate::recordings::Named;
 use crate::source::convert::Volume;
 use crate::source::recorder::Header;
 use crate::texts;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// Correlation of two aligned volumes below which the user is told to look.
 const UNLIKE: f64 = 0.5;
 
 impl Console {
+    /// The pictures of the compared volume and of the difference, each None until it is drawn, and whether the compared volume is aligned. None without a
+    /// comparison.
+    pub fn compared(&self) -> Option<([Option<Arc<Picture>>; 2], bool)> {
+        let shown = self.comparison.as_ref()?.shown();
+        Some(([shown.picture.clone(), shown.difference.clone()], shown.is_aligned))
+    }
+
     /// Begins a comparison: with the next open recording, or else with the shown volume as it is now. Ends one that is there.
     pub(super) fn toggle_comparison(&mut self) {
         if self.comparison.take().is_none() {

@@ -132,24 +132,32 @@ fn buttons(ui: &Ui, shown: &Shown, over: Rect, execute: &mut dyn FnMut(Command))
             ui.set_max_width((over.width() - 2.0 * EDGE).max(80.0));
             ui.spacing_mut().item_spacing = vec2(4.0, 4.0);
             ui.horizontal_wrapped(|ui| {
-                let mut button = |text: &str, (name, hint): (&str, &str), is_on: bool, command: Command| {
-                    let words = RichText::new(text).size(SMALL_TEXT);
-                    let size = vec2(0.0, ROW_HEIGHT - 6.0);
-                    let response = ui.add(Button::selectable(is_on, words).min_size(size));
-                    if response.tell(hint).named(name).clicked() {
-                        execute(command);
-                    }
-                };
+                let mut button =
+                    |ui: &mut Ui, text: &str, (name, hint): (&str, &str), is_on: bool, command: Command| {
+                        let words = RichText::new(text).size(SMALL_TEXT);
+                        let size = vec2(0.0, ROW_HEIGHT - 6.0);
+                        let response = ui.add(Button::selectable(is_on, words).min_size(size));
+                        if response.tell(hint).named(name).clicked() {
+                            execute(command);
+                        }
+                    };
                 for (view, name, hint) in VIEWS {
-                    button(name, (name, hint), shown.view == view, Command::CompareView(view));
+                    button(ui, name, (name, hint), shown.view == view, Command::CompareView(view));
                 }
+                ui.label(RichText::new(texts::LINKED).size(SMALL_TEXT).color(WEAK_TEXT));
                 for (link, is_on) in Link::ALL.into_iter().zip(shown.links) {
                     let (name, hint) = about(link);
-                    button(name, (name, hint), is_on, Command::ToggleLink(link));
+                    button(ui, name, (name, hint), is_on, Command::ToggleLink(link));
                 }
                 let align = if shown.is_aligning { texts::ALIGNING } else { texts::ALIGN };
-                button(align, (texts::ALIGN, texts::ALIGN_HINT), shown.is_aligned || shown.is_aligning, Command::Align);
-                button(texts::CLOSE, (texts::END_COMPARISON, texts::END_COMPARISON_HINT), false, Command::Compare);
+                button(
+                    ui,
+                    align,
+                    (texts::ALIGN, texts::ALIGN_HINT),
+                    shown.is_aligned || shown.is_aligning,
+                    Command::Align,
+                );
+                button(ui, texts::CLOSE, (texts::END_COMPARISON, texts::END_COMPARISON_HINT), false, Command::Compare);
             });
         });
     });

@@ -5,6 +5,7 @@ mod budget;
 mod cine;
 mod clipping;
 mod colours;
+mod comparing;
 mod controls;
 mod curving;
 mod cutting;

@@ -170,16 +170,18 @@ impl Shown {
         change
     }
 
+    pub(super) fn room(&self) -> Room {
+        let room = Room::of(self.size, self.panels.scale(), self.visible.panels);
+        self.compared.as_ref().map_or(room, |shown| room.divided(shown.view.tiles()))
+    }
+
     /// Lays the panels out, applies their commands, and returns these.
     pub(super) fn lay_out(&mut self) -> Vec<Command> {
         self.time += 0.1;
-        let scale = self.panels.scale();
         let named =
             |(n, name): (usize, &String)| Named { name: name.clone(), path: format!("/data/{name}"), is_shown: n == 1 };
         let recordings: Vec<Named> = self.recordings.iter().enumerate().map(named).collect();
-        let room = Room::of(self.size, scale, self.visible.panels);
-        let tiles = self.compared.as_ref().map(|shown| shown.view.tiles());
-        let room = tiles.map_or(room, |tiles| room.divided(tiles));
+        let room = self.room();
         let picture = ShownPicture {
             scene: self.kept.clone().unwrap_or_else(|| self.scene.clone()),
             volume: 2,

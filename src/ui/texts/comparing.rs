@@ -17,6 +17,8 @@ pub(crate) const FIND_ALIGN: &str = "Compare: align both volumes";
 pub(crate) const FIND_LINK_LOOK: &str = "Compare: link windows, filters and light";
 pub(crate) const WIPE_LINE: &str = "Line of the wipe";
 pub(crate) const WIPE_LINE_HINT: &str = "Drag: A is on its left, B on its right.";
+/// Stands before the names of the links.
+pub(crate) const LINKED: &str = "Linked:";
 pub(crate) const LINK_VIEW: &str = "View";
 pub(crate) const LINK_VIEW_HINT: &str = "B is seen from where A is, with its region.";
 pub(crate) const LINK_PLANES: &str = "Planes";

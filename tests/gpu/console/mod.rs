@@ -1,6 +1,7 @@
 //! The console without a screen: input, pictures, and faults.
 
 mod budget;
+mod comparing;
 mod failures;
 mod gestures;
 mod idle;
