@@ -23,7 +23,7 @@ use std::sync::Arc;
 /// A flag as it was typed, and the assignment of a setting that it stands for.
 type Assigned = (String, String);
 
-/// An open recording, the scene of one of its volumes, and what that scene was made from.
+/// An open recording, the scene of one of its volumes, and what other scenes of that volume are made from: `recorded` and `layers`.
 #[cfg_attr(not(feature = "lab"), expect(dead_code, reason = "only reports read all of it"))]
 pub struct Opened {
     pub source: Box<dyn Source>,
@@ -108,7 +108,7 @@ impl InputArgs {
         open_recording(file, self.geometry.options())
     }
 
-    /// The number of the volume to use.
+    /// Index of the volume to use, from 0: `--volume`, else that of the workspace, else 0.
     pub fn volume(&self) -> Result<usize, Failure> {
         match self.volume {
             Some(volume) => Ok(volume),
@@ -151,8 +151,8 @@ impl InputArgs {
         check_outputs(outputs, self.read_files(source).iter().map(PathBuf::as_path))
     }
 
-    /// When pictures say that they are of the phantom. None if the volumes are not of the phantom. Pictures of a workspace always say it, as in
-    /// the viewer.
+    /// Which pictures say that they are of the phantom: all pictures of a workspace, as in the viewer; otherwise those with something else drawn
+    /// over them. None if the volumes are not of the phantom.
     pub fn demo(&self, source: &dyn Source) -> Option<Demo> {
         let is_workspace = self.input.as_deref().is_some_and(workspace::is_named);
         source.is_synthetic().then_some(if is_workspace { Demo::Always } else { Demo::WithOthers })
@@ -385,7 +385,7 @@ impl SceneArgs {
         }
     }
 
-    /// Opens the chosen device and prints its name. While a signal is held back, waiting for the device ends.
+    /// Opens the chosen device and prints its name. Once a signal is deferred ([`signals::received`]), waiting for the device ends.
     pub fn open_device(&self, validation: bool) -> Result<Arc<Context>, Failure> {
         let (device, deadline) = (self.device.clone().unwrap_or_default(), self.deadline()?);
         open(&ContextOptions {

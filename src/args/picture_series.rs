@@ -23,7 +23,8 @@ pub enum SeriesTarget {
 }
 
 impl SeriesTarget {
-    /// The target that `-o` names. `name`: base name of the pictures if that is a folder, as in `picture-000000.png`.
+    /// The target that `-o` names: a folder, a pattern or a film. `name`: with a folder, what the names of the pictures begin with, such as `face` in
+    /// `face-000000.png`.
     ///
     /// # Errors
     /// One line: the name is that of a single picture, the pattern is not valid, the ending belongs to no known format, or the program was built

@@ -162,7 +162,7 @@ impl SourceArgs {
         self.source == "phantom"
     }
 
-    /// Kind of the source, by its name.
+    /// What the source is, as its name tells: the phantom, standard input, a probe (`igtl://`) or a recording.
     #[cfg(feature = "view")]
     pub fn kind(&self) -> SourceKind {
         match self.source.as_str() {
@@ -181,7 +181,7 @@ impl SourceArgs {
         }
     }
 
-    /// Path of the source, if it is a file.
+    /// The source as a path, which has a meaning only if the source is a file.
     pub fn path(&self) -> &Path {
         Path::new(&self.source)
     }

@@ -101,8 +101,8 @@ pub fn matched<'a, T, K: Eq + Hash>(old: &'a [T], new: &'a [T], key: impl Fn(&'a
     new.iter().map(|entry| (before.get(&key(entry)).copied(), Some(entry))).chain(gone).collect()
 }
 
-/// Lists the conditions that differ between two runs, one line each, the old value before the new one. Both runs must list the same names
-/// in the same order.
+/// Lists the conditions (name and value) that differ between two runs, one line each, the old value before the new one. Both runs must list the same
+/// names in the same order.
 pub fn differing<N: Display>(
     old: impl IntoIterator<Item = (N, String)>,
     new: impl IntoIterator<Item = (N, String)>,

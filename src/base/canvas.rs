@@ -31,11 +31,11 @@ pub type Frame = [f64; 4];
 struct Medium {
     /// Supersampling factor along each edge, for smooth text and slanted lines.
     pub scale: u32,
-    /// How far above the requested position `plotters` draws text in this medium, as a share of the text's height.
+    /// How much too high `plotters` draws text in this kind of output, as a share of the font size.
     pub raised: f64,
 }
 
-/// The diagram being drawn. Positions and sizes are in output pixels.
+/// The diagram being drawn. Positions and sizes are in output pixels, positions from the upper left corner.
 pub struct Canvas<'a, B: DrawingBackend> {
     area: &'a DrawingArea<B, Shift>,
     medium: Medium,
@@ -108,7 +108,7 @@ impl<'a, B: DrawingBackend> Canvas<'a, B> {
         self.area.draw(&Text::new(text.to_string(), at, style)).map_err(|e| fault(&e))
     }
 
-    /// Width and height of a text, pixels.
+    /// Width and height of a text in letters of `size` pixels, pixels.
     ///
     /// # Errors
     /// One line: the text cannot be measured.
@@ -175,7 +175,7 @@ pub fn picture(size: [u32; 2], drawing: &impl Drawing) -> Result<Picture, String
     Ok(Picture { width, height, rgba: averaged(&rgb, size, PIXELS.scale as usize) })
 }
 
-/// Width of a text in a picture, pixels.
+/// Width of a text in letters of `size` pixels in a picture, pixels.
 ///
 /// # Errors
 /// One line: the embedded font cannot be read.

@@ -13,8 +13,8 @@ pub struct Pair {
     pub faults: Vec<(String, String, String)>,
 }
 
-/// All comparisons in the results, by class and pair of devices. There is one for each unit that was drawn again and, by the digests of its
-/// outputs, for each unit that two processes did.
+/// All comparisons in the results, by class and the devices of both outputs, that of the stored or earlier output first (None: no device was
+/// used). There is one for each unit that was drawn again and, by the digests of its outputs, for each unit that two processes did.
 pub fn pairs(records: &[Record]) -> BTreeMap<(Class, Option<Drawer>, Option<Drawer>), Pair> {
     let mut pairs: BTreeMap<(Class, Option<Drawer>, Option<Drawer>), Pair> = BTreeMap::new();
     let mut first: BTreeMap<&str, &Record> = BTreeMap::new();

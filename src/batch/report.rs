@@ -33,7 +33,8 @@ fn rank(record: &Record) -> (bool, bool, &str) {
 /// The results of all shards, reduced to one for each unit.
 #[derive(Default)]
 pub struct Merged<'a> {
-    /// The result of each unit, by its input and work: the last success or, if there is none, the last failure.
+    /// The result of each unit, by its input and work: the last success, where drawing it again for a comparison counts only if there is no other;
+    /// without a success, the last failure.
     pub units: BTreeMap<(&'a str, &'a str), &'a Record>,
 }
 

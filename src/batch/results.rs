@@ -94,7 +94,7 @@ pub struct Record {
 #[derive(Default)]
 pub(super) struct Verified {
     pub whole: AtomicU64,
-    /// Number of outputs that differ or cannot be read. Each is reported in a line, and its unit is done again.
+    /// Number of outputs that have another digest or cannot be read. Each is reported in a line, and its unit is done again.
     pub damaged: AtomicU64,
 }
 
@@ -201,7 +201,7 @@ impl Earlier {
         Ok(found)
     }
 
-    /// True if any shard has done this unit. It must be among the units that were given to [`Earlier::read`].
+    /// True if any shard has done this unit with this version of the program. It must be among the units that were given to [`Earlier::read`].
     pub fn says_done(&self, input: &str, work: &str) -> bool {
         self.done_anywhere.contains(&hash_of(input, work))
     }
@@ -259,13 +259,13 @@ impl Results {
         Ok(())
     }
 
-    /// True if a line says that the unit is done. It may be missing although the unit's record exists: a process may be killed between writing
-    /// the two.
+    /// True if a line of the results says that the record's unit is done. The line may be missing although the record's file exists: a process may
+    /// be killed between writing the two.
     pub fn has(&self, record: &Record) -> bool {
         self.earlier.done.contains(&(record.key.clone(), record.input.clone()))
     }
 
-    /// Number of times that the device was lost while this unit was done.
+    /// Number of earlier runs of this shard that lost the device by this unit.
     pub fn losses(&self, input: &str, work: &str) -> usize {
         // Nearly always empty, and a key has to be copied.
         let is_known = !self.earlier.lost.is_empty();

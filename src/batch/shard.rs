@@ -111,7 +111,7 @@ impl PartialOrd for Load {
 }
 
 /// The index of the shard of every unit by Graham's LPT rule: the most expensive unit first, each to the shard with the least cost so far. No
-/// shard costs more than the mean plus one unit. O(n log n), deterministic.
+/// shard costs more than the mean of the shards plus the cost of one unit. O(n log n), deterministic.
 pub fn assign(costs: &[f64], count: u32) -> Vec<u32> {
     let mut order: Vec<usize> = (0..costs.len()).collect();
     order.sort_by(|a, b| costs[*b].total_cmp(&costs[*a]).then(a.cmp(b)));

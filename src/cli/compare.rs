@@ -86,7 +86,7 @@ impl FromStr for Motion {
     }
 }
 
-/// What `render` has of a comparison.
+/// The arguments of `render` that a comparison needs.
 pub struct Job<'a> {
     pub input: &'a InputArgs,
     pub output: &'a Path,

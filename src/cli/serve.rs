@@ -69,8 +69,8 @@ pub struct Serving {
 }
 
 impl Serving {
-    /// Prints on one line what has changed since the last call: clients that connected or disconnected, and data that slow clients did not get.
-    /// Prints nothing if nothing did.
+    /// Prints all counts on one line, with the seconds since `began`, if since the last call a client connected, disconnected or was refused, or
+    /// data was not sent because a client was slow or newer data came. Otherwise prints nothing. Logs a new fault of the server.
     pub fn say(&mut self, began: Instant) {
         let now = self.publisher.statistics();
         let (server, said) = (&now.server, &self.said.server);

@@ -10,7 +10,7 @@ use crate::terminal::{Failure, input};
 /// The values of `--still`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct StillArgs {
-    /// Assignments of settings, each after the part of the flag that stands for it.
+    /// For each setting: the part of the flag that sets it, for messages, and the assignment, such as `still.samples=64`.
     pub set: Vec<(String, String)>,
     /// Time that the path tracing of a picture may take, s; None: not limited. It determines the number of paths.
     pub time: Option<f64>,

@@ -121,7 +121,7 @@ impl ConsoleConfig {
         ConsoleConfig { source: None, first: None, options }
     }
 
-    /// The console that a configuration asks for. The flags in `scene` take precedence over its settings.
+    /// The console that a configuration asks for. The flags in `scene` take precedence over the settings of the configuration.
     pub fn configured(config: &Config, scene: &SceneArgs) -> Result<ConsoleConfig, Failure> {
         let layers = config.layers().map_err(|e| input(config.flag_error(&e.to_string())))?;
         let (live, display, files) = (&config.live, &config.display, &config.files);
@@ -196,7 +196,8 @@ fn stamp() -> String {
     crate::ui::export::timestamp(SystemTime::now())
 }
 
-/// The quality ladder for the frame budget: from the error report in this file, or the built-in one.
+/// The quality ladder: changes of settings, from full quality to the fastest, of which a moving view chooses one to meet the frame budget. `report`:
+/// file of the error report that states them; None: the built-in ladder.
 pub fn rungs(report: Option<&Path>) -> Result<Vec<Rung>, Failure> {
     match report {
         None => Ok(built_in_ladder()),

@@ -69,8 +69,8 @@ pub(super) fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl OpenedInWindow {
-    /// Returns a function that makes the next console show this source. `shown`: how it was selected; None for the source with which the program
-    /// was started.
+    /// Returns a function that, when it is called, makes the next console show this source. `shown`: how it was selected; None for the source with
+    /// which the program was started.
     pub fn next(&self, shown: Option<Shown>, source: Box<dyn Live>) -> Opened {
         let current = self.current.clone();
         Box::new(move || (*locked(&current.source), *locked(&current.shown)) = (Some(source), shown))

@@ -15,7 +15,8 @@ const FORMAT: &str = "echolume dump 1";
 const GRAPH: [usize; 2] = [512, 256];
 
 /// Draws a slot: colours unchanged, a volume as its slices side by side, a distance map with near bright and far dark, a table as
-/// curves. A single channel is stretched from its minimum to its maximum unless it is within 0..1.
+/// curves. A single channel is stretched from its minimum to its maximum unless it is within 0..1. `texels`: what the slot holds; None for a table
+/// that the CPU computes from the scene. Other slots without texels give one black pixel.
 pub fn draw(slot: Slot, texels: Option<&Texels>, scene: &Scene) -> Picture {
     match (texels, slot.initializer()) {
         (Some(texels), _) if texels.channels == 4 && texels.size[2] == 1 => colours(texels),
@@ -105,7 +106,7 @@ fn curves(values: &[f32], channels: usize) -> Picture {
 }
 
 /// A slot as an array that numpy reads (NPY 1.0, little endian, C order), and a description of its axes, channels and units. `texels` as in
-/// [`draw`]. Values are f32 as the shaders read them, f64 where they are bits.
+/// [`draw`]; other slots without texels give an empty array. Values are f32 as the shaders read them, f64 where they are bits.
 pub fn array(slot: Slot, texels: Option<&Texels>, scene: &Scene) -> (Vec<u8>, Value) {
     let Meaning { channels, unit, miss } = slot.meaning();
     let (shape, values) = match (texels, slot.initializer()) {
@@ -147,7 +148,8 @@ pub fn array(slot: Slot, texels: Option<&Texels>, scene: &Scene) -> (Vec<u8>, Va
     (bytes, about)
 }
 
-/// NPY, format 1.0: a magic number, a Python literal padded to 64 bytes, and the values.
+/// NPY, format 1.0: a magic number, a Python literal, padded so that they end at a multiple of 64 bytes, and the values. The last axis of `shape` is
+/// the fastest. False for `as_f64` stores f32.
 pub fn npy(shape: &[usize], values: &[f64], as_f64: bool) -> Vec<u8> {
     let sizes: String = shape.iter().map(|n| format!("{n}, ")).collect();
     let kind = if as_f64 { "<f8" } else { "<f4" };
@@ -166,7 +168,8 @@ pub fn npy(shape: &[usize], values: &[f64], as_f64: bool) -> Vec<u8> {
     bytes
 }
 
-/// What the arrays of a scene refer to, in mm in the space of the volume: x lateral, y depth, z elevation.
+/// What a program that reads the arrays needs to know of the scene: geometry, slice pixels, rendered box, rays, step, detector and settings. Lengths
+/// are in mm, in the space of the volume: x lateral, y depth, z elevation.
 pub fn scene_description(scene: &Scene) -> Value {
     let at = |v: DVec3| json!([v.x, v.y, v.z]);
     let rays = &scene.rays;

@@ -32,7 +32,7 @@ pub enum Rerun {
     Steps { steps: Vec<usize>, slots: Vec<Slot> },
 }
 
-/// The most expensive part of a rendering that has to run again, from the least to the most expensive.
+/// The most expensive part of a rendering that has to run again. The variants ascend from the least to the most expensive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Work {
     /// Only planes beside a rendering and stage 4. Both take little time.
@@ -248,8 +248,8 @@ impl Plan {
 pub type Contents = BTreeMap<Slot, (&'static str, u32)>;
 
 impl Plan {
-    /// Marks further steps in `stale` (one entry per step) that have to run: those whose results a stale step reads, but that a later filter of the
-    /// same chain has overwritten. `contents`: which step's result each slot holds now.
+    /// Marks further steps in `stale` (for each step, true if it has to run): those whose result a stale step reads from a slot in which a later
+    /// filter of the chain has overwritten it. `contents`: which step's result each slot holds now.
     pub fn complete(&self, scene: &Scene, stale: &mut [bool], contents: &Contents) {
         'again: loop {
             let mut now = contents.clone();

@@ -48,8 +48,8 @@ impl Textfile {
         }
     }
 
-    /// Replaces the content of the file soon. A text that still waits to be written is discarded for a newer one. A write error is reported
-    /// once, until a write succeeds again.
+    /// Has the thread replace the content of the file by this text, and returns at once. A text that still waits to be written is discarded for a
+    /// newer one. A write error is reported once, until a write succeeds again.
     pub fn put(&self, text: String) {
         self.shared.lock().text = Some(text);
         self.shared.changed.notify_all();

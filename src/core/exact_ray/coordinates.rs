@@ -23,7 +23,7 @@ impl Line<'_> {
         self.base + self.direction * s
     }
 
-    /// Fractional column, row and slice of the volume at s, also outside the insonified region.
+    /// Fractional column, row and slice of the volume at s, whole at the centres of texels; also outside the insonified region.
     pub fn coordinates(&self, s: f64) -> [f64; 3] {
         let grid = &self.scene.grid;
         let place = self.place(s);
@@ -42,7 +42,7 @@ impl Line<'_> {
         }
     }
 
-    /// True if the place at s is inside the insonified region.
+    /// True if the place at s is inside the insonified region, and always for a Cartesian volume.
     pub fn is_inside(&self, s: f64) -> bool {
         crate::passes::raycast::ray::texel(self.scene, self.place(s)).is_some()
     }

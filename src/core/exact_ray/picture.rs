@@ -17,8 +17,8 @@ pub const TOLERANCE: f64 = 1e-12;
 /// The cost of the exact rays of a picture, and their estimated error.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Effort {
-    /// Root mean square over the rays of the estimated error of a ray, which is no bound. For pictures it is the error of a channel, for
-    /// surfaces that of the distance in mm.
+    /// Root mean square, over the rays of a pass, of the estimated error of a ray: of a channel in pictures, of the distance in mm for surfaces.
+    /// The largest of all passes. The estimate is no bound.
     pub estimate: f64,
     /// Number of pieces of rays that were integrated or searched.
     pub pieces: u64,

@@ -26,9 +26,10 @@ const FOLLOW_LEVEL: f64 = 0.7;
 pub struct Found {
     /// Position of the surface, mm along the line.
     pub place: f64,
-    /// Mean field behind the surface: over the length of an edge (`surface.edge`) from the place with the largest difference.
+    /// Mean field over the length of an edge (`surface.edge`) behind the place with the largest difference; behind the crossing of the threshold
+    /// where `surface.place` is the first crossing.
     pub echo: f64,
-    /// Mean field over the depth behind the surface that skin shading averages. 0 outside the insonified region.
+    /// Mean field over the depth behind the surface that skin shading averages, outside the insonified region counted as 0. 0 without such shading.
     pub behind: f64,
     /// Estimated error of the position, mm. It follows from the error of the detector's difference where that crosses the threshold or has its
     /// maximum.

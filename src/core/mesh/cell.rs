@@ -12,7 +12,7 @@ use std::sync::OnceLock;
 pub(crate) struct Patches {
     /// Number of patches, 0 to 4.
     pub count: u8,
-    /// For each edge that the surface crosses, the number of its patch; 0 for the other edges.
+    /// For each edge that the surface crosses, the number of its patch, from 0; for the other edges 0, too.
     pub of_edge: [u8; 12],
 }
 

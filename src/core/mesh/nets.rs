@@ -30,8 +30,8 @@ pub struct Surface {
 }
 
 /// The isosurface of a lattice of `size` voxels. `slice` fills a slice with values, NaN where they are not known; slices are requested once each, in
-/// order. `place` maps fractional voxel indices to mm; if it mirrors, the order of the vertices is reversed, so that triangles are still
-/// anticlockwise as seen from outside.
+/// order. `place` maps fractional voxel indices, whole at the centres of voxels, to mm; if it mirrors, the order of the vertices is reversed, so that
+/// triangles are still anticlockwise as seen from outside.
 ///
 /// # Errors
 /// An error of `slice`, or a message that the surface has too many triangles.
@@ -222,7 +222,7 @@ pub(super) mod tests {
         }
     }
 
-    /// Test helper: the mesh of a ball from its signed distances (positive inside) on n^3 voxels.
+    /// Test helper: the mesh of a ball from its signed distances (positive inside) on n^3 voxels, their spacing, and the centre of the ball.
     pub fn ball(n: usize, radius: f64) -> (Mesh, f64, DVec3) {
         let h = 2.0 / (n - 1) as f64;
         let centre = DVec3::new(0.97, 1.02, 1.01);

@@ -16,7 +16,7 @@ const MAX_TRIANGLES: usize = 100_000_000;
 pub struct Cell {
     pub x: u32,
     pub y: u32,
-    /// Bit n is set if corner n is inside.
+    /// Bit n is set if corner n (as cell.rs numbers them) is inside.
     pub inside: u8,
     /// True if the values at all corners are known, or if the surface is to be closed where they are not.
     pub is_known: bool,
@@ -26,7 +26,7 @@ pub struct Cell {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Vertex {
     pub cell: [u32; 3],
-    /// Bit n is set for each crossed edge n that the mean is taken over.
+    /// Bit n is set for each crossed edge n (as cell.rs numbers them) that the mean is taken over.
     pub edges: u16,
 }
 

@@ -142,7 +142,8 @@ impl Pass {
         }
     }
 
-    /// The slots (read, written) of a dispatch of a chain's filter. An observer only reads the first. None for a pass that is no link of a chain.
+    /// The slots (read, written) of a dispatch of a chain's filter. For an observer only the slot that is read counts: it writes slots of its own.
+    /// None for a pass that is no link of a chain.
     pub fn link_slots(&self, scene: &Scene, args: &DispatchArgs) -> Option<(Slot, Slot)> {
         let (chain, step) = match self.link {
             Link::Filter(filter) => (filter.chain, args.iteration / (filter.dispatches)(scene)),
@@ -221,7 +222,7 @@ impl Pass {
         }
     }
 
-    /// Number of slices that one dispatch makes: all of the volume for a pass over volumes, 1 for a pass over frames.
+    /// Number of slices that one dispatch makes if frames are not batched: all of the volume for a pass over volumes, 1 for any other pass.
     pub fn slices(&self, scene: &Scene) -> u32 {
         if self.frequency == Frequency::Volume { scene.slices() } else { 1 }
     }

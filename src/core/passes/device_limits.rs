@@ -54,7 +54,7 @@ pub const ONE_FETCH: Pass = Pass {
     ..FILTERED
 };
 
-/// Copies a picture: reads and writes 8 bytes a pixel.
+/// Copies a picture: reads 8 bytes a pixel and writes as many.
 pub const COPY: Pass = Pass {
     name: "measure_copy",
     shader: |_, _| "measure/copy",

@@ -64,8 +64,8 @@ pub enum Command {
 }
 
 impl Change {
-    /// Applies the fault to the parameters of a dispatch. Returns true if they differ afterwards. The following methods do the same for what they
-    /// get.
+    /// Applies the fault to the parameters of a dispatch. Returns true if they differ afterwards. `constants`, `args`, `extent`, `table` and `frame`
+    /// do the same for their last argument.
     pub fn numbers(&self, pass: &Pass, scene: &Scene, params: &mut Params) -> bool {
         match self {
             Change::Numbers { pass: name, by } if pass.name.starts_with(name) => changed(params, |p| by(scene, p)),

@@ -61,8 +61,8 @@ fn lowered(scene: &Scene) -> f64 {
     (level(scene) - MARGIN).max(0.0)
 }
 
-/// Finds the texels of floating parts and returns the content of [`Slot::Floating`]: one byte a texel, 255 in such parts, otherwise 0. `bytes`: all
-/// texels of the volume in the format of [`Slot::WholeVolume`].
+/// Finds the texels of the parts that the setting `floating` drops and returns the content of [`Slot::Floating`]: one byte a texel, 255 in such
+/// parts, otherwise 0. `bytes`: all texels of the volume in the format of [`Slot::WholeVolume`].
 pub fn find(scene: &Scene, bytes: &[u8]) -> Vec<u8> {
     /// Texels that are decoded at a time.
     const CHUNK: usize = 1 << 16;

@@ -51,8 +51,8 @@ const OPTIONAL: [&str; 37] = [
     "volume_layer",
 ];
 
-/// Rewrites a pass's shader for a scene: removes the textures and tables that the scene does not have, and makes an array image of each volume that
-/// is stored as layers here.
+/// Rewrites a pass's shader for a scene: removes the textures and tables that the scene does not have, and makes an array image of each texture
+/// whose slot has layers in this scene.
 ///
 /// # Errors
 /// The SPIR-V module is invalid.

@@ -35,8 +35,9 @@ pub fn tgc(scene: &Scene) -> Vec<f32> {
     }))
 }
 
-/// Fractional (sample, line) that the slice pixel at in-plane (x, y), mm, shows. None outside the sector and its apron. Samples are counted after
-/// decimation: with the factor M, sample j is sample j M of the frame, and pixels beyond the last sample take the last.
+/// Fractional (sample, line) that the slice pixel at (x, y), mm as of [`SliceGrid`](crate::scene::SliceGrid), shows. None outside the sector and its
+/// apron. Samples are counted after decimation: with the factor M, sample j is sample j M of the frame, and pixels beyond the last sample take the
+/// last.
 pub fn scan_index(scene: &Scene, probe: &Probe, x: f64, y: f64) -> Option<(f64, f64)> {
     let (sample, line) = probe.plane_indices(x, y);
     let factor = f64::from(scene.decimation());
@@ -99,8 +100,8 @@ pub(super) fn sweep_border(probe: &Probe) -> [f64; 2] {
     [first - margin, last + margin].map(|position| sweep_parameter(probe.motion, position))
 }
 
-/// The fractional slice index at equidistant abscissae of the sweep table, in mean slice pitches from slice 0. For a uniform sweep that is the slice
-/// index.
+/// Position in the sweep, in mean slice pitches from slice 0, at equidistant abscissae (`sweep_parameter`) from the first slice to the last. For a
+/// uniform sweep that is the fractional slice index. Empty for a Cartesian volume.
 pub fn sweep_lut(scene: &Scene) -> Vec<f32> {
     let Some(probe) = scene.probe() else { return Vec::new() };
     let entries = scene.settings.ray.entries;
@@ -111,7 +112,8 @@ pub fn sweep_lut(scene: &Scene) -> Vec<f32> {
     }))
 }
 
-/// Share (0..1) of a frame's lines that fired before a line, at equidistant abscissae of the line table (`line_parameter`).
+/// Fractional line index divided by the number of lines, which is the share of the frame that was acquired before, at equidistant abscissae
+/// (`line_parameter`) from the first line to the last. Empty for a Cartesian volume.
 pub fn line_lut(scene: &Scene) -> Vec<f32> {
     let Some(probe) = scene.probe() else { return Vec::new() };
     let entries = scene.settings.ray.entries;
@@ -123,7 +125,8 @@ pub fn line_lut(scene: &Scene) -> Vec<f32> {
     }))
 }
 
-/// For every slice its position from slice 0 and the motor's travel during its frame, both in mean slice pitches.
+/// For every slice its position from slice 0 and the motor's travel during its frame, both in mean slice pitches. Empty for a Cartesian
+/// volume.
 pub fn slice_table(scene: &Scene) -> Vec<f32> {
     let Some(probe) = scene.probe() else { return Vec::new() };
     let pitch = probe.slices.pitch();
@@ -189,7 +192,8 @@ pub fn opaque_before(scene: &Scene) -> Vec<f32> {
     before
 }
 
-/// Table over the sample values at the begin and the end of a step: mean colour and absorption of the step ([`transfer::pre_integrated`]).
+/// Table over the sample values at the begin and the end of a step, that at the end fastest: mean colour and absorption of the step
+/// ([`transfer::pre_integrated`]).
 pub fn pre_integrated_table(scene: &Scene) -> Vec<f32> {
     floats(transfer::pre_integrated(&transfer_of(scene)).into_iter().flatten())
 }
@@ -259,8 +263,8 @@ fn side_code(side: Side) -> u32 {
     }
 }
 
-/// The table of bricks for shaders, four floats each: the ranges of tile columns, tile rows and slices that its samples may touch (packed as first *
-/// 4096 + last, exact in f32), and its [`Side`] as a number (0 outside, 1 across, 2 inside).
+/// The table of bricks for shaders, x fastest, then y, four floats each: the ranges of tile columns, tile rows and slices that its samples may touch
+/// (packed as first * 4096 + last, exact in f32), and its [`Side`] as a number (0 outside, 1 across, 2 inside).
 pub fn brick_table(scene: &Scene) -> Vec<f32> {
     let packed = |[first, last]: [u32; 2]| (first * 4096 + last) as f32;
     let entry = |reach: &Reach| {

@@ -130,7 +130,7 @@ pub const PASSES: &[Pass] = &[
     postprocess::TONE,
 ];
 
-/// A measured interval on the device or the host. `begin` and `end` are ns since the begin of the run.
+/// A measured interval on the device or the host. `begin` and `end` are ns since the timing of the renderer began.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Span {
     pub name: &'static str,

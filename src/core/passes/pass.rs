@@ -359,7 +359,7 @@ pub(crate) fn in_runs(texels: [u32; 3], axis: usize) -> [u32; 3] {
     in_runs_of(RUN, texels, axis)
 }
 
-/// As [`in_runs`], with runs of `run` texels.
+/// Number of invocations along each axis that make `texels`, each a run of `run` texels along `axis`.
 pub fn in_runs_of(run: u32, mut texels: [u32; 3], axis: usize) -> [u32; 3] {
     texels[axis] = texels[axis].div_ceil(run);
     texels

@@ -259,8 +259,8 @@ fn stride(scene: &Scene, distance: f64, to_light: DVec3, along: DVec3) -> f64 {
     (pixel / across.max(1e-6)).min(0.5 * shadow.thickness / behind.max(1e-6)).max(0.25 * pixel)
 }
 
-/// Computes the shadow by tracing the distance map towards the light (thesis Fig. 41). The map is taken as the front of matter that is `thickness`
-/// deep; the light is blocked where the way towards it goes through that matter.
+/// Computes the shadow by tracing the distance map towards the light (thesis Fig. 41). The map is taken as the front of matter of the depth
+/// `light.shadow.thickness`; the light is blocked where the way towards it goes through that matter.
 pub const SHADOW: Pass = Pass {
     name: "shadow",
     link: Link::Observer(Chain::Distances),

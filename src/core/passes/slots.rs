@@ -665,7 +665,8 @@ impl Slot {
         if scene.removes() { Slot::CutVolume } else { Slot::Volume }
     }
 
-    /// The volume that planes are cut from: the section volume if there is one, otherwise the volume before cuts and with its floating parts.
+    /// The volume that planes are cut from: [`Slot::SectionVolume`] if the scene has it, otherwise the volume before cuts and with its floating
+    /// parts.
     pub fn of_planes(scene: &Scene) -> Slot {
         match (scene.has_sections(), scene.drops_floating()) {
             (true, _) => Slot::SectionVolume,

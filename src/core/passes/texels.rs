@@ -105,7 +105,7 @@ impl Texels {
         array
     }
 
-    /// First channel, interpolated linearly at fractional texel indices. Beyond the border the nearest texel counts.
+    /// First channel, interpolated linearly at fractional texel indices, whole at the centres of texels. Beyond the border the nearest texel counts.
     pub fn trilinear(&self, at: [f64; 3]) -> f64 {
         let low = at.map(f64::floor);
         let mut sum = 0.0;

@@ -14,8 +14,8 @@ pub struct PassTime {
     pub total: f64,
 }
 
-/// Formats pass times as a table: one line per pass, their sum, and the acquisition floor if a probe swept the volume. If `measured` is empty it says
-/// that the device has no time stamps.
+/// Formats pass times as a table: one line per pass, their sum and, for a volume of a probe, the time that sound needs ([`acquisition_floor`]). If
+/// `measured` is empty it says that the device has no time stamps.
 pub fn pass_time_table(measured: &[PassTime], scene: &Scene) -> String {
     let mut text = String::new();
     if measured.is_empty() {

@@ -195,7 +195,7 @@ impl Scene {
     }
 
     /// The value that removed texels get so that the rendering draws nothing of them: 0, or 1 where dark matter is drawn. In mode mean it counts as
-    /// dark matter. None if the rendering draws both.
+    /// dark matter. None if the rendering draws something of either value.
     pub fn removed_value(&self) -> Option<f64> {
         let is_drawn = |value: f64| {
             let is_composited = self.composites() && {

@@ -62,7 +62,8 @@ pub struct Completed {
     pub said: Vec<String>,
 }
 
-/// Standard deviation of the default Gaussian of a volume of this geometry, mm.
+/// Standard deviation along every axis, mm, of the default Gaussian of a volume: in proportion to the longest edge of the box around its
+/// insonified region, within limits.
 pub fn smoothing(geometry: &Geometry) -> f64 {
     let (low, high) = insonified_box(geometry);
     let [least, most] = SMOOTHING_RANGE;
@@ -142,7 +143,7 @@ impl Recorded {
     }
 }
 
-/// What default settings follow from.
+/// What default settings are computed from.
 #[derive(Clone, Debug)]
 pub struct Defaults {
     pub layers: Layers,
@@ -180,7 +181,7 @@ impl Defaults {
 }
 
 impl Layers {
-    /// The layers with this mode and layout on top, as if the user had set them. None if they do not fit the layers.
+    /// The layers with this mode and layout on top, as if the user had set them. None if the layers cannot be merged with them.
     pub fn in_mode(mut self, mode: Mode, layout: Layout) -> Option<Layers> {
         let table = Table::from_iter([
             ("mode".to_string(), Value::try_from(mode).ok()?),

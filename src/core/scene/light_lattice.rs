@@ -49,7 +49,7 @@ impl LightLattice {
 pub struct AmbientCones {
     /// Level (0 is the finest of the pyramid) for the position nearest to the lit cell. Below 0 its cells would be narrower than any of the pyramid.
     pub narrowest: i32,
-    /// Weight (0..1) of the next level, mixed with that level so that the variance of the cone's width is met.
+    /// Weight (0..1) of the next coarser level, mixed with that level so that the variance of the cone's width is met.
     pub wider: f64,
 }
 

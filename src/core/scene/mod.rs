@@ -85,7 +85,8 @@ impl Input {
     }
 }
 
-/// The pixel grid of a slice. The centre of pixel (0, 0) lies at `origin`, pixels are `pitch` apart; in-plane (x, y), mm.
+/// The pixel grid of a slice. The centre of pixel (0, 0) lies at `origin`, pixels are `pitch` apart; (x, y) in the plane of the slice, mm: x lateral,
+/// y depth from the apex of a curved array or the face of a linear one. A Cartesian volume has them as in space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SliceGrid {
     pub size: [u32; 2],
@@ -385,8 +386,8 @@ impl Scene {
         }
     }
 
-    /// Converts a place in space, mm, to the coordinates that shaders compute with. The subtraction is in f64: f32 would lose a voxel of 0.1 mm at
-    /// 1e6 mm.
+    /// Converts a place in space, mm, to the coordinates that shaders compute with: those of a Cartesian volume count from the middle of the rendered
+    /// box, those of a sweep are the same. The subtraction is in f64: f32 would lose a voxel of 0.1 mm at 1e6 mm.
     pub fn to_local(&self, place: DVec3) -> DVec3 {
         place - self.local_origin()
     }
@@ -558,8 +559,8 @@ impl Scene {
         self.view(self.settings.projection.window, self.settings.projection.start_depth)
     }
 
-    /// Y coordinate in space, mm, at which rendering starts unless the start surface or start curve is deeper. In mode mixed it is the deeper one of
-    /// surface and volume layer.
+    /// Y coordinate in space, mm, at which rendering starts unless the start surface or start curve is deeper. In mode mixed it is the deeper of the
+    /// start depths of both layers; planes and mode cube start at the region's near face.
     pub fn start_depth(&self) -> f64 {
         let (surface, volume, projection) = (self.surface_view(), self.volume_view(), self.projection_view());
         match self.settings.mode {

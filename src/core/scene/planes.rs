@@ -237,7 +237,8 @@ impl Scene {
     }
 
     /// The place in space, mm, of a point given by its coordinates on a plane, mm right and down: lateral and depth on A, elevation and depth on B,
-    /// lateral and -elevation on C. A plane that is turned turns them about the middle of the insonified region.
+    /// lateral and -elevation on C, from the origins of [`Scene::point_of`]. A plane that is turned turns them about the middle of the insonified
+    /// region.
     pub fn place_on_plane(&self, name: PlaneName, [across, along]: [f64; 2]) -> DVec3 {
         let (plane, origin) = (self.plane(name), self.plane_origin(name));
         let place = origin + plane.right * across + plane.down * along;
@@ -594,7 +595,7 @@ impl Tiling {
 }
 
 impl Slab {
-    /// The value of the shaders' specialization constant for this slab.
+    /// The value of the shaders' specialization constant SLAB.
     pub fn number(self) -> i32 {
         match self {
             Slab::Mean => 0,

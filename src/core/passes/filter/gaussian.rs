@@ -38,7 +38,7 @@ const VOLUMES: [Volume; 2] = [
 const RENDERED: usize = 0;
 const SECTIONS: usize = 1;
 
-/// Number of neighbours along the axis that one invocation computes: RUN of glsl/filter/gaussian.comp.
+/// Number of adjacent texels, along the axis that is filtered, that one invocation computes: RUN of glsl/filter/gaussian.comp.
 pub const RUN: u32 = 8;
 
 /// Words of the tile of a workgroup along rows: TILE_PITCH and TILE_ROWS of glsl/filter/gaussian.comp.

@@ -314,7 +314,7 @@ impl<'a> Ray<'a> {
     }
 
     /// The sample after the grey window, 0..1, at an offset in mm behind the entry, which is that after `n` steps. None outside the insonified
-    /// region. With `ray.sliding` it is the weighted mean of the samples inside the region of a cube around it.
+    /// region. With `ray.sliding` it is the weighted mean over a cube of samples around that place, without those outside the region.
     pub fn sample(&self, offset: f64, n: f64) -> Option<f64> {
         let at = texel(self.scene, self.place(offset))?;
         let edge = i64::from(self.scene.settings.ray.sliding);
@@ -415,8 +415,8 @@ pub(in crate::passes) fn texel_beyond_sweep(scene: &Scene, place: DVec3) -> Opti
     inside(probe, in_plane).then_some([pixel[0], pixel[1], slice])
 }
 
-/// Fractional texel indices of a place in space, mm; None outside the insonified region. It uses the exact inverse of the probe's maps, not the
-/// tables that the shader reads.
+/// Fractional texel indices, whole at the centres of texels, of a place in space, mm. None outside the insonified region of a sweep; a Cartesian
+/// volume has indices everywhere. It uses the exact inverse of the probe's maps, not the tables that the shader reads.
 pub fn texel(scene: &Scene, place: DVec3) -> Option<[f64; 3]> {
     let grid = &scene.grid;
     let column = |x: f64, y: f64| [(x - grid.origin[0]) / grid.pitch[0], (y - grid.origin[1]) / grid.pitch[1]];

@@ -14,7 +14,7 @@ const SAMPLES: f64 = 1024.0;
 pub struct Survey {
     /// Number of rays that pass through the rendered box on the near side of all clip planes. For planes, number of points there.
     pub met: usize,
-    /// Number of samples in the insonified region that were taken on at most 4096 of those rays.
+    /// Number of samples in the insonified region that were taken on at most 4096 of those rays, or at all of those points.
     pub insonified: usize,
     /// Smallest and largest of these samples, 0..1 before the grey window. None if there are none.
     pub values: Option<[f64; 2]>,

@@ -82,7 +82,8 @@ fn brightest(scene: &Scene) -> f64 {
     }
 }
 
-/// Casts the rays of the lattice, with the scene's step at first and with shorter ones where the error is too large.
+/// Casts a ray through every other pixel of every other row, with the scene's step (at most a slice pixel) at first and with shorter ones where the
+/// estimated error is too large.
 pub const FIRST: Pass = Pass {
     name: "tolerance_first",
     shader: |_, _| "tolerance/cast.first",
@@ -137,7 +138,7 @@ pub const FIRST: Pass = Pass {
     ..volume::PASS
 };
 
-/// Computes all pixels and their errors from the rays of the lattice, and marks the pixels whose error is too large.
+/// Computes all pixels and their errors from the rays of [`FIRST`], and marks the pixels whose error is too large.
 pub const ENLARGE: Pass = Pass {
     name: "tolerance_enlarge",
     shader: |_, _| "tolerance/enlarge",

@@ -20,7 +20,8 @@ pub struct StartLine {
 }
 
 /// The lines at which the planes beside a rendering cut the start surface or start curve, one entry a tile. Empty if nothing is removed in front of
-/// the render start, or if no lines are drawn over planes. `unveiled`: the result of the search in the volume that is drawn.
+/// the render start, or if no lines are drawn over planes. `unveiled`: the result of the search in the volume that is drawn; None: there is no start
+/// surface.
 pub fn lines(scene: &Scene, unveiled: Option<&Unveiled>) -> Vec<StartLine> {
     let removes = |unveiled: &&Unveiled| unveiled.outcome.is_found() && unveiled.rows.iter().any(|row| *row > 0.0);
     let start = Start {

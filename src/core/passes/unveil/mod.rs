@@ -45,7 +45,7 @@ const LEAST_SHARE: u32 = 40;
 pub struct Unveiled {
     pub outcome: Outcome,
     /// Row, which may be fractional, at which rendering starts, by the near face of the pocket of fluid: for each column and slice of the volume, the
-    /// column fastest. All 0 if the pocket was not recognised.
+    /// column fastest. All 0 if the pocket was not recognised, or if nothing lies in front of it.
     pub rows: Vec<f32>,
 }
 
@@ -68,7 +68,7 @@ pub struct Evidence {
     /// Grey level of the tissue in front of the pocket or behind it, whichever is darker.
     pub tissue: u32,
     pub pocket: u32,
-    /// Per cent of the columns in view in which the pocket's near face was found, or that begin inside the pocket.
+    /// Per cent of the columns in view, of all slices together, in which the pocket's near face was found, or that begin inside the pocket.
     pub share: u32,
 }
 

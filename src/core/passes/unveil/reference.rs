@@ -9,7 +9,8 @@ use crate::scene::unveil::FluidLattice;
 /// Levels by cell, none outside the sector.
 type Cells = Vec<Option<i64>>;
 
-/// The same search by another method in f64: the row at which rendering starts, by column and slice, and whether the pocket was recognised.
+/// The search of [`find`](super::find) by another method: the row at which rendering starts (x is the column, y the slice), and whether the pocket
+/// was recognised.
 pub fn reference(scene: &Scene, volume: &Texels) -> (Texels, Outcome) {
     let lattice = scene.fluid_lattice();
     let [width, _, slices] = volume.size;

@@ -102,7 +102,7 @@ impl Measurement {
         self.points.len() + self.contours.iter().map(Vec::len).sum::<usize>()
     }
 
-    /// What the user reads on the line along which a length is measured.
+    /// Along what a length of this measurement is measured, as the user reads it.
     pub fn way(&self) -> &'static str {
         if self.on_surface { "along the surface" } else { "along the line" }
     }
