@@ -2,7 +2,7 @@
 // all slices that a visible one needs are stored. The sharpening kernel repeats the border instead, as samples of the volume do. An
 // invocation makes adjacent texels along the axis, which share most taps.
 #version 460
-layout(constant_id = 0) const int RADIUS = 3; // at most 31
+layout(constant_id = 0) const int RADIUS = 3; // at most 96
 layout(constant_id = 1) const int AXIS = 0; // 2: across the slices of a volume; otherwise within those of a batch
 layout(constant_id = 2) const int SHARPENS = 0; // 1: (-1, 8, -1)/6 in place of the Gaussian, against the blur of the cubic B-spline between slices
 layout(constant_id = 3) const int TILED = 0; // 1: a workgroup reads its texels once into shared memory, along axis 0
@@ -11,7 +11,7 @@ layout(constant_id = 3) const int TILED = 0; // 1: a workgroup reads its texels 
 layout(scalar) uniform Params {
 #include "slice_params.glsl"
     int slices; // those that are made, from `slice` on
-    float weights[32]; // of a tap, by its distance in texels; of all taps together 1
+    float weights[97]; // of a tap, by its distance in texels; of all taps together 1
 };
 #define SOURCE_3D
 #include "filter.glsl"

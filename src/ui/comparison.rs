@@ -221,7 +221,7 @@ impl Comparison {
     }
 
     /// The settings of the compared volume, by those of the shown one.
-    fn linked(&self, settings: &Settings, size: [u32; 2]) -> Settings {
+    fn linked(&self, settings: &Settings) -> Settings {
         let [view, planes, look, _] = self.shown.links;
         let of = |is_linked: bool| if is_linked { settings } else { &self.own };
         let mut linked = of(look).clone().without_drawings();
@@ -231,11 +231,11 @@ impl Comparison {
         let to = &mut linked.planes;
         (to.position, to.azimuth, to.tilt, to.roll) = (from.position, from.azimuth, from.tilt, from.roll);
         (to.zoom, to.plane) = (from.zoom, from.plane);
-        linked.picture.size = size;
+        linked.picture.size = settings.picture.size;
         linked
     }
 
-    /// Does what is due. `settings`: those of the shown volume, with a picture of this size; `volume`: its position in the loop. Returns whether the
+    /// Does what is due. `settings`: those of the shown volume; `volume`: its position in the loop. Returns whether the
     /// window shows anything else, and what the user is to be told.
     ///
     /// # Errors
@@ -243,7 +243,6 @@ impl Comparison {
     pub(super) fn update(
         &mut self,
         settings: &Settings,
-        size: [u32; 2],
         volume: Option<usize>,
     ) -> Result<(bool, Option<News>), StreamError> {
         let volume = if self.shown.links[3] { volume.or(self.asked).unwrap_or(0) } else { self.asked.unwrap_or(0) };
@@ -272,7 +271,7 @@ impl Comparison {
             Err(TryRecvError::Disconnected) => news = Some(News::Fault(self.shown.name.clone())),
             Err(TryRecvError::Empty) => {}
         }
-        let linked = self.linked(settings, size);
+        let linked = self.linked(settings);
         if self.sent.as_ref() != Some(&linked) {
             self.stream.change(linked.clone())?;
             self.sent = Some(linked);

@@ -370,3 +370,34 @@ fn a_plan_of_every_filter_is_what_its_references_make_in_a_row() {
         assert!(error < 1e-3, "{flat}: the picture is {error} off");
     }
 }
+
+/// The Gaussian at every width that is allowed: it keeps a constant, and spreads a single bright pixel as its formula says.
+#[test]
+fn the_widest_gaussian_has_all_of_its_weights() {
+    let device = Device::new();
+    let mut single = PassRunner::new(&device).expect("single");
+    let size = [240, 24];
+    let pitch = plane(size, "").grid.pitch;
+    for deviation in [1.0, 10.0, 10.4, 21.0, 32.0] {
+        for (axis, name, pass) in [(0, "lateral", "gaussian_lateral"), (1, "depth", "gaussian_depth")] {
+            let size = if axis == 0 { size } else { [size[1], size[0]] };
+            let scene = plane(size, &format!("smooth = {{ {name} = {} }}", deviation * pitch[axis]));
+            let constant = on_device(&mut single, &scene, pass, &texels(size, |_, _| 0.5));
+            assert!(largest_difference(&constant, &texels(size, |_, _| 0.5)) < 1e-6, "{name}, {deviation} pixels");
+            let along = |x: usize, y: usize| [x, y][axis] as f64 - 120.0;
+            let reach = (3.0 * deviation).ceil();
+            let bell = |d: f64| if d.abs() <= reach { (-0.5 * (d / deviation).powi(2)).exp() } else { 0.0 };
+            let sum: f64 = (0..240).map(|n| bell(f64::from(n) - 120.0)).sum();
+            let spread =
+                on_device(&mut single, &scene, pass, &texels(size, |x, y| f64::from(u8::from(along(x, y) == 0.0))));
+            let expected = texels(size, |x, y| bell(along(x, y)) / sum);
+            // Near the border the weights are those of the taps that are there: a pixel's share of them is larger.
+            let inner = |t: &Texels| {
+                let within = |n: usize| n as f64 >= reach && (n as f64) < 240.0 - reach;
+                texels(size, |x, y| if within([x, y][axis]) { t.get([x, y, 0])[0] } else { 0.0 })
+            };
+            let off = largest_difference(&inner(&spread), &inner(&expected));
+            assert!(off < 1e-6, "{name}, {deviation} pixels: {off}");
+        }
+    }
+}

@@ -4,7 +4,7 @@
 pub(super) use super::slots::composited_beside_surface;
 pub use super::slots::{Found, Search, Slot, rendered};
 pub use super::texels::{Arrays, Texels};
-use crate::scene::Scene;
+use crate::scene::{MAX_DEVIATION, Scene};
 use glam::DVec3;
 use std::ops::Deref;
 
@@ -389,8 +389,8 @@ pub enum Value {
     Floats([f32; MOST_FLOATS]),
 }
 
-/// The length of arrays of parameters.
-const MOST_FLOATS: usize = 32;
+/// The length of arrays of parameters: the weights on one side of the widest Gaussian, and that of the middle.
+const MOST_FLOATS: usize = 3 * MAX_DEVIATION as usize + 1;
 
 /// Parameters of one dispatch, by the names that the shader gives them.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -428,8 +428,9 @@ impl Params {
         self
     }
 
-    /// Adds an array of the first 32 of these values; missing ones are 0.
+    /// Adds an array of at most [`MOST_FLOATS`] values; missing ones are 0.
     pub(super) fn floats(mut self, name: &'static str, values: &[f64]) -> Params {
+        assert!(values.len() <= MOST_FLOATS, "{name}: {} values", values.len());
         let value = |n: usize| values.get(n).copied().map_or(0.0, finite);
         self.0.push((name, Value::Floats(std::array::from_fn(value))));
         self

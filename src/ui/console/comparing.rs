@@ -78,11 +78,11 @@ impl Console {
     /// # Errors
     /// The device is lost.
     pub(super) fn advance_comparison(&mut self) -> Result<(), ConsoleError> {
-        let (size, volume) = (self.room().picture.1, self.stream.cine_position());
+        let volume = self.stream.cine_position();
         let Some(comparison) = &mut self.comparison else { return Ok(()) };
         // What is drawn now: while the view moves, at the same quality.
         let settings = self.stream.scene().map_or_else(|| self.controls.settings(), |scene| &scene.settings);
-        let news = match comparison.update(settings, size, volume) {
+        let news = match comparison.update(settings, volume) {
             Ok((is_other, news)) => {
                 self.presentation.redraw_if(is_other);
                 news
