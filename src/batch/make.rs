@@ -109,7 +109,7 @@ pub fn unit(file: &Path, command: &[String]) -> Result<Found, Failure> {
     }
 }
 
-/// Expected cost: (1 + MiB of the volume's samples) times the cost of this kind of work relative to drawing. The ratios are rough; it matters only
+/// Expected cost: 1 plus the MiB of the volume's samples times the cost of this kind of work relative to drawing. The ratios are rough; it matters only
 /// that a large recording costs more than a small one.
 fn expected_cost(kind: Kind, source: &dyn Source, volume: usize) -> f64 {
     let geometry = source.geometry(volume);

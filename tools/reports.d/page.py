@@ -12,10 +12,14 @@ HEAD = """# Error reports
 
 <!-- Generated: `tools/reports` measures docs/reports and writes this page from it. Do not edit it. -->
 
-What `echolume report error` measured. Errors are those of the picture: RMSE before the tone mapping of stage 4 (values in 0..1), and the median, the 95th
-percentile and the shares of the pixels that differ by more than 1 and 8 levels of 255 after it. Times are medians with intervals of 95 %, each run in turn with
-the scene as it is. How the reports are made and read: [measuring.md](measuring.md#error-against-run-time); what their references are:
-[numerics.md](numerics.md#the-exact-reference-of-a-ray).
+These are results of `echolume report error`: errors of a picture against a reference, and what it takes to compute. "RMSE" is the error before the tone mapping
+of stage 4 (values in 0..1). The other errors are differences after it, in levels of 255: their median, their 95th percentile (p95), and the shares of the pixels that
+differ by more than 1 and by more than 8 levels. Each table after the error budget varies one setting, which the heading names with its unit.
+
+Times are medians with intervals of 95 %: to make the volume, and to draw the picture. "Of the scene's time" is the sum of both over that of the unchanged scene, which
+ran in turn with the setting; the row of the scene itself differs from 1 by noise. In the error budget each approximation includes the device's own arithmetic, which its last but one row has alone.
+
+How the reports are made: [measuring.md](measuring.md#error-against-run-time). What the references are: [numerics.md](numerics.md#the-exact-reference-of-a-ray).
 """
 
 
@@ -55,15 +59,15 @@ def milliseconds(t):
 
 def reference(r):
     if r["kind"] == "exact":
-        return f"exact rays ({r['pieces']} pieces, estimate {r['estimate']:.0e})"
+        return f"exact rays, integrated in {r['pieces']} pieces, with an estimated error of {r['estimate']:.0e} of their own"
     if r["kind"] == "f64":
         return "the f64 reference"
     if r["kind"] == "as-it-is":
         return "the scene as it is"
     if r["kind"] == "extrapolated":
         cells = " to ".join(f"{r['cells'][n]:.2f}" for n in (0, 2))
-        return f"pictures with light cells of {cells} mm, extrapolated with order {r['order']:.1f}; itself off by {r['rmse']:.1e}"
-    return f"a converged picture, itself off by {r['rmse']:.1e}"
+        return f"pictures with light cells of {cells} mm, extrapolated to cells of no size with order {r['order']:.1f}; the error of this reference is {r['rmse']:.1e} (RMSE)"
+    return f"a converged picture, whose own error is {r['rmse']:.1e} (RMSE)"
 
 
 def table(head, rows):
@@ -79,7 +83,7 @@ def dial(d):
         ratio = p["ratios"]["total"]
         rows.append(f"{p['label']}{mark} | {errors(p['errors'])} | {milliseconds(times['volume'])} | {milliseconds(times['picture'])} | {ratio['median']:.2f}")
     unit = f", {d['unit']}" if d["unit"] else ""
-    order = f" Order {d['order']['order']:.2f} +- {d['order']['standard_error']:.2f}." if d.get("order") else ""
+    order = f" The error falls with order {d['order']['order']:.2f} +- {d['order']['standard_error']:.2f} of the setting." if d.get("order") else ""
     text = f"\n### {d['name']}{unit}\n\nAgainst {reference(d['reference'])}.{order}\n\n"
     return text + table(f"setting | {COLUMNS} | volume, ms | picture, ms | of the scene's time", rows)
 
@@ -92,10 +96,10 @@ def page(folder, target):
         w, h, d = r["sizes"]["volume"]
         pw, ph = r["sizes"]["picture"]
         text += f"\n## {path.stem}\n\n```sh\n{command}\n```\n\n"
-        text += f"{r['device']}, {r['driver']}, {r['date'][:10]}; volume {w} x {h} x {d}, picture {pw} x {ph}, {r['repeats']} runs a place.\n\n"
+        text += f"{r['device']}, {r['driver']}, {r['date'][:10]}; volume {w} x {h} x {d}, picture {pw} x {ph}, {r['repeats']} runs of each setting.\n\n"
         budget = r["budget"]
         text += "### Error budget\n\n"
-        text += f"Each approximation alone, the others as fine as they get; against {reference(budget['reference'])}.\n\n"
+        text += f"Each row has one approximation as in the scene, and all others as fine as they get. Against {reference(budget['reference'])}.\n\n"
         rows = [f"{s['source']}: {s['label']} | {errors(s['errors'])}" for s in budget["shares"]]
         rows.append(f"**together: the scene as it is** | {errors(budget['total'])}")
         text += table(f"approximation | {COLUMNS}", rows)
