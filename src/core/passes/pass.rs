@@ -378,7 +378,7 @@ pub(super) fn reads_tile(scene: &Scene, words: u32) -> bool {
     4 * words <= LARGEST_TILE.min(scene.shared_memory)
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Value {
     F32(f32),
     I32(i32),
@@ -386,7 +386,7 @@ pub enum Value {
     Vec3([f32; 3]),
     Vec4([f32; 4]),
     /// An array of floats; elements that were not set are 0.
-    Floats([f32; MOST_FLOATS]),
+    Floats(Box<[f32; MOST_FLOATS]>),
 }
 
 /// The length of arrays of parameters: the weights on one side of the widest Gaussian, and that of the middle.
@@ -432,7 +432,7 @@ impl Params {
     pub(super) fn floats(mut self, name: &'static str, values: &[f64]) -> Params {
         assert!(values.len() <= MOST_FLOATS, "{name}: {} values", values.len());
         let value = |n: usize| values.get(n).copied().map_or(0.0, finite);
-        self.0.push((name, Value::Floats(std::array::from_fn(value))));
+        self.0.push((name, Value::Floats(Box::new(std::array::from_fn(value)))));
         self
     }
 

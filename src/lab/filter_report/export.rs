@@ -30,8 +30,8 @@ pub fn markdown(report: &Report) -> String {
         text,
         "Stage 1 on one frame, on {name} ({driver}), by {program}, {}. Made by `tools/filters`.\n\n\
          - SNR: mean over standard deviation of tissue of one kind. CNR: contrast of that tissue to a background over the noise of both.\n\
-         - Edges: Pratt's figure of merit (1 is best) of as many of the steepest edge pixels as the mean over all speckle has.\n\
-         - RMSE and SSIM: against the mean over all speckle (`echolume phantom --mean-speckle`).\n\
+         - Clean slice: the same slice as the mean over all speckle (`echolume phantom --mean-speckle`). RMSE and SSIM are against it.\n\
+         - Edges: how near the edges of the filtered slice are to those of the clean one, by Pratt's figure of merit (1 is best). Of the filtered slice the steepest pixels count, as many as the clean one has edge pixels.\n\
          - ms: the filter's passes for the whole slice, median of {}. Values are 0..1 of the grey scale; sigma and edge too.\n\
          - Of each filter the first table has the setting of the highest SSIM on the phantom. The best figure of a column is bold.",
         report.date, report.repeats

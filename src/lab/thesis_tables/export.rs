@@ -179,18 +179,18 @@ fn notes(report: &Report) -> Vec<String> {
     let usual = Conditions::usual(report.quick);
     let [frames, lines] = THESIS_FLOOR;
     let mut notes = vec![
-        "thesis: a GTX 650 (4.5; 3.8 says GT 630), time per rendered volume: stages 2-4 here. Stage 1 of all frames stands \
-         beside it, since frames go through it while they arrive"
+        "thesis: times on a GTX 650 (4.5; 3.8 says GT 630), per rendered volume. Here that is taken as the time of stages 2-4. Stage 1 of all \
+         frames has a column of its own, since frames go through it while they arrive"
             .into(),
-        "3D filter along the ray: the thesis' own, made anew for every picture. Slice by slice: separable, in stage 1, so that \
-         a picture does not pay for it"
+        "3D filter along the ray: that of the thesis, computed again for every picture. Slice by slice: a separable Gaussian in stage 1, computed \
+         once for each frame"
             .into(),
-        "2D filter: the sigma filter on the distance map, in stage 3. The thesis' own figures say that it runs on pictures: from \
-         3x3 to 11x11 they rise by 2.5 ms, so 512 x 512 pixels x 112 more fetches make 12 G/s, of the 34 G/s of a GTX 650 (32 \
-         texture units at 1058 MHz); on 37 slices it would be 430 G/s"
+        "2D filter: the sigma filter on the distance map, in stage 3. The thesis' figures show that its filter ran on pictures: from 3x3 to 11x11 \
+         they rise by 2.5 ms. The 112 more fetches of 512 x 512 pixels in that time are 12 G/s, of the 34 G/s of a GTX 650 (32 texture units \
+         at 1058 MHz); on 37 slices they would be 430 G/s"
             .into(),
-        "(54.6): Table 6 of the thesis has no such row; its figure of the same conditions in Tables 3-5, which lies below its \
-         5x5 and 7x7. In Table 5 in brackets: its figure of the filter along the ray"
+        "brackets: the thesis has no such row. In Table 5 the figure is that of its filter along the ray. Elsewhere it is that of the same \
+         conditions in its Tables 3-5, which lies below its 5x5 and 7x7 of Table 6"
             .into(),
         "the thesis composites each ray and filters with the enhanced sigma filter in stages 1, 3 and 4 (4.1, chapter 6), but the tables do \
          not say what was on: the usual row is measured as the least that they name, and as that pipeline"
@@ -198,10 +198,10 @@ fn notes(report: &Report) -> Vec<String> {
         "Table 4: 4.5 calls it linear in the volume's size, O(n). Of its figures those of 256, 384 and 512 lie on a line within 0.6 %, which \
          is below 0 at 128. Whether the picture grew with the volume it does not say: both are measured, and neither reading is proven"
             .into(),
-        format!("lines: the thesis has 64 to 256; here {}. Slices are resampled, so stages 2-4 do not see lines", usual.lines),
-        format!("as of the usual row: {}", acquisition_floor(acquisition(usual.frames, usual.lines), SOUND_SPEED)),
+        format!("lines: the thesis has 64 to 256; here {}. Stages 2-4 take samples of slices, so that their time does not depend on lines", usual.lines),
+        format!("for the usual row {}", acquisition_floor(acquisition(usual.frames, usual.lines), SOUND_SPEED)),
         format!(
-            "the thesis' example, {frames} frames of {lines} lines to {DEPTH} mm: {:.1} ms (thesis: around 466 ms)",
+            "for the thesis' example, {frames} frames of {lines} lines to {DEPTH} mm, sound needs {:.1} ms (thesis: around 466 ms)",
             acquisition(frames, lines) * 1e3
         ),
     ];
@@ -223,8 +223,8 @@ fn other_surface(report: &Report) -> Option<String> {
     let stored = depths(|f| matches!(f, Filter3d::Stored(_)))?;
     let along = depths(|f| matches!(f, Filter3d::Sliding(_)))?;
     Some(format!(
-        "3D filter slice by slice: its kernel counts pixels and slices, the other samples of the ray, so that it is wider, above all across \
-         slices, and finds another surface ({stored} mm against {along} mm): its times are not those of the thesis' filter"
+        "3D filter slice by slice: its taps are pixels and slices, those of the other filter are samples of the ray. So it is wider, above all \
+         across slices, and finds another surface ({stored} mm against {along} mm): its times are not those of the thesis' filter"
     ))
 }
 
@@ -271,8 +271,9 @@ fn growth(text: &mut String, grown: &Grown) {
     }
     text.push_str(&markdown_table(&rows));
     text.push_str(
-        "\nThe shares are of the picture, not of the filter: a window grows where fewer pixels than it has lie within 2 sigma of the \
-         centre, so they follow from how much of the picture is edge or speckle, and from the ratio of its noise to sigma.\n",
+        "\n+n is the share of the pixels whose window became n pixels wider, up to the largest. A window grows while fewer pixels than it had at first \
+         lie within 2 sigma of the centre. So the shares tell more of the picture than of the filter: how much of it is edge or speckle, and the \
+         ratio of its noise to sigma.\n",
     );
 }
 

@@ -34,7 +34,7 @@ fn set(params: &mut Params, name: &str, to: f32) {
 fn swap(params: &mut Params, a: &str, b: &str) {
     let place = |name: &str| params.0.iter().position(|(n, _)| *n == name);
     if let (Some(a), Some(b)) = (place(a), place(b)) {
-        (params.0[a].1, params.0[b].1) = (params.0[b].1, params.0[a].1);
+        (params.0[a].1, params.0[b].1) = (params.0[b].1.clone(), params.0[a].1.clone());
     }
 }
 

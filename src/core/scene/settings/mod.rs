@@ -43,9 +43,9 @@ pub struct Settings {
     pub mode: Mode,
     /// How the picture is divided.
     pub layout: Layout,
-    /// Volume and surface rendering: parts that float, and are smaller than this, are not drawn, mm^3; 0 draws all. A part is what touches
-    /// within the sector and is dense enough to be drawn; what is bright in dark fluid has parts, a cavity has none. Takes a second volume, the whole
-    /// sector in stage 1, and time of the CPU for each volume.
+    /// Volume and surface rendering: parts that float and are smaller than this are not drawn, mm^3; 0 draws all. A part consists of texels of the
+    /// sector that are dense enough to be drawn and touch one another; bright matter in dark fluid has parts, a cavity has none. Takes a second volume,
+    /// the whole sector in stage 1, and time of the CPU for each volume.
     pub floating: f64,
     /// Size of the picture.
     pub picture: Picture,

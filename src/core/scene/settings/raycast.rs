@@ -53,8 +53,8 @@ pub struct Ray {
     pub sliding: u32,
     /// How the slice index at a position of the sweep is computed.
     pub slice_index: SliceIndex,
-    /// Entries of the look-up tables of the sweep (where it has one) and the lines. The error of linear interpolation is h^2/8 times the second
-    /// derivative of the half tangent: with 1025 entries under 1e-6 slices for a sweep of 142 frames over 85 deg.
+    /// Entries of the look-up tables of the sweep (where it has one) and the lines. Linear interpolation between entries h apart is off by at most
+    /// h^2/8 times the second derivative of the index: with 1025 entries by less than 1e-6 slices for a sweep of 142 frames over 85 deg.
     pub entries: u32,
     /// Rays per pixel along each axis: the picture is rendered larger and averaged.
     pub rays: u32,
@@ -148,7 +148,7 @@ pub enum Elevation {
     Linear,
     /// The uniform cubic B-spline of four slices, without a prefilter: slopes change gradually. It smooths with a variance of 1/3
     /// slice^2, where linear interpolation has 1/6 on average; `slices.smooth.elevation` is lowered by the difference, so that the total
-    /// variance stays. Takes twice the loads (Sigg and Hadwiger 2005).
+    /// variance stays. Takes twice the loads, or four fetches of the device's filter instead of one.
     Bspline,
     /// Like `bspline`, of slices that were sharpened across elevation by (-1, 8, -1)/6, so that it nearly meets their values. The kernel
     /// needs the next slice, so that the last one of a live sweep is one late. Not with smoothing across slices.
@@ -344,7 +344,7 @@ impl Default for Surface {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum SurfaceColour {
-    /// `light.surface_colour`. The default.
+    /// `light.surface_colour`.
     #[default]
     Constant,
     /// The colour that volume rendering gives the whole ray. It takes the place of the ambient light's colour; diffuse and specular light
@@ -381,8 +381,8 @@ pub enum Detector {
     /// The difference also stands out from the noise before it. A ray without such an edge takes its largest edge above the threshold, if
     /// the echo behind it lasts.
     Adaptive,
-    /// Like `adaptive`, and ignores edges whose echo has gone half a ring behind them (specks in fluid, thin shells before a wall) unless
-    /// the ray has no other.
+    /// Like `adaptive`, and ignores edges of which less than half of the height is left one edge's length behind them (specks in fluid, thin
+    /// shells before a wall), unless the ray has no other.
     Lasting,
     /// Of the two edges of each ray that are most likely a surface, the one on which neighbouring rays agree, or none: for speckle and noise that no filter
     /// removes. Takes no rough search, and the outermost surface at the peak of its edge.

@@ -122,7 +122,7 @@ pub struct Light {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Follows {
-    /// The camera: the light stays where it is in the picture. The default.
+    /// The camera: the light stays where it is in the picture.
     #[default]
     Camera,
     /// The region: the light stays where it is in the body, in the axes of a camera that is not turned. A view that turns then needs no new
@@ -258,7 +258,7 @@ pub struct Shadow {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Dims {
-    /// Diffuse and specular light: ambient light still arrives. The default.
+    /// Diffuse and specular light: ambient light still arrives.
     #[default]
     Light,
     /// The pixel, ambient light included (thesis Fig. 41).
