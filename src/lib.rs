@@ -185,7 +185,7 @@ pub mod low_level {
     #[cfg(feature = "lab")]
     pub use echolume_lab::{bounds, error_report, filter_report, profile, thesis_tables};
     pub use echolume_segment as segment;
-    pub use echolume_session::{compare, kiosk, live, marked, measure, user_presets, workspace};
+    pub use echolume_session::{compare, kiosk, live, marked, measure, user_presets, worksheet, workspace};
     #[cfg(feature = "view")]
     pub use echolume_ui as ui;
     #[cfg(feature = "verify")]
@@ -193,6 +193,7 @@ pub mod low_level {
     pub use {echolume_probe as probe, echolume_source as source};
 }
 
+use echolume_base::digest;
 #[cfg(feature = "verify")]
 use echolume_base::html_page;
 use echolume_base::memory;

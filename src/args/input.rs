@@ -15,7 +15,7 @@ use crate::source::phantom::{self, Phantom, PhantomSource};
 use crate::source::{Frame, Source};
 use crate::terminal::{Failure, failed, input, progress_bar, say};
 use crate::user_presets;
-use crate::workspace::{self, Workspace};
+use crate::workspace::{self, Origin, Workspace};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -48,6 +48,9 @@ pub struct InputArgs {
     /// Volume of the recording to use, counted from 0 [default: that of the workspace, otherwise 0]
     #[arg(long, value_name = "N")]
     volume: Option<usize>,
+    /// A workspace that is a part of a file, in place of the one that `input` names.
+    #[arg(skip)]
+    stored: Option<(PathBuf, Workspace)>,
 }
 
 impl InputArgs {
@@ -99,6 +102,9 @@ impl InputArgs {
 
     /// The workspace, if one was given in place of a recording, and its file.
     fn workspace(&self) -> Result<Option<(&Path, Workspace)>, Failure> {
+        if let Some((file, workspace)) = &self.stored {
+            return Ok(Some((file, workspace.clone())));
+        }
         let file = self.input.as_deref().filter(|file| workspace::is_named(file));
         file.map(|file| Ok((file, Workspace::read(file).map_err(input)?))).transpose()
     }
@@ -139,7 +145,7 @@ impl InputArgs {
 
     /// The recording as the user typed it, or `phantom`.
     pub fn name(&self) -> String {
-        match &self.input {
+        match self.stored.as_ref().map(|(file, _)| file).or(self.input.as_ref()) {
             None => "phantom".into(),
             Some(file) if file.as_os_str() == STANDARD => "standard input".into(),
             Some(file) => file.display().to_string(),
@@ -154,7 +160,7 @@ impl InputArgs {
     /// Which pictures say that they are of the phantom: all pictures of a workspace, as in the viewer; otherwise those with something else drawn
     /// over them. None if the volumes are not of the phantom.
     pub fn demo(&self, source: &dyn Source) -> Option<Demo> {
-        let is_workspace = self.input.as_deref().is_some_and(workspace::is_named);
+        let is_workspace = self.stored.is_some() || self.input.as_deref().is_some_and(workspace::is_named);
         source.is_synthetic().then_some(if is_workspace { Demo::Always } else { Demo::WithOthers })
     }
 
@@ -163,11 +169,49 @@ impl InputArgs {
         let mut read = source.files();
         read.extend(self.geometry.probe.clone());
         read.extend(self.input.clone().filter(|file| workspace::is_named(file)));
+        read.extend(self.stored.as_ref().map(|(file, _)| file.clone()));
         read.extend(self.scene.files());
         read
     }
 
-    /// Calls `each` with every frame of the chosen volume, in the order of the recording, and shows a progress bar.
+    /// True if `--size` was given.
+    pub fn has_size(&self) -> bool {
+        self.scene.size.is_some()
+    }
+
+    /// The recording as it was typed, if one was given.
+    pub fn given(&self) -> Option<PathBuf> {
+        self.input.clone()
+    }
+
+    /// Takes a workspace that is a part of a file in place of the one that was typed.
+    pub fn take_stored(&mut self, file: PathBuf, workspace: Workspace) {
+        self.stored = Some((file, workspace));
+    }
+
+    /// The file name of the workspace, if one was given.
+    pub fn workspace_name(&self) -> Option<String> {
+        let file = self.input.as_deref().filter(|file| workspace::is_named(file))?;
+        Some(file.file_name()?.to_string_lossy().into_owned())
+    }
+
+    /// The recording with its geometry and the volume to use, as a workspace stores them. Paths are absolute.
+    pub fn origin(&self) -> Result<Origin, Failure> {
+        let (recording, geometry) = match (self.workspace()?, &self.input) {
+            (Some((file, workspace)), _) => {
+                (workspace.recording(file).map_err(input)?.to_path_buf(), self.geometry.or(&workspace.origin)?)
+            }
+            (None, recording) => (recording.clone().unwrap_or(workspace::PHANTOM.into()), self.geometry.clone()),
+        };
+        let mut origin = geometry.origin(Some(recording.clone()));
+        if recording.as_os_str() == workspace::PHANTOM {
+            origin.recording = Some(recording);
+        }
+        origin.volume = self.volume()?;
+        Ok(origin)
+    }
+
+    /// Calls `each` with every frame of the volume, in the order of the recording, and shows a progress bar.
     #[cfg(feature = "lab")]
     pub fn for_each_frame(
         &self,

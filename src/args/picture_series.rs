@@ -2,13 +2,11 @@
 
 use super::input::check_inputs;
 use super::picture_file::STANDARD;
+use crate::picture::film::{FilmWriter, encoder};
 use crate::picture::{Picture, PictureFormat, check_target, replace};
 use crate::terminal::{Failure, failed, input};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
-
-#[cfg(feature = "video")]
-use crate::picture::film::FilmWriter;
 
 /// Most digits of a number in a pattern.
 const MAX_DIGITS: usize = 9;
@@ -27,8 +25,8 @@ impl SeriesTarget {
     /// `face-000000.png`.
     ///
     /// # Errors
-    /// One line: the name is that of a single picture, the pattern is not valid, the ending belongs to no known format, or the program was built
-    /// without films.
+    /// One line: the name is that of a single picture, the pattern is not valid, the ending belongs to no known format, or nothing here encodes
+    /// films.
     pub fn of(path: &Path, name: &str) -> Result<SeriesTarget, Failure> {
         let text = path.to_string_lossy();
         let refuse = |why: &str| Err(input(format!("-o {text}: {why}")));
@@ -49,13 +47,7 @@ impl SeriesTarget {
             if file.contains('%') {
                 return refuse("a film is one file, whose name has no number: leave the % out");
             }
-            return match cfg!(feature = "video") {
-                true => Ok(SeriesTarget::Film(path.into())),
-                false => refuse(
-                    "this program was built without films; build it with `cargo build --release --features video`, or give a folder (face/) \
-                     or a pattern (face-%03d.png)",
-                ),
-            };
+            return encoder().map_or_else(refuse, |_| Ok(SeriesTarget::Film(path.into())));
         }
         let Some((first, rest)) = file.split_once('%') else {
             return refuse(
@@ -108,22 +100,14 @@ impl SeriesTarget {
 pub struct PictureSeries<'a> {
     target: &'a SeriesTarget,
     /// Pictures of a film in a second.
-    #[cfg_attr(not(feature = "video"), allow(dead_code))]
     rate: f64,
     count: usize,
-    #[cfg(feature = "video")]
     film: Option<FilmWriter>,
 }
 
 impl<'a> PictureSeries<'a> {
     pub fn new(target: &'a SeriesTarget, rate: f64) -> PictureSeries<'a> {
-        PictureSeries {
-            target,
-            rate,
-            count: 0,
-            #[cfg(feature = "video")]
-            film: None,
-        }
+        PictureSeries { target, rate, count: 0, film: None }
     }
 
     /// Writes a picture to the file of its number, or appends it to the film.
@@ -140,7 +124,6 @@ impl<'a> PictureSeries<'a> {
         Ok(())
     }
 
-    #[cfg(feature = "video")]
     fn add(&mut self, path: &Path, picture: &Picture) -> Result<(), String> {
         if self.film.is_none() {
             self.film = Some(FilmWriter::create(path, [picture.width, picture.height], self.rate)?);
@@ -148,19 +131,13 @@ impl<'a> PictureSeries<'a> {
         self.film.as_mut().map_or(Ok(()), |film| film.picture(picture))
     }
 
-    #[cfg(not(feature = "video"))]
-    fn add(&mut self, _: &Path, _: &Picture) -> Result<(), String> {
-        Err("this program was built without films".into())
-    }
-
-    /// Number of pictures written so far.
+    /// Number of written pictures.
     pub fn count(&self) -> usize {
         self.count
     }
 
     /// Ends the series; a film is completed and gets its final name.
     pub fn finish(self) -> Result<(), Failure> {
-        #[cfg(feature = "video")]
         if let Some(film) = self.film {
             let unwritable = |e: String| failed(format!("{}: cannot be written: {e}", self.target.file(0).display()));
             return film.finish().map_err(unwritable);
@@ -212,9 +189,9 @@ mod tests {
         let fault = of("face-%03d.mp4").expect_err("a pattern").message();
         assert!(fault.contains("leave the % out"), "in a program without films, too: {fault}");
         match of("face.MP4") {
-            Ok(SeriesTarget::Film(path)) => assert!(cfg!(feature = "video") && path == Path::new("face.MP4")),
+            Ok(SeriesTarget::Film(path)) => assert!(encoder().is_ok() && path == Path::new("face.MP4")),
             Ok(other) => panic!("{other:?}"),
-            Err(fault) => assert!(!cfg!(feature = "video") && fault.message().contains("--features video")),
+            Err(fault) => assert!(encoder().is_err() && fault.message().contains("--features video")),
         }
     }
 }

@@ -54,8 +54,7 @@ impl GeometryArgs {
         given.iter().find(|(_, is_given)| *is_given).map(|(flag, _)| *flag)
     }
 
-    /// The recording and these flags as a workspace stores them.
-    #[cfg(feature = "view")]
+    /// The description of a recording with this geometry that a workspace stores.
     pub fn origin(&self, recording: Option<PathBuf>) -> Origin {
         let absolute = |path: &PathBuf| std::path::absolute(path).unwrap_or_else(|_| path.clone());
         let mut origin = Origin::of(recording.as_ref().map(absolute));

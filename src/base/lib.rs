@@ -1,5 +1,5 @@
 //! The code that every other member uses: bounded reading and atomic writing of files ([`files`]), the limit of the [`memory`] of a volume,
-//! pictures and films ([`picture`]), drawings and plots ([`canvas`]), lines of text ([`text`]), values of TOML from which types are
+//! pictures and films ([`picture`]), drawings and plots ([`canvas`]), digests ([`digest`]), lines of text ([`text`]), values of TOML from which types are
 //! deserialized ([`tree`]), output of commands ([`terminal`]), pages of HTML ([`html_page`]), metrics for Prometheus ([`metrics`]), and
 //! results of earlier runs that new ones are compared with ([`baselines`]).
 
@@ -7,6 +7,7 @@
 
 pub mod baselines;
 pub mod canvas;
+pub mod digest;
 pub mod files;
 pub mod html_page;
 pub mod memory;

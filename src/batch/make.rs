@@ -1,9 +1,9 @@
 //! Makes a manifest from files, folders and patterns: a unit for each recording that can be read, with size, digest and expected cost.
 
-use super::digest_of;
 use super::manifest::Unit;
 use super::unit::{Kind, Work};
 use crate::args::check_volume;
+use crate::digest::digest_of;
 use crate::source::formats::is_ending;
 use crate::source::{self, Source};
 use crate::terminal::{Failure, input};

@@ -1,10 +1,10 @@
 //! Reads the recording of a unit, on a thread of its own: the next one is read while this one is drawn. Two recordings are in memory at most.
 
-use super::digest_of;
 use super::manifest::Numbered;
 use super::results::{Record, Verified, read_record};
 use super::unit::{Key, Kind, Work};
 use crate::args::{check_volume, recorded};
+use crate::digest::digest_of;
 use crate::files::escaped;
 use crate::probe::{Geometry, Grid, World};
 use crate::scene::Scene;

@@ -1,9 +1,9 @@
 //! What is stored of a unit: its record, whose existence marks it as done, and a line in the results of its shard.
 
 use super::agreement::{Agreement, Drawer};
-use super::sha256_of_file;
 use super::shard::Shard;
 use super::unit::Key;
+use crate::digest::sha256_of_file;
 use crate::terminal::remark;
 use crate::{files, machine};
 use serde::{Deserialize, Serialize};

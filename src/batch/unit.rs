@@ -1,8 +1,8 @@
 //! The command of a unit, and the key of its outputs: a hash of everything that determines them.
 
 use super::manifest::Unit;
-use super::sha256_of_file;
 use crate::args::{GeometryArgs, SceneArgs};
+use crate::digest::{hex, sha256_of_file};
 use crate::scene::Settings;
 use crate::scene::load::Layers;
 use crate::source::segmentation;
@@ -244,7 +244,7 @@ impl Work {
         let mut hash = Sha256::new();
         hash.update(&self.digest);
         hash.update(digest);
-        let mut text = super::hex(&hash.finalize());
+        let mut text = hex(&hash.finalize());
         text.truncate(KEY_LENGTH);
         Key(text)
     }

@@ -8,7 +8,7 @@ use super::reading::{Contents, Read, Task, read, shown};
 use super::results::{Earlier, FORMAT, OutputFile, Record, Results, Seconds, Status, Verified};
 use super::shard::Shard;
 use super::unit::{Key, Kind, Work};
-use super::{sha256, sha256_of_file};
+use crate::digest::{sha256, sha256_of_file};
 use crate::files::replace;
 use crate::gpu::GpuError;
 use crate::machine;

@@ -13,6 +13,7 @@ const GROUPS: [(&str, &[&str]); 6] = [
         "Input",
         &[
             "source",
+            "from",
             "probe",
             "depth_axis",
             "voxel_spacing",
@@ -101,14 +102,15 @@ const GROUPS: [(&str, &[&str]); 6] = [
 ];
 
 /// Commands whose flags are in groups, with what a group holds of them alone. The others have few flags.
-const GROUPED: [(&str, &[(&str, &str)]); 3] = [
+const GROUPED: [(&str, &[(&str, &str)]); 4] = [
     ("render", &[("rate", "Output")]),
     ("stream", &[("rate", "Input"), ("spacing", "Input")]),
     ("view", &[("rate", "Input"), ("spacing", "Input")]),
+    ("worksheet", &[]),
 ];
 
 /// The flags of `-h`, of commands with many.
-const USUAL: [(&str, &[&str]); 9] = [
+const USUAL: [(&str, &[&str]); 10] = [
     (
         "render",
         &[
@@ -173,6 +175,7 @@ const USUAL: [(&str, &[&str]); 9] = [
     ("mesh", &["threshold", "spacing", "smooth", "simplify", "fast", "base", "open", "volume", "probe"]),
     ("segment", &["output", "threshold", "dark", "seed", "smooth", "box", "least", "csv", "stl", "volume", "probe"]),
     ("phantom", &["output", "body", "volumes", "seed", "sampling", "frames", "lines", "truth"]),
+    ("worksheet", &["output", "from", "scene", "set", "size", "device"]),
     ("verify", &["device", "full", "only", "list", "baseline", "json", "junit", "html", "self_test", "against"]),
     ("profile", &["mode", "preset", "set", "size", "device", "runs", "json", "compare", "against", "html"]),
 ];

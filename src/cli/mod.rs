@@ -81,6 +81,7 @@ mod view;
 mod view_config;
 #[cfg(feature = "view")]
 mod view_open;
+mod worksheet;
 
 /// `--budget` in a build without error reports.
 #[cfg(not(feature = "lab"))]
@@ -191,6 +192,8 @@ enum Command {
     Mesh(mesh::MakeMesh),
     /// Find bodies, label their voxels, and measure their volumes (.seg.nrrd)
     Segment(segment::Segment),
+    /// Write the measurements of a workspace as a report, each with its picture (.pdf, .html, .csv)
+    Worksheet(Box<worksheet::Worksheet>),
     /// Describe a recording, without patient fields
     Info(recordings::Info),
     /// Render, convert, measure or verify many recordings: one shard of a manifest, to be run on many machines
@@ -239,6 +242,7 @@ pub fn run() -> ExitCode {
         Command::Stic(stic) => stic.run(),
         Command::Mesh(mesh) => mesh.run(),
         Command::Segment(segment) => segment.run(),
+        Command::Worksheet(worksheet) => worksheet.run(),
         Command::Info(info) => info.run(arguments.verbose > 0),
         Command::Batch(batch) => batch.run(),
         Command::Probe(probe) => probe.run(),

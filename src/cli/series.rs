@@ -8,6 +8,7 @@ use crate::gpu::{Context, Renderer, RendererOptions};
 use crate::marked::{self, Demo};
 use crate::passes::Slot;
 use crate::passes::times::pass_time_table;
+use crate::picture::film::encoder;
 use crate::plan::Rerun;
 use crate::probe::Probe;
 use crate::scene::{Scene, Settings};
@@ -24,7 +25,7 @@ use std::sync::Arc;
 #[derive(clap::Args)]
 pub struct SeriesArgs {
     /// Draw N pictures of one turn about the vertical axis of the view, at one scale; the last is followed by the first. -o is a folder
-    /// (face/), a pattern (face-%03d.png) or, in a program with films, face.mp4
+    /// (face/), a pattern (face-%03d.png) or a film (face.mp4)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=3600), conflicts_with = "volumes")]
     turntable: Option<u32>,
     /// Draw a picture of each of these volumes in time: FIRST:LAST, counted from 0, all, or loop: those between the marks of the cine loop in the
@@ -191,7 +192,11 @@ impl SeriesArgs {
         bar.finish_and_clear();
         let count = views.count();
         match target {
-            SeriesTarget::Film(file) => say!("film: {}, {count} pictures, {rate} a second", file.display()),
+            SeriesTarget::Film(file) => {
+                let by = encoder().ok().filter(|program| !program.as_os_str().is_empty());
+                let by = by.map_or(String::new(), |program| format!(", by {}", program.display()));
+                say!("film: {}, {count} pictures, {rate} a second{by}", file.display());
+            }
             SeriesTarget::Files { .. } => {
                 let [first, last] = [0, count - 1].map(|n| target.file(views.number(n)).display().to_string());
                 say!("pictures: {first} to {last}, {count}");

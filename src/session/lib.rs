@@ -1,5 +1,5 @@
 //! Sessions, which last longer than one picture: streams of frames that are rendered while they arrive ([`live`]), measurements
-//! ([`measure`]), marks on saved pictures ([`marked`]) and pictures beside each other ([`compare`]), presets and workspaces of a user ([`user_presets`], [`workspace`]), and the
+//! ([`measure`]), marks on saved pictures ([`marked`]) and pictures beside each other ([`compare`]), presets and workspaces of a user ([`user_presets`], [`workspace`]), reports of them ([`worksheet`]), and the
 //! configuration, the logs and the support bundle of a kiosk display ([`kiosk`]).
 
 #![forbid(unsafe_code)]
@@ -14,9 +14,10 @@ pub mod measure;
 #[path = "../core/scene/test_block.rs"]
 mod test_block;
 pub mod user_presets;
+pub mod worksheet;
 pub mod workspace;
 
-use echolume_base::{canvas, files, metrics, picture, text, tree};
+use echolume_base::{canvas, digest, files, html_page, metrics, picture, text, tree};
 use echolume_core::{passes, plan, scene};
 use echolume_gpu::{self as gpu, machine};
 use echolume_segment as segment;

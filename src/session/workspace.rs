@@ -80,11 +80,20 @@ impl Workspace {
     pub fn read(path: &Path) -> Result<Workspace, String> {
         let fault = |fault: &str| format!("{}: {}", path.display(), printable(fault));
         let text = files::read_text(path, MAX_BYTES, TABLE).map_err(|e| fault(&e))?;
+        Workspace::of_text(path, &text)
+    }
+
+    /// As [`Workspace::read`], of the text of a workspace that is a part of the file at `path`.
+    ///
+    /// # Errors
+    /// As for [`Workspace::read`].
+    pub fn of_text(path: &Path, text: &str) -> Result<Workspace, String> {
+        let fault = |fault: &str| format!("{}: {}", path.display(), printable(fault));
         let line = |e: &toml::de::Error| match e.span() {
-            Some(span) => format!("line {}: {}", crate::scene::load::line_of(&text, span.start), e.message()),
+            Some(span) => format!("line {}: {}", crate::scene::load::line_of(text, span.start), e.message()),
             None => e.message().to_string(),
         };
-        let mut table = toml::from_str::<Table>(&text).map_err(|e| fault(&line(&e)))?;
+        let mut table = toml::from_str::<Table>(text).map_err(|e| fault(&line(&e)))?;
         let Some(origin) = table.remove(TABLE) else {
             return Err(fault("has no table [workspace]: a file of settings alone is given with --scene"));
         };

@@ -241,7 +241,15 @@ mod tests {
         let header =
             Header { forward, backward, stored: StoredType::U8, range: [0.0, 255.0], posed: false, synthetic: false };
         let volumes = vec![CineVolume::default()];
-        Job { format: FORMATS[0], header, volumes, rate: 1.0, settings: Settings::default(), device: String::new() }
+        Job {
+            format: FORMATS[0],
+            header,
+            volumes,
+            rate: 1.0,
+            settings: Settings::default(),
+            origin: None,
+            device: String::new(),
+        }
     }
 
     #[test]

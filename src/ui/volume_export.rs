@@ -36,6 +36,11 @@ impl Format {
     pub(super) fn takes_the_loop(&self) -> bool {
         self.work == Work::Loop
     }
+
+    /// True if it is written from the recording itself: a report names that.
+    pub(super) fn is_report(&self) -> bool {
+        self.work == Work::Report
+    }
 }
 
 /// A format in the menu of exports.
@@ -57,6 +62,8 @@ enum Work {
     Loop,
     /// A picture whose longer edge has this number of pixels.
     Picture(u32),
+    /// The measurements of the recording, and the JSON that makes the report again.
+    Report,
 }
 
 const fn format(name: &'static str, ending: &'static str, work: Work, hint: &'static str) -> Format {
@@ -73,14 +80,13 @@ pub const FORMATS: &[Format] = &[
     format(texts::SURFACE_GLTF, "glb", Work::Mesh, texts::SURFACE_GLTF_HINT),
     format(texts::RELIEF_STL, "stl", Work::Relief, texts::RELIEF_STL_HINT),
     format(texts::TURNTABLE_PICTURES, "turntable", Work::Turntable, texts::TURNTABLE_PICTURES_HINT),
-    #[cfg(feature = "video")]
-    format(texts::TURNTABLE_FILM, "mp4", Work::Turntable, texts::TURNTABLE_FILM_HINT),
     format(texts::LOOP_PICTURES, "loop", Work::Loop, texts::LOOP_PICTURES_HINT),
-    #[cfg(feature = "video")]
-    format(texts::LOOP_FILM, "mp4", Work::Loop, texts::LOOP_FILM_HINT),
     format(texts::PICTURE_1000, "png", Work::Picture(1000), texts::PICTURE_HINT),
     format(texts::PICTURE_2000, "png", Work::Picture(2000), texts::PICTURE_HINT),
     format(texts::PICTURE_4000, "png", Work::Picture(4000), texts::PICTURE_HINT),
+    format(texts::TURNTABLE_FILM, "mp4", Work::Turntable, texts::TURNTABLE_FILM_HINT),
+    format(texts::LOOP_FILM, "mp4", Work::Loop, texts::LOOP_FILM_HINT),
+    format(texts::REPORT, "pdf", Work::Report, texts::REPORT_HINT),
 ];
 
 /// An export in progress.
@@ -130,10 +136,14 @@ impl Export {
         let beside = file.parent().unwrap_or(Path::new("."));
         let folder = WorkFolder::new(beside, ".echolume-export-")?;
         let recording = folder.path().join(RECORDING);
-        write_frames(&recording, job.header.clone(), &job.volumes)?;
+        if !job.format.is_report() {
+            write_frames(&recording, job.header.clone(), &job.volumes)?;
+        }
         let made = folder.path().join(format!("out.{}", job.format.ending));
         self.process(&mut job.command(&recording, &made)?, &|| signals.signal().is_some())?;
-        std::fs::rename(&made, file).map_err(|e| format!("{}: {e}", file.display()))
+        let moved = |ending: &str| std::fs::rename(made.with_extension(ending), file.with_extension(ending));
+        let json = if job.format.is_report() { moved("json") } else { Ok(()) };
+        json.and_then(|()| std::fs::rename(&made, file)).map_err(|e| format!("{}: {e}", file.display()))
     }
 
     /// `must_stop`: true if the work is to end early.
@@ -232,7 +242,9 @@ pub(super) struct Job {
     /// Rate at which the cine loop is played, volumes a second.
     pub(super) rate: f64,
     pub(super) settings: crate::scene::Settings,
-    /// Name of the device that draws the view, which also draws turntables.
+    /// The recording that is shown, for a report.
+    pub(super) origin: Option<Origin>,
+    /// The name of the view's device, for turntables.
     pub(super) device: String,
 }
 
@@ -253,6 +265,10 @@ impl Job {
                     .arg(scene)
                     .args(["--size", &format!("{width}x{height}"), "--device", &self.device, "-o"])
                     .arg(made)
+            }
+            Work::Report => {
+                let scene = self.workspace(recording)?;
+                command.arg("worksheet").arg(scene).args(["--device", &self.device, "-o"]).arg(made)
             }
             Work::Turntable => {
                 let scene = self.workspace(recording)?;
@@ -287,7 +303,8 @@ impl Job {
         // The recording holds what is between the marks.
         let mut settings = self.settings.clone();
         (settings.cine.first, settings.cine.last) = (None, None);
-        let text = workspace::text(&settings, &Origin::of(Some(RECORDING.into())))?;
+        let origin = self.origin.clone().unwrap_or_else(|| Origin::of(Some(RECORDING.into())));
+        let text = workspace::text(&settings, &origin)?;
         std::fs::write(&file, text).map_err(|e| format!("{}: {e}", file.display()))?;
         Ok(file)
     }

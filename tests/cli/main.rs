@@ -42,6 +42,7 @@ mod verify_isolated;
 #[cfg(feature = "view")]
 mod view;
 mod watchdog;
+mod worksheet;
 
 use common::program::*;
 use std::collections::BTreeSet;

@@ -70,9 +70,9 @@ fn a_series_that_would_be_wrong_is_not_begun() {
         fs::write(format!("{slices}/picture-{n:06}.pgm"), b"P5 4 4 255\n0123456789abcdef").expect("a slice");
     }
     let (one, out, over) = (folder.path("one.png"), folder.path("out"), format!("{slices}/picture-%06d.pgm"));
-    let [film, films] = ["film.mp4", "film-%03d.mp4"].map(|name| folder.path(name));
+    let films = folder.path("film-%03d.mp4");
     let stack = format!("{slices}/*.pgm");
-    let mut rows: Vec<(Vec<&str>, &str)> = vec![
+    let rows: Vec<(Vec<&str>, &str)> = vec![
         (vec!["--turntable", "3", "-o", &one], "a pattern (face-%03d.png)"),
         (vec!["--turntable", "3", "-o", "-"], "a pattern (face-%03d.png)"),
         (vec!["--turntable", "3", "-o", &out, "--mode", "mpr"], "--turntable: mode: shows planes"),
@@ -89,15 +89,51 @@ fn a_series_that_would_be_wrong_is_not_begun() {
         (vec!["--turntable", "3", "-o", &out, "--dump", &out], "--dump: is for one picture"),
         (vec!["--turntable", "2", "-o", &over], "would replace an input"),
     ];
-    if !cfg!(feature = "video") {
-        rows.push((vec!["--turntable", "3", "-o", &film], "--features video"));
-    }
     for (more, named) in rows {
         let all = [&["render", &stack, "--voxel-spacing", "1,1,1", "--size", "8x8"][..], &more].concat();
         refuses(&all, &run(&all), 2, &[named]);
     }
     assert_eq!(folder.names().into_iter().collect::<Vec<_>>(), ["slices"]);
     assert_eq!(fs::read(format!("{slices}/picture-000001.pgm")).expect("a slice"), b"P5 4 4 255\n0123456789abcdef");
+}
+
+/// Without an encoder of its own the program hands the pixels to the ffmpeg in PATH: here one that counts them.
+#[cfg(all(unix, not(feature = "video")))]
+#[test]
+fn films_are_made_by_the_ffmpeg_that_is_installed() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = Folder::new("ffmpeg");
+    let [film, bin, size] = ["turn.mp4", "bin", "size"].map(|name| folder.path(name));
+    fs::create_dir(&bin).expect("a folder");
+    let program = format!("{bin}/ffmpeg");
+    let turn = |script: Option<&str>| {
+        if let Some(script) = script {
+            fs::write(&program, format!("#!/bin/sh\n{script}\n")).expect("a program");
+            fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).expect("executable");
+        }
+        let mut command = std::process::Command::new(PROGRAM);
+        let look = ["--preset", "bone", "--size", "40x30", "--turntable", "4", "--rate", "8", "-o", &film];
+        finish(
+            command.args(["render", BONE]).args(look).env("PATH", if script.is_some() { &bin } else { "/nonexistent" }),
+        )
+    };
+    let what = ["film.mp4"];
+    refuses(&what, &turn(None), 2, &["turn.mp4: a film needs the program ffmpeg", "--features video"]);
+    let ended = turn(Some("exec 2>/dev/null; echo no such codec >&2; exec >&2; exit 3"));
+    refuses(&what, &ended, 1, &["turn.mp4: cannot be written: ffmpeg: "]);
+    let refused = turn(Some("/bin/cat >/dev/null; echo first >&2; echo no such codec >&2; exit 3"));
+    refuses(&what, &refused, 1, &["turn.mp4: cannot be written: ffmpeg: no such codec"]);
+    assert_eq!(folder.names().into_iter().collect::<Vec<_>>(), ["bin"], "nothing stays");
+    let count = format!("for film; do :; done; /usr/bin/wc -c >{size}; echo \"$@\" >\"$film\"");
+    let (code, said, err) = turn(Some(&count));
+    assert_eq!(code, Some(0), "{err}");
+    assert!(said.ends_with(&format!("film: {film}, 4 pictures, 8 a second, by {program}\n")), "{said}");
+    let bytes = fs::read_to_string(&size).expect("a count");
+    assert_eq!(bytes.trim(), (4 * 4 * 40 * 30).to_string(), "every pixel of every picture");
+    let asked = fs::read_to_string(&film).expect("the film");
+    assert!(asked.contains("-f rawvideo -pix_fmt rgba -s 40x30 -r 8 -i pipe:0"), "{asked}");
+    let mode = fs::metadata(&film).expect("the film").permissions().mode();
+    assert_eq!(mode & 0o777, 0o600, "only its owner reads it");
 }
 
 /// Prevents a volume of a workspace that is ignored: the measurements of a workspace belong to it.

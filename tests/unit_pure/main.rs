@@ -45,4 +45,5 @@ mod user_presets;
 mod verify_report;
 mod vessels;
 mod volume_format;
+mod worksheet;
 mod workspace;

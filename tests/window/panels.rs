@@ -347,3 +347,39 @@ fn a_turntable_and_a_loop_are_exported_with_marks_as_asked() {
     }
     view.leave();
 }
+
+/// The report of a recording names that, and not the copy that other exports are made of, and is made again from its JSON.
+#[test]
+fn a_report_of_the_recording_is_exported_with_what_makes_it_again() {
+    let desk = Desk::new(false);
+    let folder = Folder::new("report");
+    std::fs::copy(BONE, folder.join("bone.mha")).expect("copied");
+    let caliper = "[[measure]]\nkind = 'distance'\npoints = [[12.4, 0.5, 5.6], [12.4, 23.6, 5.6]]\n";
+    let head = "mode = 'plane'\n[workspace]\nversion = 1\nrecording = 'bone.mha'\n";
+    let (exam, kept) = (folder.write("exam.toml", [head, caliper].concat()), folder.path("kept"));
+    let view = desk.view(&["--size", "700x500", "--source", &exam, "--save-to", &kept]);
+    let all = || std::fs::read_dir(&kept).into_iter().flatten().flatten().map(|entry| entry.path());
+    let mut asked: Option<std::time::Instant> = None;
+    let report = until("the report", || {
+        let made = all().find(|path| path.extension().is_some_and(|end| end == "pdf"));
+        let is_at_work = all().any(|path| path.to_string_lossy().contains(".echolume-export-"));
+        // Before the volume there is nothing to export.
+        if made.is_none() && !is_at_work && asked.is_none_or(|at| at.elapsed().as_secs() >= 3) {
+            asked = Some(std::time::Instant::now());
+            desk.control('e');
+            desk.tap(0xff57_u32); // End
+            desk.tap(RETURN);
+        }
+        made
+    });
+    view.leave();
+    let (json, again) = (report.with_extension("json"), folder.path("again.pdf"));
+    let text = std::fs::read_to_string(&json).expect("beside it");
+    assert!(text.contains("\"name\": \"bone.mha\"") && text.contains("\"value\": 23.1"), "{text}");
+    let run =
+        std::process::Command::new(PROGRAM).args(["worksheet", "--from"]).arg(&json).args(["-o", &again]).output();
+    let run = run.expect("the program runs");
+    let said = String::from_utf8_lossy(&run.stdout).into_owned();
+    assert!(said.contains("pictures: all 1 are those of "), "{said}{}", String::from_utf8_lossy(&run.stderr));
+    assert!(std::fs::read(&report).expect("a report") == std::fs::read(&again).expect("a report"));
+}

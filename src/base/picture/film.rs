@@ -16,7 +16,7 @@ use shiguredo_mp4::mux::{Mp4FileMuxer, Mp4FileMuxerOptions, Sample};
 use shiguredo_mp4::{TrackKind, Uint};
 use std::io::Write;
 use std::num::NonZeroU32;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Units of time of a film in a second: 24, 25, 30, 50 and 60 pictures a second are whole numbers of them.
 const TIME_SCALE: NonZeroU32 = NonZeroU32::new(90_000).expect("not 0");
@@ -32,8 +32,16 @@ const TILES: usize = 4;
 const SEQUENCE_HEADER: u8 = 1;
 const TEMPORAL_DELIMITER: u8 = 2;
 
-/// An MP4 file (AV1) of pictures of one size that is being written. The encoder holds about forty pictures back, which it compares; encoded
-/// pictures are written at once.
+/// The program that encodes films: this one.
+///
+/// # Errors
+/// None; a program without this encoder has some.
+pub fn encoder() -> Result<PathBuf, &'static str> {
+    Ok(PathBuf::new())
+}
+
+/// An MP4 file of pictures of one size that is being written. The encoder keeps about forty pictures for comparison; encoded pictures are
+/// written at once.
 pub struct FilmWriter {
     encoder: Context<u8>,
     muxer: Mp4FileMuxer,

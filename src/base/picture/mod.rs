@@ -1,6 +1,9 @@
 //! Pictures in memory and their files: rendered pictures (RGBA), and grey pictures for the 2D filters, with signal-to-noise and
 //! contrast-to-noise ratios of rectangles of them.
 
+#[cfg(not(feature = "video"))]
+#[path = "ffmpeg.rs"]
+pub mod film;
 #[cfg(feature = "video")]
 pub mod film;
 mod format;

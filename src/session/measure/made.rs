@@ -1,6 +1,7 @@
 //! Describes the conditions of a measurement: the plane or the view, and the settings of the picture. Exported results contain these texts.
 
 use crate::scene::{Scene, Settings};
+use glam::DVec3;
 
 /// Largest distance of a point that counts as on a plane, mm. Coordinates are stored to a tenth of a micrometre.
 const ON_PLANE: f64 = 1e-3;
@@ -35,7 +36,23 @@ pub fn plane(scene: &Scene, points: &[[f64; 3]], on_surface: bool) -> String {
     format!("{name} at {x}, {y}, {z} mm, normal {along_x}, {along_y}, {along_z}")
 }
 
-/// The mode in words, and a digest of all settings except the size of the picture and what is drawn over it (FNV-1a of their text, 64 bits).
+/// The direction of the view that [`plane`] describes: azimuth, elevation and roll to a tenth of a degree. None if it is not one.
+pub(crate) fn direction(words: &str) -> Option<[f64; 3]> {
+    let rest = words.strip_prefix("rendering, azimuth ")?.strip_suffix(" deg")?;
+    let (azimuth, rest) = rest.split_once(", elevation ")?;
+    let (elevation, roll) = rest.split_once(", roll ")?;
+    let [Ok(azimuth), Ok(elevation), Ok(roll)] = [azimuth, elevation, roll].map(str::parse) else { return None };
+    Some([azimuth, elevation, roll])
+}
+
+/// The normal of the plane that [`plane`] describes, to three decimals. None if it describes none.
+pub(crate) fn normal(words: &str) -> Option<DVec3> {
+    let numbers = words.split_once(" mm, normal ")?.1.split(", ").map(str::parse);
+    let numbers = numbers.collect::<Result<Vec<f64>, _>>().ok()?;
+    DVec3::from(<[f64; 3]>::try_from(numbers).ok()?).try_normalize()
+}
+
+/// The mode, and a digest of all settings except the size of the picture and what is drawn over it (FNV-1a of their text, 64 bits).
 pub fn settings(of: &Settings) -> String {
     let settings = Settings { picture: Settings::default().picture, ..of.clone().without_drawings() };
     let text = settings.to_toml().unwrap_or_default();
@@ -62,6 +79,8 @@ mod tests {
         for (end, letter) in [([5.0, 18.0, 2.0], "A"), ([1.0, 18.0, 6.0], "B"), ([5.0, 15.0, 6.0], "C")] {
             let words = plane(&three, &[cross, end], false);
             assert!(words.starts_with(&format!("{letter} at ")), "{words}");
+            let axis = [DVec3::Z, DVec3::X, DVec3::Y][(letter.as_bytes()[0] - b'A') as usize];
+            assert_eq!((normal(&words), direction(&words)), (Some(axis), None), "{words}");
         }
         assert_eq!(plane(&three, &[cross, [5.0, 18.0, 6.0]], false), "", "on none of them");
         let sliced = scene(&["mode='tomography'", "planes.plane='c'"]);
@@ -74,6 +93,7 @@ mod tests {
         let rendered = scene(&["camera.azimuth=30"]);
         let words = plane(&rendered, &[cross], true);
         assert!(words.contains("azimuth 30.0") && plane(&rendered, &[cross], false).is_empty(), "{words}");
+        assert_eq!((direction(&words), normal(&words)), (Some([30.0, 0.0, 0.0]), None));
     }
 
     #[test]

@@ -5,10 +5,11 @@ use super::shapes::{self, Ellipse};
 use crate::scene::{MeasureKind, Measurement};
 use crate::text::csv_quoted;
 use glam::DVec3;
+use serde::Serialize;
 use std::fmt::Write as _;
 
-/// A measured quantity: its name, value and unit.
-#[derive(Clone, Debug, PartialEq)]
+/// A measured quantity.
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Quantity {
     pub name: &'static str,
     pub value: f64,
@@ -110,14 +111,20 @@ pub fn label(number: usize, measured: &Measurement) -> String {
 /// All results as CSV: a line for each quantity, with the conditions of the measurement if they are known. Numbers have a decimal point and four
 /// decimals. `recording`: name of the recording; empty for live volumes.
 pub fn csv(all: &[Measurement], recording: &str) -> String {
-    let mut text = String::from("number,measurement,text,quantity,value,unit,recording,volume,time,plane,settings\n");
+    csv_with(all, recording, "", |_| String::new())
+}
+
+/// As [`csv`], with further columns: their names, and their values for the measurement of a number, each behind a comma.
+pub(crate) fn csv_with(all: &[Measurement], recording: &str, names: &str, more: impl Fn(usize) -> String) -> String {
+    const COLUMNS: &str = "number,measurement,text,quantity,value,unit,recording,volume,time,plane,settings";
+    let mut text = format!("{COLUMNS}{names}\n");
     let recording = csv_quoted(recording);
     for (n, measured) in all.iter().enumerate() {
         let made = measured.made.as_ref();
         let volume = made.map_or(String::new(), |made| made.volume.to_string());
         let time = made.and_then(|made| made.time).map_or(String::new(), |time| format!("{time:.4}"));
         let [plane, settings] = made.map_or([""; 2], |made| [&made.plane, &made.settings]).map(csv_quoted);
-        let on = format!("{recording},{volume},{time},{plane},{settings}");
+        let on = format!("{recording},{volume},{time},{plane},{settings}{}", more(n + 1));
         for Quantity { name, value, unit } in quantities(measured).unwrap_or_default() {
             let (kind, label) = (measured.title(), csv_quoted(&measured.text));
             let _ = writeln!(text, "{},{kind},{label},{name},{value:.4},{unit},{on}", n + 1);

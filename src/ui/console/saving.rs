@@ -9,6 +9,7 @@ use crate::progress_lines::Progress;
 use crate::source::live::SourceKind;
 use crate::texts;
 use crate::volume_export::{FORMATS, Job, renumbered};
+use crate::workspace::Origin;
 use std::time::SystemTime;
 
 impl Console {
@@ -78,17 +79,22 @@ impl Console {
         let shown = || self.stream.cine_position().and_then(|at| cine.get(at)).or(cine.back()).cloned();
         let volumes = if format.takes_the_loop() { self.marked_volumes() } else { shown().into_iter().collect() };
         let rate = self.cine_loop().played_rate();
+        let origin = if format.is_report() { self.numbered_origin() } else { None };
         let begun = match self.stream.header().cloned() {
+            _ if format.is_report() && origin.is_none() => Err(texts::WHY_NO_REPORT.into()),
             Some(header) if !volumes.is_empty() => {
                 let mut settings = self.controls.settings().clone();
                 let numbers: Vec<u32> = volumes.iter().map(|volume| volume.volume).collect();
-                settings.measure = renumbered(&settings.measure, &numbers);
+                if origin.is_none() {
+                    settings.measure = renumbered(&settings.measure, &numbers);
+                }
                 self.exporter.export(Job {
                     format,
                     header,
                     volumes,
                     rate,
                     settings,
+                    origin,
                     device: self.context.candidate.name.clone(),
                 })
             }
@@ -100,7 +106,16 @@ impl Console {
         }
     }
 
-    /// Handles the files whose saving has ended since the last update.
+    /// The recording that is shown with the number of the volume, if numbers of volumes are those in the recording.
+    fn numbered_origin(&self) -> Option<Origin> {
+        let origin = self.fixed.origin.clone();
+        let mut origin = origin.filter(|origin| self.fixed.plays_once && origin.recording.is_some())?;
+        let shown = self.stream.cine_position().and_then(|at| self.stream.cine().volumes().get(at));
+        origin.volume = shown.map_or(0, |kept| kept.volume as usize);
+        Some(origin)
+    }
+
+    /// Takes the files that were saved since the last update.
     pub(super) fn poll_saved(&mut self) {
         while let Some(saved) = self.exporter.poll() {
             match saved.file {

@@ -18,10 +18,9 @@ pub(crate) const RELIEF_STL: &str = "Relief to print, STL";
 pub(crate) const RELIEF_STL_HINT: &str = "The surface as the probe sees it, filled down to a flat base.";
 pub(crate) const TURNTABLE_PICTURES: &str = "Turntable, pictures";
 pub(crate) const TURNTABLE_PICTURES_HINT: &str = "A folder of 72 PNG files: one turn of the rendering as it is shown.";
-#[cfg(feature = "video")]
 pub(crate) const TURNTABLE_FILM: &str = "Turntable, film";
-#[cfg(feature = "video")]
-pub(crate) const TURNTABLE_FILM_HINT: &str = "One turn of the rendering as it is shown, as AV1 in MP4.";
+pub(crate) const TURNTABLE_FILM_HINT: &str =
+    "One turn of the rendering as it is shown, as MP4: AV1, or what the installed ffmpeg makes.";
 pub(crate) const PICTURE_1000: &str = "Picture, 1000 pixels";
 pub(crate) const PICTURE_2000: &str = "Picture, 2000 pixels";
 pub(crate) const PICTURE_4000: &str = "Picture, 4000 pixels";
@@ -29,10 +28,12 @@ pub(crate) const PICTURE_HINT: &str = "The picture as it is shown in full qualit
 pub(crate) const LOOP_PICTURES: &str = "Loop, pictures";
 pub(crate) const LOOP_PICTURES_HINT: &str =
     "A folder of PNG files: the rendering as it is shown, of each volume of the loop from its first mark to its last.";
-#[cfg(feature = "video")]
 pub(crate) const LOOP_FILM: &str = "Loop, film";
-#[cfg(feature = "video")]
-pub(crate) const LOOP_FILM_HINT: &str = "The same as AV1 in MP4, back as well if the loop plays so, at the mean rate times its speed (0.1 to 240 pictures a second).";
+pub(crate) const LOOP_FILM_HINT: &str = "The same as MP4, back as well if the loop plays so, at the mean rate times its speed (0.1 to 240 pictures a second).";
+pub(crate) const REPORT: &str = "Report, PDF";
+pub(crate) const REPORT_HINT: &str = "Every measurement with its picture, plane, volume and settings, and what identifies the recording. A JSON file beside it makes the same report again.";
+pub(crate) const WHY_NO_REPORT: &str =
+    "a report names the file of its volumes, and these are live: save the loop (Ctrl+R), and open it";
 pub(crate) fn why_export_not_started(e: impl Display) -> String {
     format!("the export cannot be started: {e}")
 }

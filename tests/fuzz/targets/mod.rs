@@ -172,6 +172,7 @@ pub const TARGETS: &[Target] = &[
         also: &[],
     },
     Target { name: "report", run: reports::error_report, text: true, memory: 64 * MIB, rounds: 30_000, also: &[] },
+    Target { name: "worksheet", run: reports::worksheet, text: true, memory: 64 * MIB, rounds: 50_000, also: &[] },
     Target { name: "profile", run: reports::profile, text: true, memory: 64 * MIB, rounds: 50_000, also: &[] },
     // A header of some bytes may claim 512 MiB, which the system provides when they are written.
     // The pictures of a stack may be as large as others.

@@ -6,9 +6,13 @@ use echolume::low_level::error_report::choose::Bound;
 use echolume::low_level::error_report::{Measure, Report, choose, export as error_export};
 use echolume::low_level::picture::Grey;
 use echolume::low_level::profile::{Profile, compare, export};
+use echolume::low_level::scene::Settings;
 #[cfg(feature = "view")]
 use echolume::low_level::ui::frame_budget::measured_ladder;
 use echolume::low_level::verify::report::{self, baseline, html as page, junit};
+use echolume::low_level::worksheet::{Sheet, html, pdf};
+use echolume::low_level::workspace::Workspace;
+use std::path::Path;
 
 pub fn error_report(bytes: &[u8]) -> String {
     let report = match Report::from_json(&String::from_utf8_lossy(bytes)) {
@@ -48,6 +52,26 @@ pub fn profile(bytes: &[u8]) -> String {
         }
         Err(error) => error.to_string(),
     }
+}
+
+/// What was read is what is written, and every form of it can be made.
+pub fn worksheet(bytes: &[u8]) -> String {
+    let sheet = match Sheet::read(&String::from_utf8_lossy(bytes)) {
+        Ok(sheet) => sheet,
+        Err(error) => return told(error),
+    };
+    let written = sheet.json().expect("JSON");
+    assert_eq!(Sheet::read(&written).expect("what was written is right"), sheet);
+    let workspace = Workspace::of_text(Path::new("report.json"), &sheet.source);
+    let settings = workspace.and_then(|workspace| workspace.layers.finish().map_err(|e| e.to_string()));
+    let (settings, outcome) = match settings {
+        Ok(settings) => (settings, String::new()),
+        Err(error) => (Settings::default(), error),
+    };
+    sheet.csv(&settings);
+    html::write(&sheet, &settings, &[]).expect("a page");
+    pdf::write(&sheet, &settings, &[]).expect("a PDF");
+    told(outcome)
 }
 
 pub fn picture(bytes: &[u8]) -> String {
