@@ -17,7 +17,7 @@ const INK: RGBColor = RGBColor(214, 221, 229);
 /// Smallest end of the scale, levels of 255. Larger ones double it.
 const LEAST_END: u16 = 16;
 /// Share of the pixels that may lie beyond the scale's end.
-const BEYOND: f64 = 0.002;
+const BEYOND: f64 = 0.01;
 /// Most tiles of a picture.
 pub const MAX_TILES: usize = 4;
 

@@ -160,7 +160,7 @@ fn faults(steps: &[Step], pictures: &Mutex<BTreeSet<String>>) -> Vec<String> {
 fn commands_of_the_tutorial_print_what_it_shows() {
     let page = std::fs::read_to_string(repository("docs/tutorial.md")).expect("the tutorial");
     let sessions = sessions(&page);
-    assert_eq!(sessions.len(), 4, "{:?}", sessions.iter().map(|(heading, _)| heading).collect::<Vec<_>>());
+    assert_eq!(sessions.len(), 6, "{:?}", sessions.iter().map(|(heading, _)| heading).collect::<Vec<_>>());
     let shown =
         page.split("](pictures/tutorial-").skip(1).map(|rest| rest.split_once(')').expect("a link").0.to_string());
     let pictures = Mutex::new(shown.collect::<BTreeSet<String>>());
