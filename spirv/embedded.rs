@@ -37,6 +37,7 @@
     ("measure/sampling", include_bytes!("measure/sampling.spv")),
     ("postprocess/assemble.plain", include_bytes!("postprocess/assemble.plain.spv")),
     ("postprocess/assemble.toned", include_bytes!("postprocess/assemble.toned.spv")),
+    ("postprocess/labels", include_bytes!("postprocess/labels.spv")),
     ("postprocess/tone", include_bytes!("postprocess/tone.spv")),
     ("preprocess/condition", include_bytes!("preprocess/condition.spv")),
     ("preprocess/cut", include_bytes!("preprocess/cut.spv")),

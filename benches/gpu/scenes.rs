@@ -5,6 +5,7 @@ use echolume::low_level::passes::{PASSES, Pass};
 use echolume::low_level::probe::{Geometry, Grid};
 use echolume::low_level::scene::Scene;
 use echolume::low_level::source::phantom::Phantom;
+use echolume::low_level::verify::built_in::labelled;
 
 /// One sweep and its scenes: how large everything is.
 pub struct Sizes {
@@ -176,6 +177,7 @@ pub const SCENES: &[Stated] = &[
         ],
         &["cut"],
     ),
+    sweep("labels, 4-up", &["layout=four", "labels.shell=0.5"], &["labels"]),
     // Through the middle of the preset's region, on the side away from the camera.
     sweep("a clip with its echoes", &["clip=[{ at = [0, 60, 0], normal = [0.3, -1, 0.2] }]"], &["raycast_cap"]),
     Stated {
@@ -217,7 +219,8 @@ impl Stated {
         let grid =
             Grid { size: [sizes.samples, sizes.lines, sizes.frames], spacing: [0.5, 1.0, 1.0], origin: [0.0; 3] };
         let geometry = if self.cartesian { Geometry::Cartesian(grid) } else { Geometry::Sweep(phantom.probe(0)) };
-        scene(geometry, &set).map_err(|e| format!("scene '{}': {e}", self.name))
+        let scene = scene(geometry, &set).map_err(|e| format!("scene '{}': {e}", self.name))?;
+        if self.passes.contains(&"labels") { labelled(scene) } else { Ok(scene) }
     }
 
     /// The passes named, each needed by the scene.

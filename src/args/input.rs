@@ -1,5 +1,6 @@
 //! Arguments of commands that render a recording: the recording, the settings of the scene in layers, the device, and checks of outputs.
 
+use super::labels::show_labels;
 use super::picture_file::STANDARD;
 use super::recording::{GeometryArgs, open_recording, recording_help};
 use super::user_files::{pipeline_folder, presets_file};
@@ -45,6 +46,9 @@ pub struct InputArgs {
     scene: SceneArgs,
     #[command(flatten)]
     geometry: GeometryArgs,
+    /// Segmentation of the recording to show with it (.seg.nrrd): outline and fill on planes, a shell in renderings [default: that of the workspace]
+    #[arg(long, value_name = "FILE")]
+    labels: Option<PathBuf>,
     /// Volume of the recording to use, counted from 0 [default: that of the workspace, otherwise 0]
     #[arg(long, value_name = "N")]
     volume: Option<usize>,
@@ -81,7 +85,10 @@ impl InputArgs {
         let volume = asked.map_or_else(|| self.volume(), Ok)?;
         let flag = if asked.is_some() { "--volumes" } else { "--volume" };
         check_volume(&*source, flag, volume, self.name())?;
-        let layers = self.layers_with(chosen)?;
+        let mut layers = self.layers_with(chosen)?;
+        if let Some(file) = self.labels()? {
+            show_labels(&mut layers, &file, &source.geometry(volume), source.world_of(volume))?;
+        }
         let mut recorded = recorded(&*source, volume);
         // The settings of a workspace are complete.
         recorded.is_completed = self.workspace()?.is_none();
@@ -112,6 +119,14 @@ impl InputArgs {
     /// Opens another recording with the flags that give the geometry of this one.
     pub fn open_another(&self, file: &Path) -> Result<Box<dyn Source>, Failure> {
         open_recording(file, self.geometry.options())
+    }
+
+    /// The segmentation to show.
+    fn labels(&self) -> Result<Option<PathBuf>, Failure> {
+        match &self.labels {
+            Some(file) => Ok(Some(file.clone())),
+            None => Ok(self.workspace()?.and_then(|(_, workspace)| workspace.origin.labels)),
+        }
     }
 
     /// Index of the volume to use, from 0: `--volume`, else that of the workspace, else 0.
@@ -170,6 +185,7 @@ impl InputArgs {
         read.extend(self.geometry.probe.clone());
         read.extend(self.input.clone().filter(|file| workspace::is_named(file)));
         read.extend(self.stored.as_ref().map(|(file, _)| file.clone()));
+        read.extend(self.labels().ok().flatten());
         read.extend(self.scene.files());
         read
     }

@@ -1,6 +1,7 @@
 //! Command-line arguments that several commands share.
 
 mod input;
+mod labels;
 mod motor;
 mod picture_file;
 mod picture_series;

@@ -1,5 +1,7 @@
 //! Arguments of commands that render live: the source of frames, and how volumes become pictures.
 
+#[cfg(feature = "view")]
+use super::labels::show_labels;
 use super::motor::{MotorArgs, PlannedSweep};
 use super::recording::{GeometryArgs, open_recording, say_probe_file};
 use crate::gpu::TimeStamps;
@@ -7,6 +9,8 @@ use crate::kiosk::config::Config;
 use crate::live::Update;
 use crate::memory;
 use crate::probe::Geometry;
+#[cfg(feature = "view")]
+use crate::scene::load::Layers;
 use crate::source::formats::described;
 use crate::source::freehand::FreehandArguments;
 use crate::source::igtl::{self, Network, NetworkOptions, Poses, SCHEME};
@@ -149,6 +153,24 @@ impl SourceArgs {
             SourceKind::Recording => self.geometry.origin(Some(self.source.clone().into())),
             SourceKind::Pipe | SourceKind::Probe => Origin::of(None),
         }
+    }
+
+    /// Adds the labels of a segmentation of this source to the settings.
+    ///
+    /// # Errors
+    /// The file is no segmentation of it, or the source is live.
+    #[cfg(feature = "view")]
+    pub fn show_labels(&self, layers: &mut Layers, file: &Path) -> Result<(), Failure> {
+        let source: Box<dyn Source> = match self.kind() {
+            SourceKind::Demo => {
+                Box::new(PhantomSource::new(Phantom::new(phantom::PhantomOptions::default()).map_err(input)?))
+            }
+            SourceKind::Recording => open_recording(self.path(), self.geometry.options())?,
+            SourceKind::Pipe | SourceKind::Probe => {
+                return Err(input("--labels: are of a recording; the volumes of this source are live"));
+            }
+        };
+        show_labels(layers, file, &source.geometry(0), source.world_of(0))
     }
 
     /// True if the recording is played only once, so that volume numbers are those of the recording.

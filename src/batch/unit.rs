@@ -209,7 +209,7 @@ impl Work {
         let name = Path::new(&self.output);
         let ends = |ending: &str| name.extension().is_some_and(|e| e == ending);
         match self.kind {
-            Kind::Convert if segmentation::is_one(name) => {
+            Kind::Convert if segmentation::is_one(name) || segmentation::is_dicom(name) => {
                 Err(input("outputs: convert of a batch makes volumes; a segmentation is made by echolume convert"))
             }
             Kind::Convert => VolumeFile::of(name).map(drop).map_err(|e| input(format!("outputs: {e}"))),

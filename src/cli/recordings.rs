@@ -5,6 +5,7 @@ use crate::files::signals::Writing;
 use crate::probe::{Geometry, Grid, Rigid, World};
 use crate::scene::default_look::block_edge;
 use crate::scene::{EchoHistogram, EchoLevels, Input, insonified_box};
+use crate::segment::files;
 use crate::source::convert::{Target, Volume, lattice, no_echo};
 use crate::source::phantom::{Body, Label, Phantom, PhantomOptions, PointSpread, Sampling, Speckle, distance_path};
 use crate::source::recorder::{Header, Writer};
@@ -101,7 +102,7 @@ pub struct Convert {
     #[arg(help = recording_help())]
     input: PathBuf,
     /// File to write: .mha, .nrrd, .nii, .nii.gz or .dcm (Enhanced US Volume) for a volume, .seq.nrrd for all volumes in time, .seg.nrrd for the voxels above --threshold as a
-    /// segmentation, .frames for every frame unchanged, .mha with --sequence
+    /// segmentation, .seg.dcm (DICOM Segmentation) of a .seg.nrrd, .frames for every frame unchanged, .mha with --sequence
     #[arg(value_name = "OUTPUT", required_unless_present = "named")]
     output: Option<PathBuf>,
     /// The file to write, as other commands take it
@@ -144,6 +145,21 @@ impl Convert {
             return Err(input(
                 "-: a volume is written to a file, whole or not at all, and the file's ending says its format",
             ));
+        }
+        if segmentation::is_dicom(self.output()) {
+            let others = [
+                ("--spacing", self.spacing.is_some()),
+                ("--volume", self.volume.is_some()),
+                ("--outside", self.outside.is_some()),
+                ("--mask", self.mask.is_some()),
+                ("--threshold", self.threshold.is_some()),
+                ("--secondary-capture", self.secondary_capture),
+                ("--sequence", self.sequence),
+            ];
+            return match others.iter().find(|(_, is_given)| *is_given) {
+                Some((flag, _)) => Err(input(format!("{flag}: a .seg.dcm has the labels of a .seg.nrrd as they are"))),
+                None => self.labels(),
+            };
         }
         let is_segmented = segmentation::is_one(self.output());
         if let Some(share) = self.threshold.filter(|share| !is_segmented || !(0.0..=1.0).contains(share)) {
@@ -193,6 +209,18 @@ impl Convert {
         say!("volume: {}, {}{missing}", self.output().display(), self.voxels(&target, &geometry));
         self.remark_others(&*recording);
         self.remark_size(&volume, &grid);
+        Ok(())
+    }
+
+    /// Writes the labels of a segmentation as DICOM.
+    fn labels(&self) -> Result<(), Failure> {
+        let output = self.output();
+        check_outputs(&[(OUTPUT, Some(output))], [&*self.input])?;
+        let (labels, segments) = files::read(&self.input, self.geometry.options()).map_err(input)?;
+        let [width, height, _] = labels.grid().size;
+        let label = |[x, y, z]: [usize; 3]| labels.voxels()[(z * height + y) * width + x];
+        segmentation::write(output, labels.grid(), labels.world(), &segments, label, || ()).map_err(failed)?;
+        say!("segmentation: {}, {} segments", output.display(), segments.len());
         Ok(())
     }
 

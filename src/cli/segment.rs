@@ -26,7 +26,7 @@ use std::path::PathBuf;
 pub struct Segment {
     #[arg(help = recording_help())]
     input: PathBuf,
-    /// Segmentation to write (.seg.nrrd), as 3D Slicer reads it: a segment for each body
+    /// Segmentation to write, a segment for each body: .seg.nrrd as 3D Slicer reads it, or .seg.dcm (DICOM Segmentation)
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// Level of the surface, 0..1 of the sample range as volume.threshold; auto: half of the step between the two classes next to it
@@ -88,8 +88,8 @@ fn place(text: &str) -> Result<DVec3, String> {
 
 impl Segment {
     pub fn run(&self) -> Result<(), Failure> {
-        if !segmentation::is_one(&self.output) {
-            return Err(input(format!("{}: must end in .seg.nrrd", self.output.display())));
+        if !segmentation::is_one(&self.output) && !segmentation::is_dicom(&self.output) {
+            return Err(input(format!("{}: must end in .seg.nrrd or .seg.dcm", self.output.display())));
         }
         let mesh_file = self.stl.as_deref().map(|file| MeshFile::of(file).map(|format| (file, format)));
         let mesh_file = mesh_file.transpose().map_err(input)?;

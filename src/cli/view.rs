@@ -40,6 +40,9 @@ pub struct View {
     files: Vec<PathBuf>,
     #[command(flatten)]
     source: SourceArgs,
+    /// Segmentation of the recording to show with it (.seg.nrrd): outline and fill on planes, a shell in renderings [default: that of the workspace]
+    #[arg(long, value_name = "FILE", conflicts_with = "config")]
+    labels: Option<PathBuf>,
     #[command(flatten)]
     scene: SceneArgs,
     /// What was opened in the window since.
@@ -284,7 +287,7 @@ impl View {
 
     /// The configuration of the console from the flags alone.
     fn config_from_flags(&self) -> Result<ConsoleConfig, Failure> {
-        let Shown { source, workspace, is_given } = match self.opened.shown() {
+        let Shown { source, workspace, labels, is_given } = match self.opened.shown() {
             Some(shown) => shown,
             None => Shown::of(&self.source, self.files.first().map(PathBuf::as_path))?,
         };
@@ -292,12 +295,18 @@ impl View {
             super::stream::check_record(file, source.path())?;
         }
         let is_complete = workspace.is_some();
-        let layers = match workspace {
+        let mut layers = match workspace {
             // The flags are about what the program was started with.
             Some(layers) if !is_given => layers,
             Some(layers) => self.scene.layers_over(layers, &[])?,
             None => self.scene.layers(source.is_phantom(), &[])?,
         };
+        let labels = self.labels.clone().filter(|_| is_given).or(labels);
+        if let Some(file) = &labels {
+            source.show_labels(&mut layers, file)?;
+        }
+        let mut origin = source.origin();
+        origin.labels = labels.map(|file| std::path::absolute(&file).unwrap_or(file));
         let options = ConsoleOptions {
             settings: layers.clone().finish().map_err(input)?,
             stream: StreamOptions {
@@ -307,7 +316,7 @@ impl View {
                 cine: CineLimits { volumes: self.cine as usize, bytes: (self.cine_memory as usize) << 20 },
                 ..StreamOptions::default()
             },
-            origin: Some(source.origin()),
+            origin: Some(origin),
             plays_once: source.plays_once(),
             opening: OpeningOptions { recent: recent_list().filter(|_| !self.kiosk), ..OpeningOptions::default() },
             first_steps: first_steps().filter(|_| !self.kiosk && !self.no_ui && !self.no_panels),

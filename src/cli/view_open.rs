@@ -9,7 +9,7 @@ use crate::terminal::{Failure, input};
 use crate::ui::console::Opened;
 use crate::ui::recordings::OpenRecordings;
 use crate::workspace::{self, Workspace};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard};
 
 /// A source that the viewer shows, and the settings of the workspace that named it, if there was one.
@@ -17,6 +17,8 @@ use std::sync::{Arc, Mutex, MutexGuard};
 pub struct Shown {
     pub source: SourceArgs,
     pub workspace: Option<Layers>,
+    /// The segmentation that it names.
+    pub labels: Option<PathBuf>,
     /// True if the source was given on the command line, so that its flags apply.
     pub is_given: bool,
 }
@@ -28,10 +30,11 @@ impl Shown {
         if workspace::is_named(named) {
             let workspace = Workspace::read(named).map_err(input)?;
             let source = source.of_workspace(named, &workspace)?;
-            return Ok(Shown { source, workspace: Some(workspace.layers), is_given: true });
+            let labels = workspace.origin.labels;
+            return Ok(Shown { source, workspace: Some(workspace.layers), labels, is_given: true });
         }
         let source = file.map_or_else(|| source.clone(), |file| source.at_file(file));
-        Ok(Shown { source, workspace: None, is_given: true })
+        Ok(Shown { source, workspace: None, labels: None, is_given: true })
     }
 
     /// The source for a recording or a workspace that was opened in the window. The geometry flags of the command line do not apply to it.

@@ -286,7 +286,10 @@ impl Faults {
             let [width, height] = scene.frame_size().map(|n| n as usize);
             let frames = bytes.chunks_mut(width * height * slot.format(scene).texel_bytes());
             frames.for_each(|frame| self.frame(scene, frame));
-        } else if self.change.get().is_some() && matches!(slot.initializer(), Initializer::ByScene(_)) {
+        } else if self.change.get().is_some()
+            && slot.format(scene).channel_bytes() == 4
+            && matches!(slot.initializer(), Initializer::ByScene(_))
+        {
             let values = bytemuck::pod_collect_to_vec(&bytes);
             bytes = bytemuck::cast_slice(&self.table(slot, scene, values)).to_vec();
         }

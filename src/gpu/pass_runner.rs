@@ -10,7 +10,7 @@ use super::formats::{self, TexelAccess};
 use super::pipelines::{Pipeline, Pipelines, Prepared, embedded};
 use super::resources::SlotResources;
 use super::timing::TimeStamps;
-use crate::passes::slots::{Initializer, Shape};
+use crate::passes::slots::{Initializer, encoded};
 use crate::passes::{Arrays, Bind, DispatchArgs, Frequency, Part, Pass, Slot, Texels};
 use crate::plan::Plan;
 use crate::scene::Scene;
@@ -239,7 +239,7 @@ impl PassTimer {
             let given = given.map(|(_, t)| t.stored_part(slot, &self.scene).encode(slot.format(&self.scene)));
             let bytes = match (given, slot.initializer()) {
                 (Some(bytes), _) => bytes,
-                (None, Initializer::ByScene(make)) => bytemuck::cast_slice(&make(&self.scene)).to_vec(),
+                (None, Initializer::ByScene(make)) => encoded(slot.format(&self.scene), &make(&self.scene)),
                 _ => continue,
             };
             let Some(image) = self.slots.image(slot, copy) else { continue };
@@ -316,10 +316,8 @@ fn input(scene: &Scene, bind: &Bind, inputs: &Arrays) -> Option<Vec<u8>> {
     if let Some((_, texels)) = inputs.iter().find(|(name, _)| *name == bind.name) {
         return Some(texels.stored_part(bind.slot, scene).encode(format));
     }
-    match (bind.slot.initializer(), bind.slot.shape(scene)) {
-        (Initializer::ByScene(make), Shape::Two(_) | Shape::Buffer(_)) => {
-            Some(bytemuck::cast_slice(&make(scene)).to_vec())
-        }
+    match bind.slot.initializer() {
+        Initializer::ByScene(make) => Some(encoded(format, &make(scene))),
         _ => None,
     }
 }

@@ -2,12 +2,16 @@
 
 use crate::base_files::InputError;
 use crate::labels::Labels;
+use crate::lattice;
+use crate::memory;
 use crate::mesh::Mesh;
 use crate::mesh::nets::{Surface, surface_net};
 use crate::mesh::smooth::Smoother;
 use crate::probe::{Geometry, World};
+use crate::scene::LabelVolume;
 use crate::source::segmentation::{self, Segment};
 use crate::source::{self, OpenOptions};
+use glam::DAffine3;
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -49,7 +53,9 @@ pub fn read(path: &Path, options: OpenOptions) -> Result<(Labels, Vec<Segment>),
         return Err(fault(format!("are numbers of {bytes} bytes, must be bytes")));
     }
     let world = recording.world_of(0).unwrap_or(World::of(&grid));
-    let mut voxels = Vec::with_capacity(grid.size.iter().product());
+    let count = lattice::voxels(&grid).map_err(fault)?;
+    memory::check(count as u64).map_err(|why| fault(format!("take memory: a label volume {why}")))?;
+    let mut voxels = Vec::with_capacity(count);
     for _ in 0..grid.size[2] {
         match recording.next_frame()? {
             Some(frame) => voxels.extend(frame.bytes),
@@ -57,6 +63,31 @@ pub fn read(path: &Path, options: OpenOptions) -> Result<(Labels, Vec<Segment>),
         }
     }
     Ok((Labels::of(grid, world, voxels).map_err(fault)?, segments))
+}
+
+/// The labels as a scene of a volume shows them, in the colours of their segments. `world`: where the volume is, if it says so; otherwise the labels are in
+/// its own coordinates.
+///
+/// # Errors
+/// One line: there are none, too many, or all of them are beside the volume.
+pub fn shown(
+    labels: &Labels,
+    segments: &[Segment],
+    geometry: &Geometry,
+    world: Option<World>,
+) -> Result<LabelVolume, String> {
+    let own = labels.world();
+    let to_world = DAffine3::from_cols(own.axis(0), own.axis(1), own.axis(2), own.origin());
+    let to_space = match (geometry, world) {
+        (Geometry::Cartesian(grid), Some(world)) => world.pose(grid).inverse() * to_world,
+        _ => to_world,
+    };
+    let colour = |label: u8| segments.iter().find(|segment| segment.label == label).map(|segment| segment.colour);
+    let volume = LabelVolume::new(labels.grid().size, labels.voxels(), to_space, colour)?;
+    match volume.overlaps(geometry) {
+        true => Ok(volume),
+        false => Err("are beside the volume: they belong to another recording, or to other coordinates".into()),
+    }
 }
 
 /// The closed surface around the voxels of a label, in the world, mm. A Gaussian of one voxel smooths the steps; the surface encloses as many

@@ -22,7 +22,7 @@ pub mod sections;
 pub mod volume;
 
 use echolume_base::{files as base_files, memory, statistics};
-use echolume_core::mesh;
+use echolume_core::{mesh, scene};
 use {echolume_probe as probe, echolume_source as source};
 
 pub use field::{Field, Scale};

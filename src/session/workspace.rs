@@ -33,6 +33,9 @@ pub struct Origin {
     /// Index of the volume that was shown, from 0.
     #[serde(default)]
     pub volume: usize,
+    /// The segmentation that is shown with it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub labels: Option<PathBuf>,
     /// Path of the probe file that was given with `--probe`; None if it was not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub probe: Option<PathBuf>,
@@ -104,7 +107,7 @@ impl Workspace {
             return Err(fault(&format!("[workspace] is of version {version}, this program reads version {VERSION}")));
         }
         let folder = path.parent().unwrap_or(Path::new(""));
-        for file in [&mut origin.recording, &mut origin.probe].into_iter().flatten() {
+        for file in [&mut origin.recording, &mut origin.labels, &mut origin.probe].into_iter().flatten() {
             if file.as_os_str() != PHANTOM {
                 *file = folder.join(&*file);
             }

@@ -267,7 +267,7 @@ impl Volume {
     /// # Errors
     /// As [`Volume::write`].
     pub fn write_mask(&self, target: &Target, path: &Path) -> Result<(), InputError> {
-        if segmentation::is_one(path) {
+        if segmentation::is_one(path) || segmentation::is_dicom(path) {
             let segment = Segment { label: 1, name: "insonified".into(), colour: [0.4, 0.6, 0.8] };
             let label = |voxel| u8::from(self.value(target, voxel).is_some());
             return segmentation::write(path, &target.grid, &target.world, &[segment], label, || ());

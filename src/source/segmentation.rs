@@ -1,6 +1,7 @@
 //! Label volumes with the names of their labels: NRRD segmentations (`.seg.nrrd`) in the form of 3D Slicer, one layer of bytes packed by
 //! gzip. A file is complete or absent.
 
+use super::dicom;
 use super::nrrd;
 use super::volume_file::{self, nrrd_axes, three};
 use crate::files::{InputError, Unfinished};
@@ -16,6 +17,8 @@ use std::path::Path;
 
 /// The end of a file's name.
 const ENDING: &str = ".seg.nrrd";
+/// The end of the name of one in DICOM, which is written alone.
+const DICOM_ENDING: &str = ".seg.dcm";
 
 /// A segment of a label volume: its label, its name, and its colour (red, green, blue, 0..=1).
 #[derive(Clone, Debug, PartialEq)]
@@ -28,6 +31,11 @@ pub struct Segment {
 /// True if a file name has the ending of a segmentation, `.seg.nrrd`.
 pub fn is_one(path: &Path) -> bool {
     stem(path).is_some()
+}
+
+/// True if a file name has the ending of a DICOM segmentation that is written, `.seg.dcm`.
+pub fn is_dicom(path: &Path) -> bool {
+    volume_file::stem(path, DICOM_ENDING).is_some()
 }
 
 /// The name of a segmentation's file without the ending `.seg.nrrd`; None if it has another ending.
@@ -57,6 +65,12 @@ pub fn write(
     label: impl Fn([usize; 3]) -> u8 + Sync,
     each: impl Fn(),
 ) -> Result<(), InputError> {
+    if is_dicom(path) {
+        let named: Vec<_> = segments.iter().map(|s| (s.label, s.name.as_ref(), s.colour)).collect();
+        dicom::segments::write(path, grid.size, world, &named, label)?;
+        (0..grid.size[2]).for_each(|_| each());
+        return Ok(());
+    }
     let write = || -> io::Result<()> {
         let mut file = Unfinished::create(path)?;
         file.write_all(header(grid.size, world, segments).as_bytes())?;
@@ -138,5 +152,52 @@ mod tests {
         flate2::read::GzDecoder::new(&bytes[end..]).read_to_end(&mut labels).expect("unpacked");
         assert_eq!(labels[..12], [2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 2, 0]);
         assert_eq!((labels.len(), labels[12]), (24, 7));
+    }
+
+    /// Prevents elements that readers of DICOM segmentations need from being lost, and bits in another order.
+    #[test]
+    fn a_dicom_segmentation_has_a_frame_for_each_slice_of_a_segment() {
+        let path = std::env::temp_dir().join(format!("echolume-{}.seg.dcm", std::process::id()));
+        let grid = Grid { size: [5, 3, 4], spacing: [0.5, 1.0, 2.0], origin: [-3.0, 7.0, 0.0] };
+        let segments = [
+            Segment { label: 2, name: "two".into(), colour: [1.0, 0.5, 0.0] },
+            Segment { label: 7, name: "seven".into(), colour: [0.0; 3] },
+        ];
+        let label = |[x, y, z]: [usize; 3]| match z {
+            1 if x == y => 2,
+            2 => [2, 7, 0, 7, 9][x],
+            3 if x + y > 3 => 7,
+            _ => 0,
+        };
+        write(&path, &grid, &World::of(&grid), &segments, label, || ()).expect("written");
+        let bytes = std::fs::read(&path).expect("read");
+        let _ = std::fs::remove_file(&path);
+        let find = |element: &[u8]| bytes.windows(element.len()).position(|w| w == element);
+        for element in [
+            &b"\x02\0\x02\0UI\x1c\01.2.840.10008.5.1.4.1.1.66.4"[..],
+            b"\x08\0\x60\0CS\x04\0SEG ",
+            b"\x28\0\x08\0IS\x02\04 ",
+            b"\x28\0\x10\0US\x02\0\x03\0",
+            b"\x28\0\x11\0US\x02\0\x05\0",
+            b"\x28\0\0\x01US\x02\0\x01\0",
+            b"\x62\0\x01\0CS\x06\0BINARY",
+            b"\x62\0\x04\0US\x02\0\x02\0\x62\0\x05\0LO\x06\0seven ",
+            b"\x28\0\x30\0DS\x06\x001\\0.5 ",
+            // The second segment on the fourth slice.
+            b"\x20\0\x32\0DS\x06\0-3\\7\\6",
+        ] {
+            assert!(find(element).is_some(), "no {}", element.escape_ascii());
+        }
+        let at = find(b"\xe0\x7f\x10\0OB\0\0\x08\0\0\0").expect("samples") + 12;
+        let bit = |n: usize| bytes[at + n / 8] >> (n % 8) & 1 == 1;
+        assert_eq!(bytes.len(), at + 8);
+        for (frame, (own, z)) in [(2, 1), (2, 2), (7, 2), (7, 3)].into_iter().enumerate() {
+            for (x, y) in (0..3).flat_map(|y| (0..5).map(move |x| (x, y))) {
+                let is_there = bit(frame * 15 + y * 5 + x);
+                assert_eq!(is_there, label([x, y, z]) == own, "frame {frame}: {x}, {y}");
+            }
+        }
+        let none = write(&path, &grid, &World::of(&grid), &segments, |_| 9, || ()).expect_err("no label");
+        assert!(none.to_string().contains("no voxel with a label") && !path.exists(), "{none}");
     }
 }

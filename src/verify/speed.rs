@@ -11,7 +11,7 @@ use crate::scene::{Sampling, Scene};
 
 /// Scenes that together need every pass, with pictures as large as a tile of a small display. A pass is timed in the first scene that
 /// needs it.
-const SCENES: [&str; 23] = [
+const SCENES: [&str; 24] = [
     "mode = 'sr'",
     "mode = 'vr'",
     "mode = 'vr'\nlight = { volume = {} }",
@@ -37,6 +37,7 @@ const SCENES: [&str; 23] = [
     "mode = 'sr'\nslices = { perona_malik = { scheme = 'rkl1', step = 2.0, repeat = 1 } }",
     ALL_FILTERS,
     "mode = 'vr'\nclip = [{ at = [0, 30, 0], normal = [0.3, -1, 0.2] }]",
+    "mode = 'sr'\nlayout = 'four'\nlabels = { shell = 0.5 }",
 ];
 
 fn probe() -> Probe {

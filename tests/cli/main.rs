@@ -16,6 +16,7 @@ mod features;
 mod filter;
 mod frames;
 mod inputs;
+mod labels;
 mod locks;
 mod memory;
 mod mesh;

@@ -10,7 +10,7 @@ const CENTRE: [f64; 3] = [3.0, -2.0, 11.0];
 const VOLUME: f64 = 4.0 / 3.0 * std::f64::consts::PI * 0.729;
 
 /// A ball of 0.8 in 0.1, or the other way round, as linear floats with an edge of a voxel. The axes of the file may be left-handed.
-fn ball(folder: &Folder, name: &str, is_dark: bool, hand: f64) -> String {
+pub fn ball(folder: &Folder, name: &str, is_dark: bool, hand: f64) -> String {
     let (size, spacing) = ([44, 40, 42], [0.7, 0.8, 0.75]);
     let origin = [CENTRE[0] - 15.0, CENTRE[1] - 15.6, CENTRE[2] - 15.4 * hand];
     let mut samples = Vec::new();

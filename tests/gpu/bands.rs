@@ -6,6 +6,7 @@ use echolume::low_level::passes::{DispatchArgs, Frequency, PASSES, Slot, Texels,
 use echolume::low_level::probe::{Axis, Geometry, Probe};
 use echolume::low_level::queues::oracle::Event;
 use echolume::low_level::scene::Scene;
+use echolume::low_level::verify::built_in::labelled;
 use std::collections::BTreeMap;
 use std::sync::atomic::Ordering;
 
@@ -13,7 +14,7 @@ use std::sync::atomic::Ordering;
 const INVOCATIONS: u64 = 64;
 
 /// Together they need every pass, each with several rows of workgroups.
-const SCENES: [&str; 19] = [
+const SCENES: [&str; 20] = [
     ALL_FILTERS,
     "mode = 'vr'\nray = { brick = 4 }\nfloating = 5.0",
     "mode = 'vr'\ncuts = [{ contour = [[-8, -6], [9, -5], [3, 9]], view = { at = [0, 20, 0], direction = [0.2, 1, 0], up = [0, 0, 1] } }]",
@@ -28,6 +29,7 @@ const SCENES: [&str; 19] = [
     "mode = 'orthogonal'",
     "mode = 'orthogonal'\npost = { floats = true }",
     "mode = 'cube'",
+    "mode = 'sr'\nlayout = 'four'\nlabels = { shell = 0.5 }",
     "mode = 'mixed'\nlayout = 'four'\nplanes = { smooth = { lateral = 1.0, depth = 1.0, elevation = 1.0 } }",
     "mode = 'sr'\nlayout = 'pair'",
     "mode = 'sr'\nlight = { shadow = {}, occlusion = {}, skin = {} }\nslices = { smooth = { elevation = 1.0 } }\n\
@@ -48,6 +50,9 @@ fn band_scenes() -> Vec<Scene> {
     };
     let build = |toml: &&str| {
         let mut built = scene(Geometry::Sweep(probe.clone()), BYTES, toml);
+        if toml.contains("labels") {
+            built = labelled(built).expect("labels");
+        }
         built.settings.picture.size = [84, 76];
         built.settings.slices.pixels = 200;
         Scene::new(built.geometry, built.input, built.settings).expect("scene")

@@ -33,6 +33,7 @@ mod goldens;
 mod growth;
 mod half_resolution;
 mod known_answers;
+mod labels;
 #[cfg(feature = "view")]
 mod ladder;
 mod light_volume;

@@ -10,6 +10,7 @@ use echolume::low_level::probe::{Advance, Axis, Geometry, Motion, Probe};
 use echolume::low_level::scene::Scene;
 use echolume::low_level::shader_source;
 use echolume::low_level::spirv;
+use echolume::low_level::verify::built_in::labelled;
 use sha2::{Digest, Sha256};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -388,6 +389,9 @@ fn scenes() -> Vec<Scene> {
             "mode = 'mixed'\nclip = [{ at = [0, 0, 0], normal = [1, 0, 0] }]",
         ] {
             scenes.push(scene(geometry.clone(), BYTES, sections));
+        }
+        for labels in ["mode = 'sr'\nlayout = 'four'", "mode = 'mip'", "mode = 'orthogonal'"] {
+            scenes.push(labelled(scene(geometry.clone(), BYTES, labels)).expect("labels"));
         }
     }
     // Values that a filter cannot read from the frames.

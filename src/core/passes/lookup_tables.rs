@@ -1,7 +1,7 @@
 //! Tables that the CPU computes from the scene in f64, so that shaders need not compute them for every sample.
 
 use crate::probe::{Advance, Array, Axis, Geometry, Motion, Probe};
-use crate::scene::{Bricks, Reach, Scene, Side, self_attenuation, transfer};
+use crate::scene::{Bricks, LabelVolume, Reach, Scene, Side, self_attenuation, transfer};
 use rayon::prelude::*;
 
 pub(super) fn floats(values: impl IntoIterator<Item = f64>) -> Vec<f32> {
@@ -235,6 +235,32 @@ pub(super) fn curve_table(scene: &Scene) -> Vec<f32> {
         section.origin = scene.to_local(section.origin);
     }
     floats(tiling.column_table(scene.settings.planes.thickness))
+}
+
+/// The labels of the box that holds them, 255ths.
+pub(super) fn label_ids(scene: &Scene) -> Vec<f32> {
+    shares(scene.labels().map_or(&[0], LabelVolume::ids))
+}
+
+/// The share of the surroundings of each voxel of that box that has a label.
+pub(super) fn label_cover(scene: &Scene) -> Vec<f32> {
+    shares(scene.labels().map_or(&[0], LabelVolume::cover))
+}
+
+fn shares(bytes: &[u8]) -> Vec<f32> {
+    bytes.iter().map(|byte| f32::from(*byte) / 255.0).collect()
+}
+
+/// The colour of each label.
+pub(super) fn label_colours(scene: &Scene) -> Vec<f32> {
+    let colours = scene.labels().map_or(&[][..], LabelVolume::colours);
+    let entry = |n: usize| colours.get(n).map_or([0.0; 4], |[r, g, b]| [*r as f32, *g as f32, *b as f32, 1.0]);
+    (0..256).flat_map(entry).collect()
+}
+
+/// True if two scenes show other labels.
+pub(super) fn labels_differ(old: &Scene, new: &Scene) -> bool {
+    old.labels().is_some() != new.labels().is_some() || old.settings.labels.volume != new.settings.labels.volume
 }
 
 /// The half-spaces of the block of mode cube, four floats each: the outward normal n and the limit w of dot(n, p) <= w, for p relative to

@@ -46,6 +46,7 @@ pub mod raycast {
     pub mod volume;
 }
 pub mod empty_space;
+pub mod labels;
 pub mod light_volume;
 pub mod postprocess;
 pub mod preprocess;
@@ -128,6 +129,7 @@ pub const PASSES: &[Pass] = &[
     filter::perona_malik::PICTURE,
     filter::aos::PICTURE,
     postprocess::TONE,
+    labels::PASS,
 ];
 
 /// A measured interval on the device or the host. `begin` and `end` are ns since the timing of the renderer began.

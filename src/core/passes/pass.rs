@@ -1,8 +1,8 @@
 //! What a pass declares: one compute dispatch, its slots, numbers and reference. The files of the passes import this module
 //! and no list of passes; what follows from a pass's place in [`PASSES`](super::PASSES) is in [`chain`](super::chain).
 
-pub(super) use super::slots::composited_beside_surface;
 pub use super::slots::{Found, Search, Slot, rendered};
+pub(super) use super::slots::{composited_beside_surface, toned_slot};
 pub use super::texels::{Arrays, Texels};
 use crate::scene::{MAX_DEVIATION, Scene};
 use glam::DVec3;

@@ -27,7 +27,7 @@ pub const TONE: Pass = Pass {
         reads.extend(s.draws_lines().then_some(whole("tiles", Slot::Tiles)));
         reads
     },
-    writes: |_, _| vec![whole("screen", Slot::Screen)],
+    writes: |s, _| vec![whole("screen", toned_slot(s))],
     extent: picture_extent,
     repeat: once,
     params: |s, _| {
@@ -235,7 +235,7 @@ pub(crate) const ASSEMBLE_TONED: Pass = Pass {
         reads.extend(s.draws_lines().then_some(whole("tiles", Slot::Tiles)));
         reads
     },
-    writes: |_, _| vec![whole("screen", Slot::Screen)],
+    writes: |s, _| vec![whole("screen", toned_slot(s))],
     params: |s, _| tone_and_lines_params(s, assemble_params(s)),
     constants: |s, _| [assemble_constants(s), tone_and_lines_constants(s)].concat(),
     tolerance: Tolerance {

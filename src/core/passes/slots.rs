@@ -480,6 +480,18 @@ slots! {
     PictureShares = D::image("picture_shares", per_pixel, |_| Format::R32f).of(GREY, "share, 0..1");
     PictureForward = D::image("picture_forward", per_pixel, |_| Format::Rgba32f).of(COLOUR, "share, 0..1");
     PictureRows = D::image("picture_rows", per_pixel, |_| Format::Rgba32f).of(COLOUR, "share, 0..1");
+    /// The labels of a scene that shows them, in the box that holds them all, and the share of the surroundings of each voxel that has one.
+    Labels = D::image("labels", per_label, |_| Format::R8).by_scene(lookup_tables::label_ids, By(lookup_tables::labels_differ))
+        .of(GREY, "number of the label / 255; 0 is none");
+    LabelCover = D::image("label_cover", per_label, |_| Format::R8).by_scene(lookup_tables::label_cover, By(lookup_tables::labels_differ))
+        .of(GREY, "share of the surroundings of a voxel that has a label, above 0.5 where the voxel has one");
+    LabelColours = D::table("label_colours", |_| Shape::Buffer(16 * 256), lookup_tables::label_colours, By(lookup_tables::labels_differ))
+        .of(COLOUR, "share, 0..1");
+    /// The result before labels are laid over it.
+    Unlabelled = D::image("unlabelled", per_pixel, |s| match s.window_texels {
+        WindowTexels::Deep => Format::Rgba16f,
+        _ => Format::Rgba8,
+    }).of(COLOUR, "share, 0..1");
     /// The result: 8 bits a channel, or the format of the window.
     Screen = D::image("screen", per_pixel, |s| match s.window_texels {
         WindowTexels::Rgba8 => Format::Rgba8,
@@ -579,6 +591,11 @@ fn curve_columns(scene: &Scene) -> Shape {
 
 fn per_pixel(scene: &Scene) -> Shape {
     Shape::Two(scene.picture_size())
+}
+
+/// A voxel where there are no labels.
+fn per_label(scene: &Scene) -> Shape {
+    Shape::Three(scene.labels().map_or([1; 3], |labels| labels.size().map(|n| n as u32)))
 }
 
 /// What look-up tables follow from besides the geometry.
@@ -704,6 +721,11 @@ pub fn rendered(scene: &Scene) -> Slot {
     if scene.assembles() { Slot::Rendered } else { Slot::Picture }
 }
 
+/// The slot of the picture in 8 bits: the result itself, unless labels are laid over it.
+pub(super) fn toned_slot(scene: &Scene) -> Slot {
+    if scene.labels().is_some() { Slot::Unlabelled } else { Slot::Screen }
+}
+
 /// The slot of volume-rendered whole rays that are composited next to a surface or give it its colour. It is the volume layer, unless that holds what
 /// lies behind the surface.
 pub(super) fn composited_beside_surface(scene: &Scene) -> Slot {
@@ -760,6 +782,14 @@ impl Format {
 
     pub fn texel_bytes(self) -> usize {
         self.channels() * self.channel_bytes()
+    }
+}
+
+/// Values that the CPU computed from a scene, as texels of a format: bits of floats, or 8 bits of 0..1.
+pub fn encoded(format: Format, values: &[f32]) -> Vec<u8> {
+    match format {
+        Format::R8 => values.iter().map(|value| (value * 255.0).round() as u8).collect(),
+        _ => bytemuck::cast_slice(values).to_vec(),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::file_version::FileVersion;
 use super::look::is_look;
-use super::{Settings, TransferPoint};
+use super::{Settings, SharedLabels, TransferPoint};
 use crate::files;
 use crate::text::printable;
 use crate::tree::{self, Fault, NodeError};
@@ -56,12 +56,20 @@ pub struct Layers {
     presets: Vec<String>,
     /// The paths of the values that other layers than presets give.
     given: BTreeSet<String>,
+    /// The labels that are shown, which are in no table.
+    labels: Option<SharedLabels>,
 }
 
 impl Layers {
+    /// Adds labels to the settings.
+    pub fn show_labels(&mut self, labels: SharedLabels) {
+        self.labels = Some(labels);
+    }
+
     /// One layer that holds all of `settings`. Empty if they cannot be written as TOML.
     pub fn of(settings: &Settings) -> Option<Layers> {
-        settings.to_table().ok().map(|merged| Layers { merged, ..Layers::default() })
+        let labels = settings.labels.volume.clone();
+        settings.to_table().ok().map(|merged| Layers { merged, labels, ..Layers::default() })
     }
 
     /// These layers with those of `over` on top. The result keeps presets and given values of `over` only.
@@ -71,7 +79,7 @@ impl Layers {
         for path in over.given.iter().filter(|path| !holds(&over.merged, path)) {
             remove(&mut self.merged, path);
         }
-        Layers { presets: over.presets.clone(), given: over.given.clone(), ..self }
+        Layers { presets: over.presets.clone(), given: over.given.clone(), labels: over.labels.clone(), ..self }
     }
 
     /// The names of the presets that were added, in their order.
@@ -208,7 +216,9 @@ impl Layers {
     }
 
     fn settings(&self) -> Result<Settings, NodeError> {
-        Settings::from_table(self.merged.clone())
+        let mut settings = Settings::from_table(self.merged.clone())?;
+        settings.labels.volume.clone_from(&self.labels);
+        Ok(settings)
     }
 
     pub fn finish(self) -> Result<Settings, LoadError> {
@@ -222,7 +232,9 @@ pub fn rebase(current: &Settings, before: &Settings, after: &Settings) -> Option
     let table = |settings: &Settings| settings.to_table().ok();
     let mut rebased = table(current)?;
     rebase_table(&mut rebased, &table(before)?, &table(after)?);
-    Settings::from_table(rebased).ok()
+    let mut rebased = Settings::from_table(rebased).ok()?;
+    rebased.labels.volume.clone_from(&current.labels.volume);
+    Some(rebased)
 }
 
 fn rebase_table(current: &mut Table, before: &Table, after: &Table) {

@@ -1,5 +1,5 @@
 //! The look of a scene: its mode, filters, transfer function, light and tone. It excludes what belongs to one examination: region, camera,
-//! positions of planes, clip planes, cuts, marks, measurements, body marks and the cine loop. A user preset keeps a look.
+//! positions of planes, clip planes, cuts, labels, marks, measurements, body marks and the cine loop. A user preset keeps a look.
 
 use super::{Cap, Cube, Planes, Projection, Region, Settings, Slices, Surface, Volume};
 
@@ -29,6 +29,7 @@ const OF_EXAMINATION: &[&str] = &[
     "cube.tilt",
     "slices.everything",
     "slices.still",
+    "labels",
     "marks",
     "measure",
     "body_marks",
@@ -69,6 +70,7 @@ impl Settings {
             },
             cube: Cube { inset: kept.cube.inset, tilt: kept.cube.tilt, ..look.cube },
             slices: Slices { everything: kept.slices.everything, still: kept.slices.still, ..look.slices },
+            labels: kept.labels,
             marks: kept.marks,
             measure: kept.measure,
             body_marks: kept.body_marks,
@@ -126,6 +128,7 @@ mod tests {
                 "cube.tilt.left=[8,9]",
                 "slices.everything=true",
                 "slices.still=true",
+                "labels={fill=0.4,outline=false,shell=0.6,behind=0.1}",
                 "marks.bar=true",
                 "samples.range=[0,100]",
                 "unveil={enabled=true,offset=3,smoothing=4}",

@@ -18,7 +18,7 @@ use super::pipelines::{Pipeline, Shaders, embedded};
 use super::resources::SlotResources;
 use super::scene_compiler::SceneCompiler;
 use super::timing::TimeStamps;
-use crate::passes::slots::{Format, Initializer};
+use crate::passes::slots::{Format, Initializer, encoded};
 use crate::passes::{DispatchArgs, Frequency, PassTime, Slot, Span, Stage, Texels};
 use crate::plan::{Contents, Plan, Rerun, Step};
 use crate::queues::MAX_QUEUES;
@@ -216,7 +216,8 @@ impl Renderer {
             return Ok(());
         }
         let values = self.context.faults.table(slot, scene, make(scene));
-        self.drawing.upload(&mut self.queues, &self.slots, slot, bytemuck::cast_slice(&values))
+        let texels = encoded(slot.format(scene), &values);
+        self.drawing.upload(&mut self.queues, &self.slots, slot, &texels)
     }
 
     /// An error if the last change of scene failed, or if there is no such volume image.

@@ -16,6 +16,7 @@ mod palette;
 mod placed;
 mod planes;
 mod regions;
+pub(super) mod segments;
 mod series;
 mod tags;
 mod volume;

@@ -18,11 +18,11 @@ const ENHANCED_VOLUME: &str = "1.2.840.10008.5.1.4.1.1.6.2";
 const CAPTURE: &str = "1.2.840.10008.5.1.4.1.1.7.2";
 const EXPLICIT_LITTLE_ENDIAN: &str = "1.2.840.10008.1.2.1";
 /// Names of this program in a file.
-const NAME: &str = "Echolume";
+pub(super) const NAME: &str = "Echolume";
 /// Offset of the length of the file meta information, and of the first byte that it counts.
 const META_LENGTH_AT: usize = 140;
 const META_BEGIN: usize = 144;
-const PIXEL_DATA: Tag = 0x7fe0_0010;
+pub(super) const PIXEL_DATA: Tag = 0x7fe0_0010;
 /// Largest number of bytes of pixels in a file: the largest even length of 32 bits, of which the value of all ones means "not stated".
 pub(in super::super) const MOST_BYTES: u64 = 0xffff_fffe;
 
@@ -45,7 +45,7 @@ pub(in super::super) struct DicomWriter {
 
 /// The identifiers of a file. Each has a value of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Identifier {
+pub(super) enum Identifier {
     Instance,
     Study,
     Series,
@@ -73,7 +73,11 @@ impl DicomWriter {
     /// # Errors
     /// Those of writing.
     pub fn create(file: Unfinished, size: [usize; 3], world: &World, form: Form) -> io::Result<DicomWriter> {
-        let header = Header::new(size, world, form);
+        DicomWriter::begin(file, Header::new(size, world, form))
+    }
+
+    /// Begins a file with these elements, of which the last is the head of the samples.
+    pub(super) fn begin(file: Unfinished, header: Header) -> io::Result<DicomWriter> {
         let mut writer = DicomWriter { file, digest: Sha256::new(), identifiers: header.identifiers, bytes: 0 };
         writer.file.write_all(&header.bytes)?;
         writer.digest.update(&header.bytes);
@@ -112,14 +116,14 @@ impl Write for DicomWriter {
 
 /// Elements one after another, in the order of their tags.
 #[derive(Default)]
-struct Header {
+pub(super) struct Header {
     bytes: Vec<u8>,
     /// Where identifiers stand.
     identifiers: Vec<(usize, Identifier)>,
 }
 
 /// A decimal number of at most 16 characters, the nearest there is.
-fn decimal(value: f64) -> String {
+pub(super) fn decimal(value: f64) -> String {
     // No negative zero.
     let value = value + 0.0;
     let plain = (0..15).map(|digits| format!("{value:.digits$}"));
@@ -129,7 +133,7 @@ fn decimal(value: f64) -> String {
     shown.min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or_default()
 }
 
-fn decimals<const N: usize>(values: [f64; N]) -> String {
+pub(super) fn decimals<const N: usize>(values: [f64; N]) -> String {
     values.map(decimal).join("\\")
 }
 
@@ -150,7 +154,7 @@ impl Header {
         header
     }
 
-    fn head(&mut self, tag: Tag, vr: &[u8; 2], length: u32) {
+    pub(super) fn head(&mut self, tag: Tag, vr: &[u8; 2], length: u32) {
         self.bytes.extend(((tag >> 16) as u16).to_le_bytes());
         self.bytes.extend((tag as u16).to_le_bytes());
         self.bytes.extend(vr);
@@ -164,12 +168,12 @@ impl Header {
         }
     }
 
-    fn value(&mut self, tag: Tag, vr: &[u8; 2], value: &[u8]) {
+    pub(super) fn value(&mut self, tag: Tag, vr: &[u8; 2], value: &[u8]) {
         self.head(tag, vr, value.len() as u32);
         self.bytes.extend(value);
     }
 
-    fn text(&mut self, tag: Tag, vr: &[u8; 2], text: &str) {
+    pub(super) fn text(&mut self, tag: Tag, vr: &[u8; 2], text: &str) {
         let mut bytes = text.as_bytes().to_vec();
         if !bytes.len().is_multiple_of(2) {
             bytes.push(if vr == b"UI" { 0 } else { b' ' });
@@ -177,15 +181,15 @@ impl Header {
         self.value(tag, vr, &bytes);
     }
 
-    fn empty(&mut self, tag: Tag, vr: &[u8; 2]) {
+    pub(super) fn empty(&mut self, tag: Tag, vr: &[u8; 2]) {
         self.value(tag, vr, &[]);
     }
 
-    fn word(&mut self, tag: Tag, value: u16) {
+    pub(super) fn word(&mut self, tag: Tag, value: u16) {
         self.value(tag, b"US", &value.to_le_bytes());
     }
 
-    fn longs(&mut self, tag: Tag, vr: &[u8; 2], values: &[u32]) {
+    pub(super) fn longs(&mut self, tag: Tag, vr: &[u8; 2], values: &[u32]) {
         let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
         self.value(tag, vr, &bytes);
     }
@@ -195,19 +199,19 @@ impl Header {
         self.value(tag, b"FD", &bytes);
     }
 
-    fn tag(&mut self, tag: Tag, value: Tag) {
+    pub(super) fn tag(&mut self, tag: Tag, value: Tag) {
         let bytes = [((value >> 16) as u16).to_le_bytes(), (value as u16).to_le_bytes()].concat();
         self.value(tag, b"AT", &bytes);
     }
 
-    fn identifier(&mut self, tag: Tag, identifier: Identifier) {
+    pub(super) fn identifier(&mut self, tag: Tag, identifier: Identifier) {
         self.head(tag, b"UI", UID_LENGTH as u32);
         self.identifiers.push((self.bytes.len(), identifier));
         self.bytes.extend([b'0'; UID_LENGTH]);
     }
 
     /// A sequence of items, each with an end mark.
-    fn sequence(&mut self, tag: Tag, items: usize, mut item: impl FnMut(&mut Header, usize)) {
+    pub(super) fn sequence(&mut self, tag: Tag, items: usize, mut item: impl FnMut(&mut Header, usize)) {
         self.head(tag, b"SQ", u32::MAX);
         for n in 0..items {
             self.bytes.extend([0xfe, 0xff, 0x00, 0xe0, 0xff, 0xff, 0xff, 0xff]);
@@ -217,11 +221,11 @@ impl Header {
         self.bytes.extend([0xfe, 0xff, 0xdd, 0xe0, 0, 0, 0, 0]);
     }
 
-    fn one(&mut self, tag: Tag, item: impl Fn(&mut Header)) {
+    pub(super) fn one(&mut self, tag: Tag, item: impl Fn(&mut Header)) {
         self.sequence(tag, 1, |header, _| item(header));
     }
 
-    fn code(&mut self, tag: Tag, value: &str, scheme: &str, meaning: &str) {
+    pub(super) fn code(&mut self, tag: Tag, value: &str, scheme: &str, meaning: &str) {
         self.one(tag, |item| {
             item.text(0x0008_0100, b"SH", value);
             item.text(0x0008_0102, b"SH", scheme);
@@ -234,7 +238,7 @@ impl Header {
         self.code(tag, "261665006", "SCT", "Unknown");
     }
 
-    fn meta(&mut self, class: &str) {
+    pub(super) fn meta(&mut self, class: &str) {
         self.bytes.resize(128, 0);
         self.bytes.extend(b"DICM");
         self.longs(0x0002_0000, b"UL", &[0]);
@@ -251,24 +255,24 @@ impl Header {
     }
 
     /// Group 0008 up to the scanner, and the patient.
-    fn general(&mut self, class: &str, image_type: &str) {
+    pub(super) fn general(&mut self, class: &str, image_type: &str, modality: &str) {
         self.text(0x0008_0008, b"CS", image_type);
         self.text(tags::SOP_CLASS, b"UI", class);
         self.identifier(0x0008_0018, Identifier::Instance);
         self.empty(0x0008_0020, b"DA");
         self.empty(0x0008_0030, b"TM");
         self.empty(0x0008_0050, b"SH");
-        self.text(tags::MODALITY, b"CS", "US");
+        self.text(tags::MODALITY, b"CS", modality);
     }
 
-    fn patient(&mut self) {
+    pub(super) fn patient(&mut self) {
         self.empty(0x0010_0010, b"PN");
         self.empty(0x0010_0020, b"LO");
         self.empty(0x0010_0030, b"DA");
         self.empty(0x0010_0040, b"CS");
     }
 
-    fn study(&mut self) {
+    pub(super) fn study(&mut self) {
         self.identifier(0x0020_000d, Identifier::Study);
         self.identifier(tags::SERIES, Identifier::Series);
         self.empty(0x0020_0010, b"SH");
@@ -312,7 +316,7 @@ impl Header {
         // The axes of the volume are those that are drawn, which are those of the transducer: y is depth.
         let grid = world.grid(size);
         let directions = world.directions();
-        self.general(class, KIND);
+        self.general(class, KIND, "US");
         self.text(tags::MANUFACTURER, b"LO", NAME);
         self.empty(0x0008_0090, b"PN");
         self.text(tags::MODEL, b"LO", NAME);
@@ -414,7 +418,7 @@ impl Header {
 
     fn capture(&mut self, class: &str, size: [usize; 3], world: &World) {
         let spacing = [0, 1, 2].map(|n| world.axis(n).length());
-        self.general(class, "DERIVED\\SECONDARY");
+        self.general(class, "DERIVED\\SECONDARY", "US");
         self.text(0x0008_0064, b"CS", "WSD");
         self.text(tags::MANUFACTURER, b"LO", NAME);
         self.empty(0x0008_0090, b"PN");

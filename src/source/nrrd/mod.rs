@@ -110,7 +110,11 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
 /// # Errors
 /// The file cannot be read, or states a label that is no number of 8 bits.
 pub(super) fn segments(path: &Path) -> Result<Vec<(u8, String, [f64; 3])>, InputError> {
-    let header = Header::read(&InputFile::new(path)?)?;
+    let file = InputFile::new(path)?;
+    if !is_one(&file.start(8)?) {
+        return Err(InputError::new(path, "labels", "are not there: it is no segmentation (.seg.nrrd)"));
+    }
+    let header = Header::read(&file)?;
     let one = |n: usize| {
         let stated = header.of_segment(n, "labelvalue").unwrap_or("1");
         let Ok(label) = stated.parse() else {

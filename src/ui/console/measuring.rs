@@ -190,6 +190,7 @@ impl Console {
         // The flags of the geometry are those of all recordings.
         let mut origin = self.fixed.origin.clone().unwrap_or_else(|| Origin::of(None));
         (origin.recording, origin.volume) = (Some(path.clone()), kept.frozen.unwrap_or(0) as usize);
+        origin.labels = None;
         let text = workspace::text(kept.controls.settings(), &origin);
         let saved = text.and_then(|text| self.exporter.text("toml", text, Holds::Work { kept: Some(path), work }));
         if let Err(fault) = &saved {

@@ -5,9 +5,9 @@ mod rays;
 
 use crate::passes::Texels;
 use crate::probe::{Advance, Array, Axis, Geometry, Grid, Indices, Motion, Probe};
-use crate::scene::{Input, Scene, Settings, VolumeFormat};
+use crate::scene::{Input, LabelVolume, Scene, Settings, VolumeFormat};
 use crate::source::StoredType;
-use glam::DVec3;
+use glam::{DAffine3, DQuat, DVec3, EulerRot};
 
 /// A scene to build: its name, geometry, input, and settings as TOML.
 #[derive(Clone)]
@@ -132,6 +132,7 @@ fn wide_scenes() -> Vec<SceneSpec> {
     let small = Geometry::Sweep(wobbler());
     let others = [
         ("planes", "mode = 'orthogonal'\nray.sampling = 'exact'"),
+        ("labels", "mode = 'sr'\nlabels.shell = 0.6\nray.sampling = 'exact'"),
         ("two rays at edges", "mode = 'vr'\nray = { rays = 2, adaptive = true, sampling = 'exact' }"),
         ("still", "mode = 'vr'\nstill = { samples = 1, events = 4 }\nray.sampling = 'exact'"),
         (
@@ -193,7 +194,7 @@ pub const SHARED_MEMORY: u32 = 32 << 10;
 /// Edge of a brick where a scene states none, texels.
 const BRICK: u32 = 8;
 
-/// A scene with settings from TOML.
+/// A scene with settings from TOML. If they state something of labels, there are some.
 ///
 /// # Errors
 /// One line: the settings are invalid.
@@ -205,7 +206,34 @@ pub fn scene(geometry: Geometry, input: Input, toml: &str) -> Result<Scene, Stri
     if settings.slices.format == VolumeFormat::Auto {
         settings.slices.format = VolumeFormat::R16f;
     }
-    Scene::new(geometry, input, settings).map_err(|e| e.to_string())
+    let scene = Scene::new(geometry, input, settings).map_err(|e| e.to_string())?;
+    if toml.contains("labels") { labelled(scene) } else { Ok(scene) }
+}
+
+/// The scene with labels: two bodies that touch and a single voxel, on a lattice that lies obliquely in the middle of what the scene shows.
+///
+/// # Errors
+/// None: the labels are valid.
+pub fn labelled(mut scene: Scene) -> Result<Scene, String> {
+    const SIZE: [usize; 3] = [19, 16, 13];
+    let middle = DVec3::new(9.0, 7.0, 6.0);
+    let label = |at: DVec3| match () {
+        () if at == DVec3::new(17.0, 13.0, 2.0) => 9,
+        () if ((at - middle) / DVec3::new(7.0, 5.0, 4.0)).length() >= 1.0 => 0,
+        () if at.x + 0.4 * at.y < 11.0 => 1,
+        () => 4,
+    };
+    let places = (0..SIZE.iter().product()).map(|n| [n % SIZE[0], n / SIZE[0] % SIZE[1], n / (SIZE[0] * SIZE[1])]);
+    let voxels: Vec<u8> = places.map(|at| label(DVec3::from(at.map(|n| n as f64)))).collect();
+    let spacing = (scene.high - scene.low) / DVec3::new(24.0, 22.0, 18.0);
+    let turned = DAffine3::from_quat(DQuat::from_euler(EulerRot::XYZ, 0.4, -0.3, 0.2));
+    let to_space = DAffine3::from_translation((scene.low + scene.high) / 2.0)
+        * turned
+        * DAffine3::from_scale(spacing)
+        * DAffine3::from_translation(-middle);
+    let labels = LabelVolume::new(SIZE, &voxels, to_space, |label| (label == 4).then_some([0.9, 0.8, 0.1]))?;
+    scene.settings.labels.volume = Some(labels.into());
+    Ok(scene)
 }
 
 /// Pseudorandom numbers in 0..1, the same on every machine (SplitMix64).

@@ -96,6 +96,32 @@ pub(super) fn plane_scenes() -> Vec<SceneSpec> {
             "ray = { tolerance = 1, spread = 0, early_end = 0.05 }\nvolume = { compositing = 'pre-integrated', shading = 'depth-coded' }",
         ),
         (
+            "labels, 4-up, dim behind the surface",
+            &voxels,
+            "mode = 'sr'\nlayout = 'four'\nlabels = { behind = 0.2 }\nsurface.threshold = 0.3",
+        ),
+        ("labels, 3D + planes, half the rays", &voxels, "layout = 'beside'\nray.subsampling = 2\nlabels.fill = 0.4"),
+        (
+            "labels, pair, two rays",
+            &Geometry::Sweep(linear()),
+            "mode = 'sr'\nlayout = 'pair'\nlabels.shell = 0.7\nray.rays = 2",
+        ),
+        (
+            "labels, perspective, in floats",
+            &Geometry::Sweep(wobbler()),
+            "mode = 'mip'\nlabels.shell = 0.9\npost.floats = true\ncamera = { azimuth = 40, elevation = 15, field_of_view = 35, zoom = 1.8 }",
+        ),
+        (
+            "labels, a curved plane",
+            &Geometry::Sweep(wobbler()),
+            "mode = 'orthogonal'\nlabels.fill = 0.3\nplanes = { tilt = 12, curve = { plane = 'c', points = [[-9, 3], [-2, -6], [5, 2], [11, 1]] } }",
+        ),
+        (
+            "labels, outlines alone",
+            &voxels,
+            "mode = 'tomography'\nlabels = { fill = 0 }\nplanes = { columns = 2, rows = 3, zoom = 1.6 }",
+        ),
+        (
             "3D + planes, higher than wide, half the rays, toned",
             &voxels,
             "layout = 'beside'\nray.subsampling = 2\npost.colour_map = 'ice'",
@@ -107,7 +133,8 @@ pub(super) fn plane_scenes() -> Vec<SceneSpec> {
              volume.compositing = 'riemann'",
         ),
     ] {
-        let toml = format!("mode = 'vr'\n{toml}\npicture.size = [27, 31]\nray.sampling = 'exact'\nslices.pixels = 33");
+        let mode = if toml.contains("mode") { "" } else { "mode = 'vr'\n" };
+        let toml = format!("{mode}{toml}\npicture.size = [27, 31]\nray.sampling = 'exact'\nslices.pixels = 33");
         let toml = if toml.contains("ray = {") { toml.replace("ray.sampling = 'exact'\n", "") } else { toml };
         scenes.push(SceneSpec::new(name, geometry, BYTES, toml));
     }

@@ -291,7 +291,9 @@ fn described_types() -> BTreeMap<String, Described> {
                     let Fields::Named(fields) = item.fields else {
                         panic!("{file}: {} has no named fields", item.ident)
                     };
-                    let keys = fields.named.into_iter().map(|field| {
+                    // What is skipped is in no file.
+                    let is_key = |field: &syn::Field| argument(&serde_arguments(&field.attrs), "skip").is_none();
+                    let keys = fields.named.into_iter().filter(is_key).map(|field| {
                         let arguments = serde_arguments(&field.attrs);
                         for (name, _) in &arguments {
                             let is_known = ["default", "skip_serializing_if"].contains(&name.as_str());

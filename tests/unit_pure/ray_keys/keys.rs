@@ -302,6 +302,10 @@ const ROWS: &[Row] = &[
     ("projection.start_depth", Rays, "mode=mean", &["projection.start_depth=24.0"]),
     // Planes and the block cast no rays; cut faces have the window of planes.
     ("planes.window", Rays, CLIPPED, &["planes.window=[0.0,0.4]"]),
+    ("labels.fill", Nothing, "", &["labels.fill=0.5"]),
+    ("labels.outline", Nothing, "", &["labels.outline=false"]),
+    ("labels.shell", Nothing, "", &["labels.shell=0.2"]),
+    ("labels.behind", Nothing, "", &["labels.behind=0.9"]),
     ("planes.position", Nothing, FOUR, &["planes.position=[3,20,2]"]),
     ("planes.azimuth", Nothing, FOUR, &["planes.azimuth=20.0"]),
     ("planes.tilt", Nothing, FOUR, &["planes.tilt=20.0"]),
@@ -517,7 +521,8 @@ pub fn declared() -> Vec<String> {
 }
 
 fn collect(name: &str, before: &str, types: &BTreeMap<String, Vec<syn::Field>>, keys: &mut Vec<String>) {
-    for field in &types[name] {
+    let is_skipped = |a: &syn::Attribute| a.meta.require_list().is_ok_and(|list| list.tokens.to_string() == "skip");
+    for field in types[name].iter().filter(|field| !field.attrs.iter().any(is_skipped)) {
         let key = format!("{before}{}", field.ident.as_ref().expect("a name"));
         match innermost(&field.ty) {
             Some(inner) if types.contains_key(&inner) => collect(&inner, &format!("{key}."), types, keys),

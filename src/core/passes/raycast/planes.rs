@@ -52,7 +52,7 @@ pub(crate) const TONED: Pass = Pass {
         (true, false) => Err("the picture of planes is filtered, or wanted in floats"),
         (false, _) => Err("planes do not make up the picture"),
     },
-    writes: |_, _| vec![whole("screen", Slot::Screen)],
+    writes: |s, _| vec![whole("screen", toned_slot(s))],
     params: |s, _| postprocess::tone_params(s, params(s)).f32("line_strength", postprocess::LINE_STRENGTH),
     constants: |s, _| [constants(s), postprocess::tone_constants(s)].concat(),
     tolerance: Tolerance {

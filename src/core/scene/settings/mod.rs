@@ -4,6 +4,7 @@
 mod body_marks;
 mod cine;
 mod cuts;
+mod labels;
 mod marks;
 mod measurements;
 mod planes;
@@ -17,6 +18,7 @@ mod unveil;
 pub use body_marks::*;
 pub use cine::*;
 pub use cuts::*;
+pub use labels::*;
 pub use marks::*;
 pub use measurements::*;
 pub use planes::*;
@@ -88,6 +90,8 @@ pub struct Settings {
     pub still: Option<Still>,
     /// Stage 4: filters, tone and colour of the picture.
     pub post: Post,
+    /// Stage 4: the labels of a segmentation, over the picture.
+    pub labels: Labels,
     /// Marks beside the picture.
     pub marks: Marks,
     /// Measurements and annotations, at most 64. The viewer makes them; `render` draws them.
@@ -290,6 +294,7 @@ const NUMBERS: &[&[Number]] = &[
     preprocess::FILTERS[4],
     cuts::NUMBERS,
     still::NUMBERS,
+    labels::NUMBERS,
     measurements::NUMBERS,
     body_marks::NUMBERS,
     cine::NUMBERS,

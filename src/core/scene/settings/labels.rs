@@ -1,0 +1,47 @@
+//! Settings of labels: how a segmentation is laid over the picture.
+
+use crate::scene::Settings;
+use crate::scene::labels::SharedLabels;
+use crate::scene::number::Allowed::Any;
+use crate::scene::number::{Group, Number, SHARE, number};
+use serde::{Deserialize, Serialize};
+
+/// Labels: a segmentation that is shown with the echoes (`render --labels`, `view --labels`). Planes show the boundary of each label and a
+/// translucent fill, renderings a translucent shell. They lie over the finished picture, in the colours of the file; without a file nothing of this applies.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Labels {
+    /// Opacity of the fill on planes.
+    pub fill: f64,
+    /// Draw the boundaries on planes.
+    pub outline: bool,
+    /// Opacity of the shell in renderings.
+    pub shell: f64,
+    /// Share of the shell's opacity that is left where it lies behind a rendered surface, by more than a voxel. 0 hides it there.
+    pub behind: f64,
+    /// The labels themselves, which are in a file of their own.
+    #[serde(skip)]
+    pub volume: Option<SharedLabels>,
+}
+
+impl Default for Labels {
+    fn default() -> Labels {
+        Labels { fill: 0.25, outline: true, shell: 0.5, behind: 0.35, volume: None }
+    }
+}
+
+fn has_labels(s: &Settings) -> bool {
+    s.labels.volume.is_some()
+}
+
+pub(super) const NUMBERS: &[Number] = &[
+    number!(labels.fill, "", SHARE;
+        Group::Image, "Label fill", [0.0, 1.0], 0.05, has_labels, "How strongly labels tint planes: less shows more of the tissue."),
+    number!(labels.outline, "", Any;
+        Group::Image, "Label outline", [0.0, 1.0], 1.0, has_labels, "Draws the boundary of each label on planes."),
+    number!(labels.shell, "", SHARE;
+        Group::Image, "Label shell", [0.0, 1.0], 0.05, has_labels, "How opaque the surface of labels is in 3D."),
+    number!(labels.behind, "", SHARE;
+        Group::Image, "Labels behind", [0.0, 1.0], 0.05, has_labels,
+        "How much of the labels shines through a surface in front of them: 0 hides them there."),
+];
