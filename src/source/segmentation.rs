@@ -174,9 +174,9 @@ mod tests {
         let _ = std::fs::remove_file(&path);
         let find = |element: &[u8]| bytes.windows(element.len()).position(|w| w == element);
         for element in [
-            &b"\x02\0\x02\0UI\x1c\01.2.840.10008.5.1.4.1.1.66.4"[..],
+            &b"\x02\0\x02\0UI\x1c\x001.2.840.10008.5.1.4.1.1.66.4"[..],
             b"\x08\0\x60\0CS\x04\0SEG ",
-            b"\x28\0\x08\0IS\x02\04 ",
+            b"\x28\0\x08\0IS\x02\x004 ",
             b"\x28\0\x10\0US\x02\0\x03\0",
             b"\x28\0\x11\0US\x02\0\x05\0",
             b"\x28\0\0\x01US\x02\0\x01\0",

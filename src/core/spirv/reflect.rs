@@ -331,7 +331,7 @@ mod tests {
         );
         let gaussian = reflect(&words(embedded("filter/gaussian").unwrap())).unwrap();
         let weights = gaussian.params.iter().find(|p| p.name == "weights").unwrap();
-        assert!(weights.components == 32 && weights.is_float, "{weights:?}");
+        assert!(weights.components == 97 && weights.is_float, "{weights:?}");
         let target = module.bindings.iter().find(|b| b.name == "target").unwrap();
         assert_eq!((target.kind, target.access, target.dimension), (Kind::Storage, Access::Write, Dimension::Three));
         let source = module.bindings.iter().find(|b| b.name == "source").unwrap();

@@ -10,9 +10,9 @@ use crate::picture::Picture;
 use crate::texts;
 use egui::accesskit::Role;
 use egui::{
-    Align2, Area, Button, Color32, ColorImage, Context, FontId, Frame, Id, Label, Margin, Order, Pos2, Rect, Response,
-    RichText, ScrollArea, Sense, Stroke, StrokeKind, TextureHandle, TextureId, TextureOptions, Ui, WidgetInfo,
-    WidgetType, pos2, vec2,
+    Align2, Area, Button, ColorImage, Context, FontId, Frame, Id, Label, Margin, Order, Pos2, Rect, Response, RichText,
+    ScrollArea, Sense, Stroke, StrokeKind, TextureHandle, TextureId, TextureOptions, Ui, WidgetInfo, WidgetType, pos2,
+    vec2,
 };
 use std::sync::Arc;
 
@@ -66,9 +66,7 @@ impl Textures {
                 return texture.id();
             }
             let size = [picture.width as usize, picture.height as usize];
-            // The opacity of a rendering is in its colours already.
-            let pixels = picture.rgba.chunks_exact(4).map(|c| Color32::from_rgb(c[0], c[1], c[2])).collect();
-            let image = ColorImage::new(size, pixels);
+            let image = ColorImage::from_rgba_unmultiplied(size, &picture.rgba);
             let texture = context.load_texture("thumbnail", image, TextureOptions::LINEAR);
             let id = texture.id();
             self.0.push((picture.clone(), texture));
