@@ -30,7 +30,7 @@ pub enum Motion {
     Still { thickness: f64 },
 }
 
-/// Distance that the motor travels while a frame is acquired line by line: signed, in the unit of the slice axis.
+/// Distance that the motor travels while a frame is acquired line by line: signed, in the unit of the slice axis (rad or mm).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Advance {
     /// The motor stops for each frame.

@@ -18,8 +18,8 @@ pub struct Comparison {
     pub used: f64,
     /// Share of the texels beyond tolerance, less the share that is allowed additionally; the largest of all outputs.
     pub outliers: f64,
-    /// Mean signed error of the texels within tolerance, divided by the error that is allowed there; the largest of all outputs that have enough
-    /// written texels. It is small if errors are roundings, which have both signs.
+    /// Absolute value of the mean signed error of the texels within tolerance, divided by the error that is allowed there; the largest
+    /// of all outputs that have enough written texels. It is small if errors are roundings, which have both signs.
     pub bias: f64,
     /// The worst texel of an output that has more texels beyond tolerance than its pass allows; None if no output has.
     pub worst: Option<Worst>,

@@ -14,7 +14,7 @@ pub struct Line<'a> {
     pub scene: &'a Scene,
     /// A point of the line, mm. Rounding errors are smallest if it lies near the volume.
     pub base: DVec3,
-    /// Direction in which s grows; a unit vector.
+    /// Direction in which the distance s from `base` grows; a unit vector.
     pub direction: DVec3,
 }
 

@@ -43,7 +43,7 @@ impl Texels {
         &self.values[i..i + self.channels]
     }
 
-    /// Value of the first channel.
+    /// Value of the first channel, as a shader reads it: 0..1 in formats of 8 and 16 bits that are no floats.
     pub fn one(&self, x: usize, y: usize, z: usize) -> f64 {
         self.values[self.index([x, y, z])]
     }

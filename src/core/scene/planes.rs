@@ -22,7 +22,7 @@ const WAY_STEP: f64 = 1.0 / 256.0;
 /// Size of a tile in the table for shaders, in vectors of four floats.
 pub(crate) const TILE_VECTORS: u32 = 9;
 
-/// A plane through the volume: a point on it, mm in space, and three unit axes.
+/// A plane through the volume: a point on it, mm in space, and unit vectors: two in the plane and its normal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane {
     pub at: DVec3,

@@ -30,7 +30,7 @@ const LEAST_RATE: f64 = 1e6;
 /// Longest description of an error, characters.
 const MAX_ERROR_CHARACTERS: usize = 600;
 
-/// Options of a [`Client`]. No value can do harm: attempts to connect take at least 10 ms and are at least 10 ms apart.
+/// Options of a [`Client`]. No value can do harm: the time-out of an attempt to connect, and the wait before the next, are at least 10 ms.
 #[derive(Clone, Debug)]
 pub struct ClientOptions {
     /// Longest time for connecting to one address.

@@ -37,7 +37,7 @@ pub struct TrackingData {
 /// A tool of a [`TrackingData`] and its pose.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tool {
-    /// Name of the tool, at most 20 bytes on the wire.
+    /// Name of the tool; a name of more than 20 bytes is not sent, but refused.
     pub name: String,
     pub kind: ToolKind,
     /// Pose of the tool, see [`Transform::matrix`].

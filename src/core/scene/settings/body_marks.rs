@@ -43,7 +43,7 @@ impl Default for BodyMark {
     }
 }
 
-/// The part of the body that a body mark shows, seen from the front.
+/// The part of the body that a body mark shows; all but the head are seen from the front.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Body {

@@ -160,22 +160,21 @@ pub struct Inset {
     pub top: f64,
 }
 
-/// Tilt of each face of the block: two angles in deg, right-handed about the two axes in the face, applied in this order: (depth,
-/// elevation) for left and right, (lateral, elevation) for near and far, (lateral, depth) for bottom and top.
+/// Tilt of each face of the block: two angles in deg about the two axes in the face.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Tilt {
-    /// Tilt of the face towards -lateral, two angles in deg.
+    /// Tilt of the face towards -lateral: right-handed about depth, then elevation, deg.
     pub left: [f64; 2],
-    /// Tilt of the face towards +lateral, two angles in deg.
+    /// Tilt of the face towards +lateral: right-handed about depth, then elevation, deg.
     pub right: [f64; 2],
-    /// Tilt of the face nearest to the probe, two angles in deg.
+    /// Tilt of the face nearest to the probe: right-handed about lateral, then elevation, deg.
     pub near: [f64; 2],
-    /// Tilt of the face farthest from the probe, two angles in deg.
+    /// Tilt of the face farthest from the probe: right-handed about lateral, then elevation, deg.
     pub far: [f64; 2],
-    /// Tilt of the face towards -elevation, two angles in deg.
+    /// Tilt of the face towards -elevation: right-handed about lateral, then depth, deg.
     pub bottom: [f64; 2],
-    /// Tilt of the face towards +elevation, two angles in deg.
+    /// Tilt of the face towards +elevation: right-handed about lateral, then depth, deg.
     pub top: [f64; 2],
 }
 
