@@ -226,7 +226,7 @@ pub fn pack(module: &Module, params: &Params) -> Vec<u8> {
             Value::Vec2(v) => bytemuck::bytes_of(v),
             Value::Vec3(v) => bytemuck::bytes_of(v),
             Value::Vec4(v) => bytemuck::bytes_of(v),
-            Value::Floats(v) => bytemuck::bytes_of(&**v),
+            Value::Floats(v) => bytemuck::cast_slice(&v[..]),
         };
         let at = member.offset as usize;
         block[at..at + words.len()].copy_from_slice(words);
