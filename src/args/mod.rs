@@ -11,11 +11,12 @@ mod source;
 mod time;
 mod user_files;
 
+#[cfg(feature = "verify")]
+pub use input::open_device_until;
+pub use input::recorded;
 pub use input::{InputArgs, Output, SceneArgs, check_outputs, check_volume, device_failure, frames_of};
 #[cfg(feature = "lab")]
 pub use input::{Opened, open_device, open_device_for_statistics, write_report};
-#[cfg(feature = "verify")]
-pub use input::{open_device_until, recorded};
 pub use motor::{SerialArgs, motor_failure, motor_table};
 pub use picture_file::PictureFile;
 pub use picture_series::{PictureSeries, SeriesTarget};
