@@ -224,6 +224,7 @@ impl InputArgs {
             origin.recording = Some(recording);
         }
         origin.volume = self.volume()?;
+        origin.labels = self.labels()?.map(|file| std::path::absolute(&file).unwrap_or(file));
         Ok(origin)
     }
 

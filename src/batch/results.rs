@@ -229,7 +229,8 @@ impl Results {
         fs::create_dir_all(&place).map_err(|e| format!("{}: cannot be made: {e}", place.display()))?;
         let path = file_of(folder, shard);
         let fault = |e: io::Error| format!("{}: cannot be written: {e}", path.display());
-        let mut file = OpenOptions::new().create(true).read(true).append(true).open(&path).map_err(fault)?;
+        let mut file =
+            files::private(OpenOptions::new().create(true).read(true).append(true)).open(&path).map_err(fault)?;
         let mut last = [b'\n'];
         if file.metadata().map_err(fault)?.len() > 0 {
             file.seek(SeekFrom::End(-1)).and_then(|_| file.read_exact(&mut last)).map_err(fault)?;

@@ -197,7 +197,11 @@ impl CompareArgs {
             layers.set_by("--compare-set", assignment).map_err(input)?;
         }
         // Measurements belong to the first volume.
-        let settings = layers.finish().map_err(input)?.without_drawings();
+        let mut settings = layers.finish().map_err(input)?.without_drawings();
+        // So do its labels, wherever the other is.
+        if self.register.is_none() {
+            settings.labels.volume = None;
+        }
         let (_, mut volume, _) = read_volume(&mut *source, file, number, |_, _| ())?;
         let mut scene = scene_of(&*source, number, &settings)?;
         let motion = match self.register {

@@ -30,17 +30,7 @@ pub(super) fn read_volume(
 ) -> Result<(Geometry, Volume, usize), Failure> {
     check_number(recording, file, number)?;
     let geometry = recording.geometry(number);
-    let mut volume = Volume::new(geometry.clone(), recording.stored_type());
-    recording.skip_to_volume(number).map_err(input)?;
-    let (mut there, mut first) = (0, None);
-    while there < recording.frames_per_volume() {
-        // A .frames file may lack frames: the next one can belong to another volume.
-        let next = recording.next_frame().map_err(input)?;
-        let Some(frame) = next.filter(|frame| *first.get_or_insert(frame.volume) == frame.volume) else { break };
-        each(&geometry, &frame);
-        volume.take(frame);
-        there += 1;
-    }
+    let (volume, there) = Volume::read(recording, number, |frame| each(&geometry, frame)).map_err(input)?;
     Ok((geometry, volume, there))
 }
 

@@ -43,8 +43,8 @@ pub struct Worksheet {
 /// Longest edge of a picture, pixels, unless `--size` states one: the labels of calipers, of 14 pixels, are to be read beside the table.
 const EDGE: u32 = 560;
 /// The flags of what the JSON of a report states.
-const SETTINGS: [&str; 10] =
-    ["mode", "layout", "transfer", "scene", "preset", "size", "camera", "roi", "set", "volume"];
+const SETTINGS: [&str; 11] =
+    ["mode", "layout", "transfer", "scene", "preset", "size", "camera", "roi", "set", "volume", "labels"];
 /// Most bytes of the JSON of a report.
 const MAX_BYTES: u64 = 32 << 20;
 
@@ -262,7 +262,7 @@ fn recording(origin: &Origin, source: &dyn Source) -> Result<Recording, Failure>
 /// The origin with its paths relative to the folder of a file, as far as they are below it.
 fn seen_from(file: &Path, mut origin: Origin) -> Origin {
     let folder = std::path::absolute(file).ok().and_then(|file| file.parent().map(Path::to_path_buf));
-    for path in [&mut origin.recording, &mut origin.probe].into_iter().flatten() {
+    for path in [&mut origin.recording, &mut origin.labels, &mut origin.probe].into_iter().flatten() {
         if let Some(Ok(below)) = folder.as_deref().map(|folder| path.strip_prefix(folder)) {
             *path = below.to_path_buf();
         }

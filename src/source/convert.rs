@@ -128,6 +128,29 @@ impl Volume {
         Volume { geometry, stored, size, frames: vec![Vec::new(); size[2]] }
     }
 
+    /// Reads a volume of a recording, and counts its frames: a `.frames` file may lack some. `each` sees every frame before it is kept.
+    ///
+    /// # Errors
+    /// The recording cannot be read, or has no volume with this number.
+    pub fn read(
+        source: &mut dyn Source,
+        number: usize,
+        mut each: impl FnMut(&Frame),
+    ) -> Result<(Volume, usize), InputError> {
+        let mut volume = Volume::new(source.geometry(number), source.stored_type());
+        source.skip_to_volume(number)?;
+        let (mut there, mut first) = (0, None);
+        while there < source.frames_per_volume() {
+            // After an incomplete volume the next frame belongs to another one.
+            let next = source.next_frame()?;
+            let Some(frame) = next.filter(|frame| *first.get_or_insert(frame.volume) == frame.volume) else { break };
+            each(&frame);
+            volume.take(frame);
+            there += 1;
+        }
+        Ok((volume, there))
+    }
+
     /// Stores a frame as the slice that it states. A frame with a wrong slice or size is ignored.
     pub fn take(&mut self, frame: Frame) {
         let bytes = self.size[0] * self.size[1] * self.stored.bytes();

@@ -232,6 +232,10 @@ impl Comparison {
         (to.position, to.azimuth, to.tilt, to.roll) = (from.position, from.azimuth, from.tilt, from.roll);
         (to.zoom, to.plane) = (from.zoom, from.plane);
         linked.picture.size = settings.picture.size;
+        // Labels lie where the shown volume does.
+        if !self.shown.is_aligned {
+            linked.labels.volume = None;
+        }
         linked
     }
 
@@ -397,20 +401,8 @@ impl Held {
             Held::Pinned(header, volume) => Ok(((**header).clone(), volume.clone())),
             Held::Recording(source) => {
                 let number = number.min(source.volumes().saturating_sub(1));
-                source.skip_to_volume(number).map_err(|e| e.to_string())?;
-                let (mut frames, mut first) = (Vec::new(), None);
-                while frames.len() < source.frames_per_volume() {
-                    let next = source.next_frame().map_err(|e| e.to_string())?;
-                    // An incomplete volume has fewer frames.
-                    let Some(frame) = next.filter(|frame| *first.get_or_insert(frame.volume) == frame.volume) else {
-                        break;
-                    };
-                    frames.push(frame);
-                }
-                let header = source.header();
-                let mut volume = Volume::new(source.geometry(number), header.stored);
-                frames.into_iter().for_each(|frame| volume.take(frame));
-                Ok((header, volume))
+                let (volume, _) = Volume::read(&mut **source, number, |_| ()).map_err(|e| e.to_string())?;
+                Ok((source.header(), volume))
             }
         }
     }

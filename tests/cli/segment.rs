@@ -59,6 +59,21 @@ fn a_body_in_a_file_is_measured_labelled_in_its_place_and_written() {
     }
 }
 
+/// The session of docs/tutorial.md: the chamber of the phantom's heart at rest is a ball of blood with a radius of 13 mm in a wall of 4 mm.
+#[test]
+fn the_interval_of_a_dark_chamber_holds_its_volume() {
+    let folder = Folder::new("cyst");
+    let [sweep, labels, csv] = ["cyst.mha", "cyst.seg.nrrd", "cyst.csv"].map(|name| folder.path(name));
+    done(&["phantom", "--body", "heart", "--still", "-o", &sweep]);
+    done(&["segment", &sweep, "--dark", "--seed", "2,58,-1", "--smooth", "0.6", "-o", &labels, "--csv", &csv]);
+    let table = fs::read_to_string(&csv).expect("a table");
+    let row: Vec<f64> = table.lines().nth(1).expect("a body").split(',').take(8).flat_map(str::parse).collect();
+    let truth = 4.0 / 3.0 * std::f64::consts::PI * 1.3f64.powi(3);
+    assert!((row[2]..=row[3]).contains(&truth), "{truth}: {table}");
+    let off = glam::DVec3::new(row[5] - 2.0, row[6] - 58.0, row[7] + 1.0).length();
+    assert!((row[1] / truth - 1.0).abs() < 0.03 && off < 0.5, "{truth}: {table}");
+}
+
 #[test]
 fn a_seed_a_box_and_a_threshold_choose_what_is_labelled() {
     let folder = Folder::new("segment-choices");
