@@ -2,17 +2,17 @@
 
 use super::drawing::{DrawFault, draw_despite_losses};
 use super::recordings::read_volume;
-use crate::args::{InputArgs, PictureFile, check_volume, recorded};
+use crate::args::{InputArgs, PictureFile, check_outputs, check_volume, recorded};
 use crate::compare::{self, Difference, MAX_TILES};
 use crate::gpu::{Context, Renderer, RendererOptions};
-use crate::marked;
+use crate::marked::{self, Demo};
 use crate::picture::Picture;
 use crate::probe::Rigid;
 use crate::scene::load::Layers;
 use crate::scene::{Scene, Settings};
 use crate::segment::registration::{centre, register};
-use crate::source::Source;
 use crate::source::convert::Volume;
+use crate::source::{DEMO_DATA, Source};
 use crate::terminal::{Failure, failed, input, remark, say};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -98,6 +98,7 @@ pub struct Job<'a> {
 /// A volume that is drawn, and its scene.
 struct Drawn {
     name: String,
+    is_synthetic: bool,
     scene: Scene,
     volume: Volume,
 }
@@ -127,11 +128,12 @@ impl CompareArgs {
             View::Wipe(_) => size,
             _ => compare::tile_size(tiles, size),
         };
-        let (demo, number) = (job.input.demo(&*source), job.input.volume()?);
+        let number = job.input.volume()?;
         let (_, volume, _) = read_volume(&mut *source, Path::new(&job.input.name()), number, |_, _| ())?;
         let settings = sized(scene.settings.clone(), each);
         let first = Drawn {
-            name: format!("A  {}", short(&job.input.name())),
+            name: tile_name('A', &job.input.name(), &*source),
+            is_synthetic: source.is_synthetic(),
             scene: scene_of(&*source, number, &settings)?,
             volume,
         };
@@ -145,8 +147,8 @@ impl CompareArgs {
         let mut context = job.input.open_device(job.validate)?;
         let mut options = job.options.clone();
         let reopen = || job.input.open_device(job.validate);
-        let mut pictures = Vec::with_capacity(tiles);
-        for (n, of) in drawn.iter().enumerate() {
+        let (mut bare, mut pictures) = (Vec::new(), Vec::with_capacity(tiles));
+        for of in &drawn {
             let picture = draw_despite_losses(
                 &mut context,
                 &mut options,
@@ -155,16 +157,20 @@ impl CompareArgs {
                 || 0,
                 |context, options, _| draw(context, of, options),
             )?;
-            let demo = demo.filter(|_| n == 0);
+            // The names of tiles say it, too.
+            let demo = matches!(self.compare_view, View::Wipe(_)) && of.is_synthetic;
+            let demo = demo.then_some(Demo::Always);
             let shown = marked::as_set(&picture, &of.scene, u32::try_from(number).ok(), None, demo).map_err(failed)?;
-            pictures.push((of.name.clone(), shown.into_owned()));
+            let shown = shown.into_owned();
+            // Calipers are no difference.
+            bare.push(picture);
+            pictures.push((of.name.clone(), shown));
         }
         let composed = match self.compare_view {
             View::Wipe(share) => compare::wipe(&pictures[0].1, &pictures[1].1, share),
             _ => {
                 if shows_difference {
-                    let Difference { picture, end, rms } =
-                        compare::difference(&pictures[0].1, &pictures[1].1).map_err(failed)?;
+                    let Difference { picture, end, rms } = compare::difference(&bare[0], &bare[1]).map_err(failed)?;
                     say!("difference: A - B, RMS {rms:.2} of 255 levels; scale -{end} to {end}");
                     pictures.push(("A \u{2212} B".into(), picture));
                 }
@@ -191,6 +197,8 @@ impl CompareArgs {
         let mut source = job.input.open_another(file)?;
         let number = self.compare_volume.map_or_else(|| job.input.volume(), Ok)?;
         check_volume(&*source, "--compare-volume", number, file.display())?;
+        let read = source.files();
+        check_outputs(&[("-o", Some(job.output))], read.iter().map(PathBuf::as_path))?;
         let fault = |why: String| input(format!("{}: {why}", file.display()));
         let mut layers = Layers::of(settings).ok_or_else(|| failed("the settings cannot be written"))?;
         for assignment in &self.compare_set {
@@ -230,7 +238,8 @@ impl CompareArgs {
             volume = volume.moved_onto(geometry, |place| back.transform_point3(place), source.range()[0]);
             scene = Scene::new(geometry.clone(), scene.input, settings).map_err(input)?;
         }
-        Ok(Drawn { name: format!("{letter}  {}", short(&file.display().to_string())), scene, volume })
+        let name = tile_name(letter, &file.display().to_string(), &*source);
+        Ok(Drawn { name, is_synthetic: source.is_synthetic(), scene, volume })
     }
 }
 
@@ -249,6 +258,14 @@ fn scene_of(source: &dyn Source, volume: usize, settings: &Settings) -> Result<S
     recorded.is_completed = false;
     let layers = Layers::of(settings).ok_or_else(|| failed("the settings cannot be written"))?;
     recorded.scene(&layers).map_err(input)
+}
+
+/// The name of a tile: its letter, the file without its folder, and whether the volume is of the phantom.
+fn tile_name(letter: char, file: &str, source: &dyn Source) -> String {
+    match source.is_synthetic() {
+        true => format!("{letter}  {} \u{b7} {DEMO_DATA}", short(file)),
+        false => format!("{letter}  {}", short(file)),
+    }
 }
 
 /// The name of a file without its folder.

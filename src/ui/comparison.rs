@@ -71,6 +71,8 @@ pub(super) struct Shown {
     /// Name of the shown volume; `name`: that of the compared one.
     pub first: String,
     pub name: String,
+    /// Whether the compared volume is of the phantom.
+    pub is_synthetic: bool,
     /// The compared volume's picture; None until it is drawn.
     pub picture: Option<Arc<Picture>>,
     /// The difference of both pictures; None unless it is shown and both are drawn.
@@ -258,6 +260,7 @@ impl Comparison {
         let (mut is_other, mut news) = (false, None);
         match self.read.try_recv() {
             Ok(Read::Volume(header, frames)) => {
+                self.shown.is_synthetic = header.synthetic;
                 let frames = Frames { header: Some(header), frames };
                 match Feed::waking(Box::new(frames), None, Some(self.wake.clone())) {
                     Ok(feed) => self.stream.replace_source(feed),

@@ -32,49 +32,59 @@ fn about(link: Link) -> (&'static str, &'static str) {
 /// Distance of names and buttons from the edges of a tile, points.
 const EDGE: f32 = 10.0;
 
-/// Paints the compared picture and the difference, and shows the buttons. `textures`: of both, None while it is not drawn.
-pub(super) fn show(
-    ui: &Ui,
-    state: &PanelState,
-    textures: &[Option<TextureId>],
-    scale: f32,
-    execute: &mut dyn FnMut(Command),
-) {
+/// Paints the compared picture and the difference, below everything that is drawn over pictures. `textures`: of both, None while it is not drawn.
+pub(super) fn paint(ui: &Ui, state: &PanelState, textures: &[Option<TextureId>], scale: f32) {
     let Some(shown) = state.compared else { return };
     let painter = ui.painter();
-    let first = picture_rect(state, scale);
-    let tile = |n: u32| {
-        let ([x, y], [w, h]) = state.room.tile(n);
-        let [x, y, w, h] = [x, y, w, h].map(|n| n as f32 / scale);
-        Rect::from_min_size(pos2(x, y), vec2(w, h))
-    };
+    let [second, difference] = [0, 1].map(|n| textures.get(n).copied().flatten());
+    if shown.view == CompareView::Wipe {
+        let (area, share) = (picture_rect(state, scale), shown.wipe as f32);
+        let right = area.with_min_x(area.left() + share * area.width());
+        if let Some(texture) = second {
+            let part = Rect::from_min_max(pos2(share, 0.0), pos2(1.0, 1.0));
+            painter.image(texture, right, part, UNCOLOURED);
+        }
+        painter.line_segment([right.left_top(), right.left_bottom()], Stroke::new(2.0, TEXT));
+        return;
+    }
     let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
-    let at = if shown.view == CompareView::Wipe { wipe(ui, first, shown, textures, execute) } else { tile(1) };
-    if shown.view != CompareView::Wipe {
-        match textures.first().copied().flatten() {
-            Some(texture) => _ = painter.image(texture, at, whole, UNCOLOURED),
-            None => {
-                _ = painter.text(
-                    at.center(),
-                    Align2::CENTER_CENTER,
-                    texts::NOT_DRAWN_YET,
-                    FontId::proportional(SMALL_TEXT),
-                    WEAK_TEXT,
-                )
-            }
+    match second {
+        Some(texture) => _ = painter.image(texture, tile(state, 1, scale), whole, UNCOLOURED),
+        None => {
+            let (at, font) = (tile(state, 1, scale).center(), FontId::proportional(SMALL_TEXT));
+            painter.text(at, Align2::CENTER_CENTER, texts::NOT_DRAWN_YET, font, WEAK_TEXT);
         }
     }
-    name(painter, at, &texts::tile_b(&shown.name), true);
-    name(painter, first, &texts::tile_a(shown.first.as_str()), shown.view != CompareView::Wipe);
-    if shown.view == CompareView::Difference {
-        if let Some(texture) = textures.get(1).copied().flatten() {
-            painter.image(texture, tile(2), whole, UNCOLOURED);
-        }
-        name(painter, tile(2), texts::TILE_DIFFERENCE, true);
+    if let Some(texture) = difference.filter(|_| shown.view == CompareView::Difference) {
+        painter.image(texture, tile(state, 2, scale), whole, UNCOLOURED);
+    }
+}
+
+/// A tile in points; 0 is the picture.
+fn tile(state: &PanelState, n: u32, scale: f32) -> Rect {
+    let ([x, y], [w, h]) = state.room.tile(n);
+    let [x, y, w, h] = [x, y, w, h].map(|n| n as f32 / scale);
+    Rect::from_min_size(pos2(x, y), vec2(w, h))
+}
+
+/// Shows the names of the tiles, the handle of the wipe, and the buttons.
+pub(super) fn show(ui: &Ui, state: &PanelState, scale: f32, execute: &mut dyn FnMut(Command)) {
+    let Some(shown) = state.compared else { return };
+    let (painter, first) = (ui.painter(), picture_rect(state, scale));
+    let is_wipe = shown.view == CompareView::Wipe;
+    let second = match is_wipe {
+        true => first.with_min_x(first.left() + shown.wipe as f32 * first.width()),
+        false => tile(state, 1, scale),
+    };
+    name(painter, second, &texts::tile_b(&shown.name, shown.is_synthetic), true);
+    name(painter, first, &texts::tile_a(&shown.first), !is_wipe);
+    match shown.view {
+        CompareView::Difference => name(painter, tile(state, 2, scale), texts::TILE_DIFFERENCE, true),
+        CompareView::Wipe => handle(ui, first, second.left(), execute),
+        CompareView::Tiles => {}
     }
     // Over the picture that no gesture is made on.
-    let over = if shown.view == CompareView::Wipe { first } else { tile(1) };
-    buttons(ui, shown, over, execute);
+    buttons(ui, shown, if is_wipe { first } else { second }, execute);
 }
 
 /// Names a tile in its upper left corner; where it is covered by the other picture, above that corner's letter.
@@ -89,16 +99,8 @@ fn name(painter: &Painter, tile: Rect, text: &str, is_alone: bool) {
     painter.galley(at, galley, TEXT);
 }
 
-/// Paints the compared picture to the right of the line of the wipe, with a handle on it. Returns the area that it covers.
-fn wipe(ui: &Ui, area: Rect, shown: &Shown, textures: &[Option<TextureId>], execute: &mut dyn FnMut(Command)) -> Rect {
-    let share = shown.wipe as f32;
-    let at = area.left() + share * area.width();
-    let right = area.with_min_x(at);
-    if let Some(texture) = textures.first().copied().flatten() {
-        let part = Rect::from_min_max(pos2(share, 0.0), pos2(1.0, 1.0));
-        ui.painter().image(texture, right, part, UNCOLOURED);
-    }
-    ui.painter().line_segment([pos2(at, area.top()), pos2(at, area.bottom())], Stroke::new(2.0, TEXT));
+/// Shows the handle on the line of the wipe, which is at `at` in an area.
+fn handle(ui: &Ui, area: Rect, at: f32, execute: &mut dyn FnMut(Command)) {
     let handle = Rect::from_center_size(pos2(at, area.center().y), vec2(0.5 * TOUCH_SIZE, TOUCH_SIZE));
     Area::new(Id::new(texts::WIPE_LINE)).order(Order::Middle).fixed_pos(handle.min).constrain(false).show(
         ui.ctx(),
@@ -119,7 +121,6 @@ fn wipe(ui: &Ui, area: Rect, shown: &Shown, textures: &[Option<TextureId>], exec
             }
         },
     );
-    right
 }
 
 /// Shows the buttons of the comparison at the upper edge of an area.

@@ -265,6 +265,7 @@ impl Panels {
                     inspector::show_drawer(ui, state, points.into(), edges, &looks, execute);
                 }
             }
+            compared::paint(ui, state, &compared, self.scale);
             let taken = recordings::show_reading(ui, state, self.scale, execute);
             let messages = overlays::show_notes(ui, state, self.scale, taken);
             match state.visible.panels {
@@ -278,7 +279,7 @@ impl Panels {
                 measures::paint(ui, state, self.scale);
                 body_marks::paint(ui, state, self.scale);
             }
-            compared::show(ui, state, &compared, self.scale, execute);
+            compared::show(ui, state, self.scale, execute);
             if state.visible.times {
                 overlays::show_times(ui, state, self.scale);
             }

@@ -18,6 +18,7 @@ fn compared(view: CompareView, size: [u32; 2]) -> Shown {
         links: [true, false, true, false],
         first: "before.mha".into(),
         name: "after.mha".into(),
+        is_synthetic: true,
         picture: picture(),
         difference: picture(),
         is_aligned: false,
