@@ -18,7 +18,8 @@ pub enum PictureFile<'a> {
 }
 
 impl<'a> PictureFile<'a> {
-    /// The target of the path that a flag was given. With standard output, messages go to standard error from now on.
+    /// The target for the path that the user gave to `flag` (such as `-o`, for messages): standard output if the path is `-`, otherwise a file in
+    /// the format of its ending. With standard output, messages go to standard error from now on.
     ///
     /// # Errors
     /// The ending belongs to no known format, or standard output is a terminal.

@@ -113,7 +113,7 @@ fn for_each_line(file: &Path, mut each: impl FnMut(u64, &str) -> Result<(), Stri
     }
 }
 
-/// The expected cost of every unit, in the order of the manifest.
+/// The expected cost of every unit, in the order of the manifest: at least 0, relative to the others, 1 where the line states none.
 ///
 /// # Errors
 /// One line that names the file, the line and the fault.

@@ -45,10 +45,11 @@ impl ProbeFile {
         ProbeFile { path: path.into(), tables, interval: None }.checked()
     }
 
-    /// As [`ProbeFile::read`], with the file's tables given as a JSON object. `path` names their origin in messages.
+    /// Makes a probe file of its tables, given as a JSON object, and checks it as [`ProbeFile::read`] does. `path` only names their origin in
+    /// messages; nothing is read from there.
     ///
     /// # Errors
-    /// As [`ProbeFile::read`].
+    /// Unknown keys, values of another type, and numbers out of their range: one line that names `path` and the field.
     pub fn from_json(path: &Path, tables: serde_json::Value) -> Result<ProbeFile, InputError> {
         let tables = serde_json::from_value(tables).map_err(|e| InputError::new(path, "probe", e.to_string()))?;
         ProbeFile { path: path.into(), tables, interval: None }.checked()

@@ -84,8 +84,9 @@ fn common_axis(planes: &[Plane]) -> Option<(DVec3, DVec3)> {
     (axis != DVec3::ZERO && through.is_finite() && planes.iter().all(is_through)).then_some((axis, through))
 }
 
-/// The area of a closed contour as a vector along its normal, mm^2 (Newell). For a plane contour its length is the enclosed area, as by the
-/// shoelace formula. For another contour it is the area of the projection onto the plane in which that is largest.
+/// The area of a closed contour of points in mm, the last of which is joined to the first, as a vector along its normal, mm^2 (Newell). The direction
+/// follows from the order of the points by the right-hand rule. For a plane contour its length is the enclosed area, as by the shoelace formula. For
+/// another contour it is the area of the projection onto the plane in which that is largest.
 pub fn vector_area(contour: &[DVec3]) -> DVec3 {
     let Some((first, rest)) = contour.split_first() else { return DVec3::ZERO };
     rest.windows(2).map(|ends| (ends[0] - first).cross(ends[1] - first)).sum::<DVec3>() / 2.0

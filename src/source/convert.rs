@@ -116,7 +116,7 @@ pub struct Volume {
     stored: StoredType,
     /// Samples of a line, lines of a frame, frames.
     size: [usize; 3],
-    /// By slice in geometric order; a missing frame is zero.
+    /// By slice in geometric order; a missing frame is empty.
     frames: Vec<Vec<u8>>,
 }
 

@@ -156,7 +156,8 @@ pub(super) struct Pixels {
     pub encoding: Encoding,
     /// Number of decompressed bytes that come before the samples; 0 if they are not compressed.
     pub inside: u64,
-    /// If given, the samples are these and not a range of one file.
+    /// If given, the samples come from here, decompressed, and `offset` and `inside` do not count. `path` is then what the user named, `length` the
+    /// bytes of all files together, and `encoding` what they are packed by.
     pub gathered: Option<Arc<dyn Gathered>>,
 }
 

@@ -98,8 +98,10 @@ impl Posed {
         Posed { options, sweep: None, time: None, volumes: 0, begun: None, left_out: LeftOut::default(), lost: 0 }
     }
 
-    /// Processes an event of the source. Returns the event itself, or the events of a volume that is due: the first event of any kind after the
-    /// schedule's interval emits one.
+    /// Processes an event of the source; returns the events that take its place. The header and the frames of posed pictures are taken into the
+    /// volume, any other event is returned. Before it come the events of the volume if it has changed and is due by its [`Schedule`], or at once
+    /// before another header and the end: a header if its grid is new, and a frame for each slice. What was left out is returned as faults, at most
+    /// once a second and at the end.
     pub fn take(&mut self, event: Event) -> Vec<Event> {
         let mut events = Vec::new();
         match event {

@@ -87,14 +87,14 @@ pub(super) fn matrix(text: &str) -> Result<DMat4, String> {
     Ok(matrix)
 }
 
-/// The transforms that differ from picture to picture, by name and by the index of the picture. Invalid ones have no entry.
+/// The transforms that differ from picture to picture, by name and by the index of the picture, from 0. Invalid ones have no entry.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Poses {
     pub by_name: BTreeMap<TransformName, BTreeMap<usize, DMat4>>,
 }
 
 impl Poses {
-    /// Adds the transform of this name for a picture. It is ignored if there are too many names already.
+    /// Sets the transform of this name for a picture. A name beyond the first 256 is ignored.
     pub fn add(&mut self, name: TransformName, picture: usize, matrix: DMat4) {
         if self.by_name.len() < MAX_NAMES || self.by_name.contains_key(&name) {
             self.by_name.entry(name).or_default().insert(picture, matrix);

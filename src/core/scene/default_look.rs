@@ -196,7 +196,8 @@ impl Layers {
         self.presets().is_empty()
     }
 
-    /// The settings of the layers for a geometry, completed by defaults. Without `levels` grey windows are those of a face in fluid.
+    /// The settings of the layers for a geometry, completed by defaults. Without a preset, grey windows follow from `levels`; None takes those of
+    /// a face in fluid.
     ///
     /// # Errors
     /// As for [`Layers::finish`].

@@ -221,6 +221,10 @@ impl Layers {
         Ok(settings)
     }
 
+    /// The settings of all layers together.
+    ///
+    /// # Errors
+    /// One line: the layers together are no valid settings.
     pub fn finish(self) -> Result<Settings, LoadError> {
         self.settings().map_err(|e| LoadError::Layer { layer: "scene".into(), fault: one_line(&e, "") })
     }

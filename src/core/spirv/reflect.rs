@@ -77,8 +77,9 @@ pub struct Constant {
 pub struct Module {
     /// Bindings in the order of their binding numbers.
     pub bindings: Vec<Binding>,
+    /// Members of the parameter block, the uniform block `Params`; empty if the module has none.
     pub params: Vec<Member>,
-    /// Size of the parameter block, bytes.
+    /// Size of the parameter block up to the end of its last member, bytes; 0 if the module has none.
     pub params_size: u32,
     /// Specialization constants in the order of their ids.
     pub constants: Vec<Constant>,

@@ -48,7 +48,7 @@ pub struct Source {
     pub label: String,
     /// Assignments `key=value` of its finest setting, only of keys of its own.
     pub finest: Vec<String>,
-    /// Assignments `key=value` of the setting next to the finest.
+    /// Assignments `key=value` of the setting that is one step coarser than the finest.
     pub nearly: Vec<String>,
 }
 

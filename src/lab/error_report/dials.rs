@@ -30,8 +30,8 @@ pub struct Dial {
     pub is_ordered: bool,
     /// Assignments `key=value` of the reference that errors are measured against. Empty for a look.
     pub best: Vec<String>,
-    /// Assignments `key=value` of the setting next to the reference. If the device renders the reference, the difference of both estimates the error
-    /// of the reference.
+    /// Assignments `key=value` of the setting that is one step coarser than the reference. Where the device renders the reference, because exact rays
+    /// and f64 do not serve, the difference of the two pictures estimates the error of the reference. Empty for a look.
     pub nearly: Vec<String>,
 }
 

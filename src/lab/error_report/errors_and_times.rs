@@ -248,11 +248,11 @@ impl ErrorMeasurement<'_> {
         })
     }
 
-    /// Renders and times a combination anew.
+    /// Renders and times a combination anew. Returns it with the new measurement, and the times of the scene with its own settings, measured
+    /// alternately with it.
     ///
     /// # Errors
     /// As [`ErrorMeasurement::report`].
-    /// The choice as measured anew, and the times of the scene as it is, in turn with it.
     fn measure_again(
         &self,
         finest: &Finest,

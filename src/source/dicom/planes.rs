@@ -21,7 +21,7 @@ pub(super) struct Plane {
     pub column: DVec3,
     /// Index in time of the volume that the plane belongs to; None if the file does not state it.
     pub index: Option<u32>,
-    /// Time stamp, s; None if the file does not state it.
+    /// Temporal Position Time Offset (0020,930D), s, from a zero that the file chooses; None if the file does not state it.
     pub time: Option<f64>,
 }
 

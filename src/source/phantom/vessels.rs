@@ -13,7 +13,7 @@ pub struct Vessel {
     pub to: DVec3,
     /// Radius of the blood at `from` and at `to`, mm.
     pub radii: [f64; 2],
-    /// Index of the vessel that this one branches from. None for the trunk.
+    /// Index in [`VesselTree::vessels`] of the piece that this one branches from. None for the trunk.
     pub parent: Option<usize>,
 }
 

@@ -50,7 +50,7 @@ pub struct Gain {
 }
 
 impl Conditioning {
-    /// Gain at a depth in mm, dB.
+    /// Gain, dB, at a depth along the line from the probe's face, mm, by the curve `tgc`; 0 without one.
     pub fn gain(&self, depth: f64) -> f64 {
         let after = self.tgc.partition_point(|g| g.depth <= depth);
         match (after.checked_sub(1).and_then(|i| self.tgc.get(i)), self.tgc.get(after)) {
@@ -215,7 +215,8 @@ pub struct EnhancedSigma {
     pub noise: Noise,
     /// Estimator of the centre. Absent: Perona-Malik in modes of planes, the median in all others (thesis 5.7).
     pub centre: Option<Estimator>,
-    /// Edge constant k of a Perona-Malik centre, in the units of sigma.
+    /// Edge constant k of a Perona-Malik centre: differences above it are preserved. In 0..1 on slices and on the brightness of pictures, in mm on
+    /// distances, also if the noise is multiplicative.
     pub edge: f64,
     /// Records by how many rings each pixel's window grew (thesis Tables 7-9). Slices only.
     pub growth: bool,

@@ -81,7 +81,7 @@ fn once() -> u32 {
     1
 }
 
-/// Stage 3: the light. Directions and positions use the camera's axes: right, up, towards the viewer.
+/// Stage 3: the light. The direction uses the axes that `follows` names, the position those of the camera: right, up, towards the viewer.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Light {
