@@ -217,15 +217,15 @@ impl Segment {
                 diameter(volume)
             );
         }
-        let scale = match scale {
-            Scale::Linear => "linear samples".into(),
-            Scale::Decibels(range) => format!("{range:.0} dB over the sample range"),
+        let range = match scale {
+            Scale::Linear => String::new(),
+            Scale::Decibels(range) => format!(" ({range:.0} dB)"),
         };
+        let share = scale.share(found.level);
         let [x, y, z] = found.labels.grid().size;
         let (count, shown) = (found.bodies.len(), self.output.display());
         say!(
-            "segmentation: {shown}, {x} x {y} x {z} voxels, {count} bodies; level {:.4} of {scale}, smoothed by {} mm",
-            found.level,
+            "segmentation: {shown}, {x} x {y} x {z} voxels; bodies: {count}; threshold {share:.4} of the sample range{range}, smoothed by {} mm",
             self.smooth
         );
         if found.left_out > 0 {

@@ -87,6 +87,15 @@ impl Scale {
             Scale::Decibels(_) => self.echo(share).sqrt(),
         }
     }
+
+    /// The share of the sample range, 0..=1, at which the searched quantity has this value (0..=1): the inverse of [`Scale::searched`]. 0 for what
+    /// is below the range.
+    pub fn share(self, searched: f64) -> f64 {
+        match self {
+            Scale::Linear => searched,
+            Scale::Decibels(range) => (1.0 + 20.0 * searched.log10() / range).max(0.0),
+        }
+    }
 }
 
 /// The quantity that bodies are searched in ([`Scale::searched`]), 0..=1, at each voxel of a grid; unknown outside the insonified region.

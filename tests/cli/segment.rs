@@ -65,13 +65,23 @@ fn the_interval_of_a_dark_chamber_holds_its_volume() {
     let folder = Folder::new("cyst");
     let [sweep, labels, csv] = ["cyst.mha", "cyst.seg.nrrd", "cyst.csv"].map(|name| folder.path(name));
     done(&["phantom", "--body", "heart", "--still", "-o", &sweep]);
-    done(&["segment", &sweep, "--dark", "--seed", "2,58,-1", "--smooth", "0.6", "-o", &labels, "--csv", &csv]);
-    let table = fs::read_to_string(&csv).expect("a table");
-    let row: Vec<f64> = table.lines().nth(1).expect("a body").split(',').take(8).flat_map(str::parse).collect();
+    let segment =
+        ["segment", &*sweep, "--dark", "--seed", "2,58,-1", "--smooth", "0.6", "-o", &*labels, "--csv", &*csv];
+    let segmented = |more: &[&str]| {
+        let said = done(&[&segment, more].concat());
+        let table = fs::read_to_string(&csv).expect("a table");
+        let row: Vec<f64> = table.lines().nth(1).expect("a body").split(',').take(8).flat_map(str::parse).collect();
+        (said, table, row)
+    };
+    let (said, table, row) = segmented(&[]);
     let truth = 4.0 / 3.0 * std::f64::consts::PI * 1.3f64.powi(3);
     assert!((row[2]..=row[3]).contains(&truth), "{truth}: {table}");
     let off = glam::DVec3::new(row[5] - 2.0, row[6] - 58.0, row[7] + 1.0).length();
     assert!((row[1] / truth - 1.0).abs() < 0.03 && off < 0.5, "{truth}: {table}");
+    // The printed threshold, stated, labels the same voxels but for its rounding.
+    let printed = said.split("threshold ").nth(1).and_then(|rest| rest.split(' ').next()).expect("a threshold");
+    let again = segmented(&["--threshold", printed]).2;
+    assert!((again[4] / row[4] - 1.0).abs() < 1e-3, "{said} {row:?} {again:?}");
 }
 
 #[test]
