@@ -73,8 +73,8 @@ impl Access {
         Access { resource: Resource::Slot(slot, image), parts, write, stage }
     }
 
-    /// True if the order of two accesses matters. Slices of a 3D image are not subresources in Vulkan: two writers of different slices
-    /// may overlap, but a reader, which may filter across slices, and a writer may not.
+    /// True if the order of two accesses matters. Slices of a 3D image are not subresources in Vulkan: two writers of different slices may overlap,
+    /// but a reader, which may filter across slices, and a writer may not. The slot `TileRanges` is treated likewise.
     pub fn conflicts(&self, later: &Access) -> bool {
         if self.resource != later.resource || !(self.write || later.write) {
             return false;

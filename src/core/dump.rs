@@ -14,7 +14,7 @@ const FORMAT: &str = "echolume dump 1";
 /// Width and height of a drawn table, pixels.
 const GRAPH: [usize; 2] = [512, 256];
 
-/// Draws a slot: colours unchanged, a volume as its slices side by side, a distance map with near bright and far dark, a table as
+/// Draws a slot: colours unchanged, a volume as its slices side by side, a distance map with near bright, far dark and misses black, a table as
 /// curves. A single channel is stretched from its minimum to its maximum unless it is within 0..1. `texels`: what the slot holds; None for a table
 /// that the CPU computes from the scene. Other slots without texels give one black pixel.
 pub fn draw(slot: Slot, texels: Option<&Texels>, scene: &Scene) -> Picture {
@@ -105,8 +105,9 @@ fn curves(values: &[f32], channels: usize) -> Picture {
     Picture { width: width as u32, height: height as u32, rgba }
 }
 
-/// A slot as an array that numpy reads (NPY 1.0, little endian, C order), and a description of its axes, channels and units. `texels` as in
-/// [`draw`]; other slots without texels give an empty array. Values are f32 as the shaders read them, f64 where they are bits.
+/// A slot as an array that numpy reads (NPY 1.0, little endian, C order), and a description of its axes, channels and units. `texels`: what the slot
+/// holds; None for a table that the CPU computes from the scene. Other slots without texels give an empty array. Values are f32 as the shaders read
+/// them, f64 where they are bits.
 pub fn array(slot: Slot, texels: Option<&Texels>, scene: &Scene) -> (Vec<u8>, Value) {
     let Meaning { channels, unit, miss } = slot.meaning();
     let (shape, values) = match (texels, slot.initializer()) {

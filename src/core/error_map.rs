@@ -17,11 +17,12 @@ const HATCH: usize = 6;
 const COLOURS: [[f64; 3]; 5] =
     [[0.07, 0.08, 0.17], [0.41, 0.15, 0.46], [0.80, 0.33, 0.38], [0.97, 0.64, 0.35], [0.99, 0.95, 0.75]];
 
-/// A picture of the error of each pixel, with statistics of the errors.
+/// A picture of the error of each pixel, with statistics. The error of a pixel is the largest difference of red, green and blue (0..1) between the
+/// picture and one with half the step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ErrorMap {
     pub picture: Picture,
-    /// Root mean square over all pixels of a pixel's error (0..1), and `largest`, the largest error of any pixel.
+    /// Root mean square of the errors of all pixels; `largest` is the largest error of any pixel. Both in 0..1.
     pub rms: f64,
     pub largest: f64,
     /// Share (0..1) of the pixels whose error exceeds the tolerance.

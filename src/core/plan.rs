@@ -23,7 +23,8 @@ pub struct Plan {
 /// What has to run again after a change of scene or shaders.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Rerun {
-    /// Slots or pipelines differ: the plan is rebuilt, and all frames have to be sent again.
+    /// The geometry, the type of the samples, or the size or format of slots that frames fill differ: all slots are made again, and all frames have
+    /// to be sent again.
     Everything,
     /// All frames have to be sent again, through stage 1.
     Frames,

@@ -14,7 +14,7 @@ pub fn render(scene: &Scene, frames: &[Texels]) -> BTreeMap<Slot, Texels> {
     render_with(scene, frames, &mut |_, _, _| false)
 }
 
-/// Converts the frames of a volume, in geometric order, to the values that shaders read from them.
+/// Converts the frames of a volume, in any order, to the values that shaders read from them, one array per slice in geometric order.
 pub fn decoded(scene: &Scene, frames: &[Frame]) -> Vec<Texels> {
     let format = Slot::Frames.format(scene);
     let [width, height] = scene.frame_size().map(|n| n as usize);
@@ -27,7 +27,8 @@ pub fn decoded(scene: &Scene, frames: &[Frame]) -> Vec<Texels> {
 /// true if it filled the outputs.
 pub type Replacement<'a> = dyn FnMut(&str, &Arrays, &mut Arrays) -> bool + 'a;
 
-/// As [`render`], but `replace` may compute some passes instead of their own reference.
+/// Renders a volume from `frames` to the contents of all slots, like [`render`]. It calls `replace` for each dispatch, which may compute the outputs
+/// in place of the reference of the pass.
 pub fn render_with(scene: &Scene, frames: &[Texels], replace: &mut Replacement) -> BTreeMap<Slot, Texels> {
     let plan = Plan::new(scene);
     let mut slots: BTreeMap<Slot, Texels> = plan.slots.iter().map(|s| (*s, empty(*s, scene))).collect();

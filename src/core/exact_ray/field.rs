@@ -19,7 +19,7 @@ const HALVINGS: u32 = 6;
 /// A part of a ray on which the interpolated sample value (the field) is one polynomial.
 #[derive(Clone, Copy, Debug)]
 pub struct Segment {
-    /// Start of the segment, mm along the ray; `to` is its end.
+    /// Start of the segment, mm along the line from its `base`; `to` is its end.
     pub from: f64,
     pub to: f64,
     /// The sample value after the grey window, not clamped, with the segment mapped to -1..1.

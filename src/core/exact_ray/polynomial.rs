@@ -115,7 +115,8 @@ impl Polynomial {
         std::array::from_fn(|k| rows[k].iter().zip(self.chebyshev).take(self.count).map(|(a, b)| a * b).sum())
     }
 
-    /// A lower and an upper bound of the values on -1..1, exact to rounding for a polynomial that rises or falls.
+    /// A lower and an upper bound of the values on -1..1: the least and the largest Bernstein coefficient. They are the extreme values, to rounding,
+    /// if these coefficients rise or fall throughout; else they may lie beyond them.
     pub fn range(&self) -> [f64; 2] {
         let values = self.bernstein();
         values[..self.count].iter().fold([f64::MAX, f64::MIN], |[low, high], v| [low.min(*v), high.max(*v)])

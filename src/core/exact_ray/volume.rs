@@ -63,7 +63,7 @@ pub struct Medium<'a> {
 }
 
 impl<'a> Medium<'a> {
-    /// The medium of a transfer function without fade or tint. `points` as in [`transfer::resolved`], at least one; samples below `threshold` are
+    /// The medium of a transfer function without fade or tint. `points`: control points in rising order, at least one; samples below `threshold` are
     /// transparent; a piece is halved until both quadrature rules differ by no more than `tolerance`.
     pub fn new(points: &[TransferPoint], threshold: f64, absorption: Absorption, tolerance: f64) -> Medium<'a> {
         let mut levels: Vec<f64> = [0.0, 1.0].into_iter().chain(points.iter().map(|p| p.at)).collect();
@@ -95,7 +95,8 @@ impl<'a> Medium<'a> {
         Medium { levels, linear, absorption, fade: None, tint: None, hit_depth: f64::INFINITY, tolerance }
     }
 
-    /// The medium that a scene's ray along `line` meets; the ray begins at `line.base`. `tolerance` as in [`Medium::new`].
+    /// The medium that a scene's ray along `line` meets; the ray begins at `line.base`. A piece of the ray is halved until both quadrature rules
+    /// differ by no more than `tolerance`.
     pub fn of(scene: &'a Scene, line: &super::Line<'a>, tolerance: f64) -> Medium<'a> {
         let volume = &scene.settings.volume;
         let points = transfer::of(volume);

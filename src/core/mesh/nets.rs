@@ -29,9 +29,9 @@ pub struct Surface {
     pub closed: bool,
 }
 
-/// The isosurface of a lattice of `size` voxels. `slice` fills a slice with values, NaN where they are not known; slices are requested once each, in
-/// order. `place` maps fractional voxel indices, whole at the centres of voxels, to mm; if it mirrors, the order of the vertices is reversed, so that
-/// triangles are still anticlockwise as seen from outside.
+/// The isosurface of a lattice of `size` voxels. `slice` fills a slice of this number with values, row by row, NaN where they are not known; slices
+/// are requested once each, in order. `place` maps fractional voxel indices, whole at the centres of voxels, to mm; if it mirrors, the order of the
+/// vertices is reversed, so that triangles are still anticlockwise as seen from outside.
 ///
 /// # Errors
 /// An error of `slice`, or a message that the surface has too many triangles.

@@ -16,7 +16,7 @@ const MAX_TRIANGLES: usize = 100_000_000;
 pub struct Cell {
     pub x: u32,
     pub y: u32,
-    /// Bit n is set if corner n (as cell.rs numbers them) is inside.
+    /// Bit n is set if corner n is inside: the corner at (n & 1, n >> 1 & 1, n >> 2 & 1) from the first corner of the cell.
     pub inside: u8,
     /// True if the values at all corners are known, or if the surface is to be closed where they are not.
     pub is_known: bool,
@@ -26,7 +26,8 @@ pub struct Cell {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Vertex {
     pub cell: [u32; 3],
-    /// Bit n is set for each crossed edge n (as cell.rs numbers them) that the mean is taken over.
+    /// Bit 4 a + m is set for each crossed edge that the mean is taken over: the edge along axis a whose place along the next axis (cyclically) is
+    /// bit 0 of m, and along the one after it bit 1.
     pub edges: u16,
 }
 

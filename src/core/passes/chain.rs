@@ -227,8 +227,9 @@ impl Pass {
         if self.frequency == Frequency::Volume { scene.slices() } else { 1 }
     }
 
-    /// The rectangle of each slice that a pass over slices has to compute: the visible part, and as much around it as later filters read. None for
-    /// passes that compute all of their extent: passes over the lines of a frame, and AOS, where each texel depends on its complete row and column.
+    /// The rectangle of each slice that a pass over slices has to compute: the visible part and as much around it as later filters read, or the whole
+    /// slice where the pass only observes it or a later filter reads all of it. None for passes that compute all of their extent: filters each of
+    /// whose texels depends on the complete slice (AOS, RKL1), and passes that are no part of the chains of slices.
     pub fn rectangle(&self, scene: &Scene, args: &DispatchArgs) -> Option<Rectangle> {
         let all = Rectangle { first: [0; 2], size: scene.grid.size };
         let mut around = [0, 0];

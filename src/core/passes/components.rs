@@ -31,7 +31,7 @@ pub struct Parts {
 
 impl Lattice<'_> {
     /// For each texel, the column fastest: true if it belongs to a part whose size is below `least`. Parts consist of the texels for which `is_set`
-    /// holds.
+    /// holds; it gets the index of a texel in the same order.
     pub fn floating(&self, is_set: impl Fn(usize) -> bool, least: u64) -> Vec<bool> {
         let [columns, rows, slices] = self.size;
         let parts = self.parts(is_set);
@@ -50,7 +50,7 @@ impl Lattice<'_> {
         floats
     }
 
-    /// Finds the connected parts of the texels for which `is_set` holds.
+    /// Finds the connected parts of the texels for which `is_set` holds; it gets the index of a texel, the column fastest, then the row.
     pub fn parts(&self, is_set: impl Fn(usize) -> bool) -> Parts {
         let [columns, rows, slices] = self.size;
         let mut runs: Vec<Run> = Vec::new();
@@ -87,8 +87,8 @@ impl Lattice<'_> {
 }
 
 impl Parts {
-    /// The number of the part that each of the lattice's `texels` belongs to, the column fastest. Parts are numbered from 1 in the order of their
-    /// first texels; 0 for a texel of no part.
+    /// For each texel of the lattice, the column fastest: the number of its part, from 1 in the order of the first texels of parts; 0 for a texel of
+    /// no part. `texels`: the number of texels of the lattice.
     pub fn numbers(&self, texels: usize) -> Vec<u32> {
         let mut numbers = vec![0; texels];
         let (mut of_root, mut count) = (vec![0; self.runs.len()], 0);

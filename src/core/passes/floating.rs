@@ -79,7 +79,8 @@ pub fn find(scene: &Scene, bytes: &[u8]) -> Vec<u8> {
     floats.into_iter().map(|floats| if floats { 255 } else { 0 }).collect()
 }
 
-/// The same search in f64 by another method, flood fill from a texel of each part. It is the reference of [`find`].
+/// The reference of [`find`]: the texels of the parts that the setting `floating` drops, in f64 by flood fill from a texel of each part. 1 in such
+/// parts, otherwise 0. `volume`: the whole volume.
 pub fn reference(scene: &Scene, volume: &Texels) -> Texels {
     let [columns, rows, slices] = volume.size;
     let (level, reach, sizes) = (level(scene), scene.part_reach() as i64, scene.texel_sizes());

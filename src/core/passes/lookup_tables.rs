@@ -25,7 +25,8 @@ pub fn scan_lut(scene: &Scene) -> Vec<f32> {
     lut
 }
 
-/// Gain of every sample of a line: a factor for linear envelopes, an addend (0..1) for log-compressed samples. Empty for a Cartesian volume.
+/// Gain of every sample of a line: a factor for linear envelopes, an addend in sample values (0..1 is their full range) for log-compressed samples.
+/// Empty for a Cartesian volume.
 pub fn tgc(scene: &Scene) -> Vec<f32> {
     let Some(probe) = scene.probe() else { return Vec::new() };
     let c = &scene.settings.conditioning;
@@ -100,8 +101,8 @@ pub(super) fn sweep_border(probe: &Probe) -> [f64; 2] {
     [first - margin, last + margin].map(|position| sweep_parameter(probe.motion, position))
 }
 
-/// Position in the sweep, in mean slice pitches from slice 0, at equidistant abscissae (`sweep_parameter`) from the first slice to the last. For a
-/// uniform sweep that is the fractional slice index. Empty for a Cartesian volume.
+/// Position in the sweep, in mean slice pitches from slice 0, at `ray.entries` equidistant abscissae from the first slice to the last: the tangent of
+/// half the angle of a fan, otherwise mm. For a uniform sweep that is the fractional slice index. Empty for a Cartesian volume.
 pub fn sweep_lut(scene: &Scene) -> Vec<f32> {
     let Some(probe) = scene.probe() else { return Vec::new() };
     let entries = scene.settings.ray.entries;
@@ -112,8 +113,9 @@ pub fn sweep_lut(scene: &Scene) -> Vec<f32> {
     }))
 }
 
-/// Fractional line index divided by the number of lines, which is the share of the frame that was acquired before, at equidistant abscissae
-/// (`line_parameter`) from the first line to the last. Empty for a Cartesian volume.
+/// Fractional line index divided by the number of lines, which is the share of the frame that was acquired before, at `ray.entries` equidistant
+/// abscissae from the first line to the last: the tangent of half the line's angle (of a quarter for a radial probe), or mm for a linear array. Empty
+/// for a Cartesian volume.
 pub fn line_lut(scene: &Scene) -> Vec<f32> {
     let Some(probe) = scene.probe() else { return Vec::new() };
     let entries = scene.settings.ray.entries;
@@ -237,12 +239,12 @@ pub(super) fn curve_table(scene: &Scene) -> Vec<f32> {
     floats(tiling.column_table(scene.settings.planes.thickness))
 }
 
-/// The labels of the box that holds them, 255ths.
+/// The label of each voxel of the box that holds all labels, divided by 255; x fastest.
 pub(super) fn label_ids(scene: &Scene) -> Vec<f32> {
     shares(scene.labels().map_or(&[0], LabelVolume::ids))
 }
 
-/// The share of the surroundings of each voxel of that box that has a label.
+/// For each voxel of the box that holds all labels, x fastest: the share (0..1) of its surroundings that has a label.
 pub(super) fn label_cover(scene: &Scene) -> Vec<f32> {
     shares(scene.labels().map_or(&[0], LabelVolume::cover))
 }
@@ -251,7 +253,7 @@ fn shares(bytes: &[u8]) -> Vec<f32> {
     bytes.iter().map(|byte| f32::from(*byte) / 255.0).collect()
 }
 
-/// The colour of each label.
+/// The colour of each of 256 labels: red, green and blue in 0..1, and 1.
 pub(super) fn label_colours(scene: &Scene) -> Vec<f32> {
     let colours = scene.labels().map_or(&[][..], LabelVolume::colours);
     let entry = |n: usize| colours.get(n).map_or([0.0; 4], |[r, g, b]| [*r as f32, *g as f32, *b as f32, 1.0]);

@@ -119,7 +119,8 @@ impl Deref for Dispatch<'_> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
     Whole,
-    /// Of a 3D texture the dispatch's slices, of an array the dispatch's layers, and of a 2D image all of it.
+    /// Of a 3D texture the dispatch's slices; of an array of layers the first ones, one for each of these slices; of a 2D image or a buffer all of
+    /// it.
     Slices,
     /// The layers of the frame array from [`DispatchArgs::layer`] on, one for each frame of the dispatch.
     Layers,
@@ -303,7 +304,7 @@ impl Pass {
         reference: |_, _, _, _| {},
     };
 
-    /// Defaults of passes that make slices from frames, as [`Pass::OF_RAYS`].
+    /// Defaults of filters of slices, one invocation a texel. Every pass has to replace the fields that are empty in [`Pass::OF_RAYS`].
     pub(super) const OF_SLICES: Pass = Pass {
         stage: Stage::Preprocess,
         frequency: Frequency::Frame,
@@ -311,10 +312,10 @@ impl Pass {
         ..Pass::filter(Chain::Slices)
     };
 
-    /// Defaults of filters of the distance map, as [`Pass::OF_RAYS`].
+    /// Defaults of filters of the distance map. Every pass has to replace the fields that are empty in [`Pass::OF_RAYS`].
     pub(super) const OF_DISTANCES: Pass = Pass { stage: Stage::Shade, ..Pass::filter(Chain::Distances) };
 
-    /// Defaults of filters of the picture, as [`Pass::OF_RAYS`].
+    /// Defaults of filters of the picture. Every pass has to replace the fields that are empty in [`Pass::OF_RAYS`].
     pub(super) const OF_PICTURES: Pass =
         Pass { stage: Stage::Postprocess, extent: picture_extent, ..Pass::filter(Chain::Pictures) };
 

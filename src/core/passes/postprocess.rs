@@ -108,7 +108,7 @@ pub(crate) fn reference_pixel(
     [colour[0], colour[1], colour[2], 1.0]
 }
 
-/// A colour after contrast, brightness, gamma and the colour map.
+/// A colour after contrast, brightness, gamma and the colour map; red, green and blue, clamped to 0..1.
 pub fn toned(scene: &Scene, colour: [f64; 3]) -> [f64; 3] {
     let post = &scene.settings.post;
     let toned = colour.map(|c| {

@@ -20,7 +20,7 @@ pub fn batch_bytes(scene: &Scene) -> u64 {
     if scene.is_for_cpu() { 4 << 20 } else { 16 << 20 }
 }
 
-/// Number of consecutive frames that go through stage 1 together, each pass in one dispatch.
+/// Largest number of consecutive frames that go through stage 1 together, each pass in one dispatch; at least 1.
 pub fn frames_per_batch(scene: &Scene) -> u32 {
     let bytes =
         |[width, height]: [u32; 2], format: Format| u64::from(width) * u64::from(height) * format.texel_bytes() as u64;
@@ -82,9 +82,9 @@ pub struct Search {
     pub name: &'static str,
     /// The slot of the volume that is searched.
     pub within: Slot,
-    /// The search. Its second argument is the texels of the volume, in their format.
+    /// The search. Its second argument is all texels of the slot `within`, in the format of that slot.
     pub find: fn(&Scene, &[u8]) -> Found,
-    /// The same search in f64, by another method.
+    /// The same search in f64, by another method; it returns the content of the slot that is searched for.
     pub reference: fn(&Scene, &Texels) -> Texels,
 }
 
@@ -206,12 +206,13 @@ slots! {
     SliceB = D::image("slice_b", slices, |_| Format::R32f).clear().across_queues().of(GREY, SHARE_OF_RANGE);
     /// How many rings the window of the enhanced sigma filter grew, at each pixel of the last batch's slices.
     Growth = D::image("growth", slices, |_| Format::R32f).across_queues().of(GREY, "rings of pixels");
-    /// AOS on slices, elimination of rows or columns: u = `SliceForward` + `SliceShares` u of the next pixel.
+    /// AOS on slices, after the elimination along rows or columns: the result at a pixel is `SliceForward` plus `SliceShares` times the result at the
+    /// next pixel.
     SliceShares = D::image("slice_shares", slices, |_| Format::R32f).across_queues().of(GREY, "share, 0..1");
     SliceForward = D::image("slice_forward", slices, |_| Format::R32f).across_queues().of(GREY, SHARE_OF_RANGE);
     /// A slice diffused along its rows.
     SliceRows = D::image("slice_rows", slices, |_| Format::R32f).across_queues().of(GREY, SHARE_OF_RANGE);
-    /// AOS with Richardson's extrapolation: a slice after a complete step, and (`SliceHalfStep`) after the first of two half steps.
+    /// AOS with Richardson's extrapolation: a slice after a complete step. `SliceHalfStep` is the slice after the first of two half steps.
     SliceStep = D::image("slice_step", slices, |_| Format::R32f).across_queues().of(GREY, SHARE_OF_RANGE);
     SliceHalfStep = D::image("slice_half_step", slices, |_| Format::R32f).across_queues().of(GREY, SHARE_OF_RANGE);
     /// RKL1: slices after a stage. Each stage reads the results of the last two.
@@ -248,7 +249,7 @@ slots! {
     /// For each texel of a slice, the share (0..1) of the frame's lines that fired before the line through it.
     LineShares = D::image("line_shares", one_slice, |_| Format::R32f).by_scene(cut::line_shares, By(lattice_differs))
         .of(GREY, "share of the frame's lines that fired before");
-    /// The section volume, which planes beside a rendering are cut from: before it is smoothed across slices, and (`SectionVolume`) after.
+    /// The section volume before it is smoothed across slices. `SectionVolume` is the smoothed one, which planes beside a rendering are cut from.
     SharpSectionVolume = D::image("sharp_section_volume", volume, volume_format).multibuffered().clear().across_queues()
         .of(GREY, SHARE_OF_RANGE);
     SectionVolume = D::image("section_volume", volume, volume_format).multibuffered().clear().across_queues()
@@ -273,13 +274,13 @@ slots! {
     /// The kind of each brick for the scene's mode: active, empty or homogeneous.
     BrickKinds = D::image("brick_kinds", per_brick, |_| Format::R8)
         .of(GREY, "(64 kind + distance in bricks) / 255; kinds: 0 active, 1 empty, 2 homogeneous");
-    /// Steps of the distance transform of bricks: the kind of each brick, and its distance to the nearest brick of another kind along x, and
-    /// (`BrickDistancesXy`) within x and y.
+    /// Steps of the distance transform of bricks: the kind of each brick, and its distance to the nearest brick of another kind along x.
+    /// `BrickDistancesXy` has the distance within x and y.
     BrickDistancesX = D::image("brick_distances_x", per_brick, |_| Format::R8)
         .of(GREY, "(64 kind + distance in bricks) / 255; kinds: 0 active, 1 empty, 2 homogeneous");
     BrickDistancesXy = D::image("brick_distances_xy", per_brick, |_| Format::R8)
         .of(GREY, "(64 kind + distance in bricks) / 255; kinds: 0 active, 1 empty, 2 homogeneous");
-    /// The kind of each brick, and its distance to the nearest brick of another kind: for the surface detector, and (`VolumeBrickDistances`) for
+    /// The kind of each brick, and its distance to the nearest brick of another kind: for the surface detector. `VolumeBrickDistances` has them for
     /// modes that composite or take the mean.
     SurfaceBrickDistances = D::image("surface_brick_distances", per_brick, |_| Format::R8)
         .of(GREY, "(64 kind + distance in bricks) / 255; kinds: 0 active, 1 empty, 2 homogeneous");
@@ -292,7 +293,8 @@ slots! {
         lookup_tables::opaque_before,
         ByContent,
     ).of(GREY, "entries of the transfer function");
-    /// The slice index over the position in the sweep. The direction of the motor only stretches the span of positions.
+    /// Position in the sweep in mean distances of slices from slice 0, which is the slice index if slices are equidistant, over the tangent of half
+    /// the angle of a fan, otherwise mm. The direction of the motor only stretches the span of positions.
     SweepLut = D::table(
         "sweep_lut",
         entries,
@@ -375,30 +377,33 @@ slots! {
         .of(GREY, "share of the densest matter, 0..1");
     LightPyramid8 = D::image("light_pyramid_8", |s| light_level(s, 8), |_| Format::R16f)
         .of(GREY, "share of the densest matter, 0..1");
-    /// Light that has passed a layer of cells, and (`LightFrontB`) the next layer.
+    /// Light that leaves the last layer of cells that a dispatch lit, towards the next layer. Dispatches alternate between `LightFrontA` and
+    /// `LightFrontB`.
     LightFrontA = D::image("light_front_a", |s| light_layer(s, false), |_| Format::Rgba32f)
         .of(COLOUR, "light; 1 is that of an unshadowed light of strength 1");
     LightFrontB = D::image("light_front_b", |s| light_layer(s, false), |_| Format::Rgba32f)
         .of(COLOUR, "light; 1 is that of an unshadowed light of strength 1");
-    /// Light that arrives in each cell, and the density of its matter. The passes that scatter it alternate between the other two slots, so that this
-    /// one stays.
+    /// Light that arrives in each cell, and the density of its matter. The passes that scatter it alternate between `LightScattered` and
+    /// `LightScatteredB`, so that this one stays.
     LightArriving = D::image("light_arriving", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f)
         .of(&["red", "green", "blue", "density"], "light: share of what came; share of the densest matter");
     LightScattered = D::image("light_scattered", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f)
         .of(&["red", "green", "blue", "density"], "light: share of what came; share of the densest matter");
     LightScatteredB = D::image("light_scattered_b", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f)
         .of(&["red", "green", "blue", "density"], "light: share of what came; share of the densest matter");
-    /// The back light, in cells of twice the edge: as `LightFrontA`, `LightFrontB` and `LightArriving`.
+    /// Back light that leaves the last layer of cells of twice the edge that a dispatch lit; dispatches alternate between `BackFrontA` and
+    /// `BackFrontB`. `BackLight` is the back light that arrives in each of these cells, and the density of its matter.
     BackFrontA = D::image("back_front_a", |s| light_layer(s, true), |_| Format::Rgba32f)
         .of(COLOUR, "light; 1 is that of an unshadowed light of strength 1");
     BackFrontB = D::image("back_front_b", |s| light_layer(s, true), |_| Format::Rgba32f)
         .of(COLOUR, "light; 1 is that of an unshadowed light of strength 1");
     BackLight = D::image("back_light", |s| light_level(s, 1), |_| Format::Rgba16f)
         .of(&["red", "green", "blue", "density"], "light: share of what came; share of the densest matter");
-    /// Light that arrives from all sides and from behind, in cells of twice the edge: its colour, and the share of the ambient light.
+    /// Ambient light, which comes from the side of the probe, and back light, in cells of twice the edge: their sum by colour, and the ambient light
+    /// alone.
     LightAmbient = D::image("light_ambient", |s| light_level(s, 1), |_| Format::Rgba16f)
         .of(COLOUR, "light; 1 is that of an unshadowed light of strength 1");
-    /// Light that white matter in each cell scatters, and the share of ambient light in it.
+    /// Light that white matter in each cell scatters towards the viewer, by colour, and the ambient light that arrives there.
     LightShade = D::image("light_shade", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f)
         .of(COLOUR, "light; 1 is that of an unshadowed light of strength 1");
     /// For each cell the direction towards weaker echoes, whose length (0..1) is its certainty, and the light for a highlight.
@@ -413,8 +418,8 @@ slots! {
     ).of(&["red", "green", "blue", "extinction"], "albedo of scattering, 0..1; extinction, 1/mm");
     /// The largest extinction of each brick, for stills.
     StillMajorants = D::image("still_majorants", per_brick, |_| Format::R32f).of(GREY, "largest extinction of a brick, 1/mm");
-    /// Sums over the paths of each pixel of a still: light and number of collisions, and (`StillSquares`) squares of luminance. Dispatches alternate
-    /// between A and B.
+    /// Sums over the paths of each pixel of a still: light and the number of paths that met matter. `StillSquaresA` has the sums of the squares of
+    /// the luminances. Dispatches alternate between A and B.
     StillSumsA = D::image("still_sums_a", per_ray, |_| Format::Rgba32f)
         .of(&["red", "green", "blue", "collided"], "light of all paths of a pixel; how many of them collided");
     StillSumsB = D::image("still_sums_b", per_ray, |_| Format::Rgba32f)
@@ -423,7 +428,7 @@ slots! {
         .of(GREY, "squares of the luminance of all paths of a pixel");
     StillSquaresB = D::image("still_squares_b", per_ray, |_| Format::R32f)
         .of(GREY, "squares of the luminance of all paths of a pixel");
-    /// The cut face of a clip plane that each ray ends at: its echo, and its opacity (0 without one).
+    /// The cut face of a clip plane that each ray meets: its echo, and its opacity (0 without a cut face; rays end at an opacity of 1).
     Cap = D::image("cap", per_ray, |_| Format::Rg16f)
         .of(&["echo", "opacity"], "echo 0..1 after the grey window of planes, where a ray ends at a cut face; opacity, 0..1");
     /// Detector consistent: the two edges of each ray that are most likely its surface.
@@ -441,7 +446,7 @@ slots! {
     /// For each ray the echo at its surface, 1 where a surface was found, and the mean echo behind it where skin shading needs that.
     Surface = D::image("surface", per_ray, |s| if s.samples_behind() > 0 { Format::Rgba16f } else { Format::Rg16f })
         .of(&["echo", "found", "echo_behind", "unused"], "echo 0..1 after the grey window; found: 0 or 1");
-    /// Share (0..1) of the light that reaches each ray's surface, by shadow.
+    /// Share (0..1) of the lamp's light that reaches each ray's surface: 1 without a shadow.
     Shadow = D::image("shadow", per_ray, |_| Format::R16f).of(GREY, "share, 0..1");
     /// Share (0..1) of the ambient light that reaches each ray's surface.
     Occlusion = D::image("occlusion", per_ray, |_| Format::R16f).of(GREY, "share, 0..1");
@@ -452,18 +457,18 @@ slots! {
     /// What stages 2 and 3 render, if the picture is assembled from it. With adaptive supersampling it holds the rays of marked pixels; other texels
     /// keep their old content.
     Rendered = D::image("rendered", per_ray, |_| Format::Rgba16f).of(COLOUR, "share, 0..1");
-    /// Adaptive supersampling: the colour of one ray through the middle of each pixel, and (`EdgeMarks`) 1 in pixels that have all rays.
+    /// Adaptive supersampling: the colour of one ray through the middle of each pixel. `EdgeMarks` is 1 in pixels that have all rays.
     PixelRays = D::image("pixel_rays", per_pixel_of_rendering, |_| Format::Rgba16f).of(COLOUR, "share, 0..1");
     EdgeMarks = D::image("edge_marks", per_pixel_of_rendering, |_| Format::R8).of(GREY, "1 in pixels that have several rays");
-    /// With a tolerance: the colours of the rays through every other pixel of every other row, and (`LatticeErrors`) their colours on the screen with
+    /// With a tolerance: the colours of the rays through every other pixel of every other row. `LatticeErrors` has their colours on the screen and
     /// their errors.
     Lattice = D::image("lattice", |s| Shape::Two(tolerance::lattice_size(s)), |_| Format::Rgba16f).of(COLOUR, "share, 0..1");
     LatticeErrors = D::image("lattice_errors", |s| Shape::Two(tolerance::lattice_size(s)), |_| Format::Rgba32f)
         .of(&["red", "green", "blue", "error"], "colour and error on the screen, 0..1; no error is certain");
     /// With a tolerance: the error of each pixel, 0..1 of the screen; 0 is certain.
     PixelErrors = D::image("pixel_errors", per_ray, |_| Format::R32f).of(GREY, "error on the screen, 0..1; 0 is certain");
-    /// With a tolerance: a bit for each pixel of a tile of 8 x 8, set if its error is too large, and (`MarkedBefore`) the number of such pixels in
-    /// the tiles before.
+    /// With a tolerance: a bit for each pixel of a tile of 8 x 8, set if its error is too large. `MarkedBefore` is the number of such pixels in the
+    /// tiles before.
     ErrorMarks = D::image("error_marks", |s| Shape::Two(tolerance::tiles(s)), |_| Format::Rg32u)
         .of(&["rows 0 to 3", "rows 4 to 7"], "bits of pixels of a tile");
     MarkedBefore = D::image("marked_before", |s| Shape::Two(tolerance::tiles(s)), |_| Format::R32u).of(GREY, "pixels");
@@ -476,7 +481,8 @@ slots! {
     Picture = D::image("picture", per_pixel, |_| Format::Rgba16f).of(COLOUR, "share, 0..1");
     SmoothPicture = D::image("smooth_picture", per_pixel, |_| Format::Rgba16f).of(COLOUR, "share, 0..1");
     SmoothPictureB = D::image("smooth_picture_b", per_pixel, |_| Format::Rgba16f).of(COLOUR, "share, 0..1");
-    /// AOS on the picture, elimination of rows or columns, as `SliceShares` and `SliceForward`.
+    /// AOS on the picture, after the elimination along rows or columns: the result at a pixel is `PictureForward` plus `PictureShares` times the
+    /// result at the next pixel.
     PictureShares = D::image("picture_shares", per_pixel, |_| Format::R32f).of(GREY, "share, 0..1");
     PictureForward = D::image("picture_forward", per_pixel, |_| Format::Rgba32f).of(COLOUR, "share, 0..1");
     PictureRows = D::image("picture_rows", per_pixel, |_| Format::Rgba32f).of(COLOUR, "share, 0..1");
@@ -505,7 +511,8 @@ fn frame_layers(scene: &Scene) -> Shape {
     Shape::Layers([width, height, BATCHES_IN_FLIGHT * frames_per_batch(scene)])
 }
 
-/// The layer after the last one of the ring entry that holds `layer`, in a frame array of `layers` layers.
+/// A frame array of `layers` layers has a range of layers for each entry of the staging ring. Returns the end (exclusive) of the range that holds
+/// `layer`.
 pub fn ring_entry_end(layers: u32, layer: u32) -> u32 {
     let entry = (layers / BATCHES_IN_FLIGHT).max(1);
     layer - layer % entry + entry
@@ -670,7 +677,8 @@ impl Slot {
         matches!(self.shape(scene), Shape::Layers(_))
     }
 
-    /// True if the slot has one texel for each texel of the volume. The device stores only the stored bounds of it.
+    /// True if the slot has one texel for each texel of the volume; [`Slot::PackedNeighbours`] does not count. The device stores only the stored
+    /// bounds of it.
     pub fn is_volume(self) -> bool {
         let of_rays =
             matches!(self, Slot::Volume | Slot::SharpVolume | Slot::WholeVolume | Slot::Floating | Slot::CutVolume);

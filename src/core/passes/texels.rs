@@ -201,7 +201,7 @@ impl Texels {
         Texels::decode([1; 3], format, &one.encode(format)).values[0]
     }
 
-    /// The distance between neighbouring values of this format near `value`.
+    /// The distance between neighbouring values of this format near `value`, of floats up to twice that; 0.9 for formats of integers.
     pub fn spacing(format: Format, value: f64) -> f64 {
         match format {
             Format::R8 | Format::Rgba8 | Format::Bgra8 => 1.0 / 255.0,
@@ -246,7 +246,7 @@ impl Arrays {
     /// The array under this name, to be changed.
     ///
     /// # Panics
-    /// As [`Arrays::get`].
+    /// The pass did not declare the name: its declaration and its reference disagree.
     pub fn get_mut(&mut self, name: &str) -> &mut Texels {
         match self.0.iter_mut().find(|(n, _)| *n == name) {
             Some((_, texels)) => texels,

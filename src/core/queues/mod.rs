@@ -21,8 +21,8 @@ pub enum QueueRole {
 }
 
 impl QueueRole {
-    /// Index of the queue for this work, on a device with `queues` queues: 0 renders, 1 converts frames, 2 copies them. With fewer queues, work
-    /// shares one.
+    /// Index of the queue for this work, on a device with `queues` queues: 0 renders, 1 converts frames, 2 copies them. With two queues, copies share
+    /// that of the conversion; with one, all share it.
     pub fn queue(self, queues: usize) -> usize {
         (self as usize).min(queues.clamp(1, MAX_QUEUES) - 1)
     }

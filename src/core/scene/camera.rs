@@ -51,8 +51,8 @@ pub fn full_size(settings: &Settings) -> [u32; 2] {
     settings.layout.rendering(settings.picture.size).size.map(|n| n * settings.ray.rays)
 }
 
-/// The rays of the settings' camera, which frames the box `low`..`high`, mm in space. `depth_offset` converts depths below the probe's face to Y.
-/// `still`: the recording is a single frame, which is viewed from the side like a B-mode picture, with the probe on top.
+/// The rays of the settings' camera, which frames the box `low`..`high`, mm in space. `depth_offset`, mm, is added to depths below the probe's face
+/// to give Y in space. `still`: the recording is a single frame, which is viewed from the side like a B-mode picture, with the probe on top.
 pub fn rays(settings: &Settings, low: DVec3, high: DVec3, depth_offset: f64, still: bool) -> Rays {
     let camera = &settings.camera;
     let azimuth = camera.azimuth.to_radians();

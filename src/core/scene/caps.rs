@@ -35,8 +35,8 @@ impl Scene {
         View { window: self.settings.planes.window, low, high: self.high }
     }
 
-    /// The sample value, before any window, from which on matter counts as tissue on a cut face. None if no cut face is shown: dark matter is
-    /// rendered, or everything is translucent.
+    /// The sample value, before any window, from which on matter counts as tissue on a cut face. None in mode volume if the brightest matter is
+    /// translucent, so that no cut face is shown.
     pub fn cap_level(&self) -> Option<f64> {
         let solid = self.solid_from()?;
         let level = self.settings.cap.level.unwrap_or(solid);

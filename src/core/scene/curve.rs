@@ -95,7 +95,8 @@ impl Line {
         self.starts.last().copied().unwrap_or(0.0)
     }
 
-    /// Position and unit direction at a distance along the line, mm. A distance beyond an end is clamped to it.
+    /// Position and unit direction at a distance along the line, mm. A distance beyond an end is clamped to it. A line without length gives (0, 0)
+    /// and the x axis.
     pub fn at(&self, along: f64) -> (DVec2, DVec2) {
         let along = along.clamp(0.0, self.length());
         let piece = self.starts.partition_point(|start| *start <= along).clamp(1, self.starts.len().max(2) - 1) - 1;
@@ -114,7 +115,8 @@ impl Line {
         (segment.at(t), direction.unwrap_or(DVec2::X))
     }
 
-    /// The point of the line that is nearest to `point`, as its distance along the line, and how far it is from `point`; mm.
+    /// The point of the line that is nearest to `point`, as its distance along the line, and how far it is from `point`; mm. (0, infinity) for a line
+    /// without length.
     pub fn nearest(&self, point: DVec2) -> (f64, f64) {
         self.near(point, 0.0).into_iter().min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0.0, f64::INFINITY))
     }

@@ -85,7 +85,7 @@ pub struct Recorded {
     pub stated: Input,
     /// What was added to signed samples to store them as unsigned ([`SampleType::shift`](crate::probe::SampleType::shift)).
     pub shift: f64,
-    /// Levels of the volume's echoes. None if no default depends on them, or if all samples are equal.
+    /// Levels of the volume's echoes. None if no default depends on them, or if the samples are too few or all equal.
     pub levels: Option<EchoLevels>,
     /// True if defaults complete the settings. False if the settings are complete already, such as those of a workspace.
     pub is_completed: bool,
@@ -116,19 +116,21 @@ impl Recorded {
         self.is_completed && layers.needs_levels()
     }
 
-    /// A histogram that counts the echoes of the volume's frames, for [`Recorded::levels`].
+    /// An empty histogram for the echoes of the volume. Once it has taken all frames ([`EchoHistogram::take`]), its levels are those for
+    /// [`Recorded::levels`].
     ///
     /// # Errors
-    /// As for [`Layers::finish`].
+    /// One line: the layers together are no valid settings.
     pub fn histogram(&self, layers: &Layers) -> Result<EchoHistogram, LoadError> {
         let samples = self.samples(&layers.clone().finish()?);
         Ok(EchoHistogram::new(&self.geometry, samples, block_edge(&self.geometry)))
     }
 
-    /// The scene of these layers of settings on the recording, completed by defaults.
+    /// The scene of these layers of settings on the recording. They are completed by defaults if `is_completed`, unless defaults depend on levels of
+    /// echoes that the recording does not have.
     ///
     /// # Errors
-    /// As for [`Layers::finish`] and [`Scene::new`].
+    /// The layers together are no valid settings, or a setting cannot be rendered with this geometry.
     pub fn scene(&self, layers: &Layers) -> Result<Scene, RecordedFault> {
         // Of a volume that is all the same nothing follows, and what was set explains the picture best.
         let is_alike = layers.needs_levels() && self.levels.is_none();
@@ -156,7 +158,7 @@ impl Defaults {
     /// The settings of the layers, completed by defaults for their mode.
     ///
     /// # Errors
-    /// As for [`Layers::finish`].
+    /// One line: the layers together are no valid settings.
     pub fn settings(&self) -> Result<Settings, LoadError> {
         Ok(self.layers.completed(&self.geometry, self.levels.as_ref())?.settings)
     }
@@ -196,11 +198,11 @@ impl Layers {
         self.presets().is_empty()
     }
 
-    /// The settings of the layers for a geometry, completed by defaults. Without a preset, grey windows follow from `levels`; None takes those of
-    /// a face in fluid.
+    /// The settings of the layers for a geometry, completed by defaults. Without a preset, the ramp of volume rendering and the grey windows follow
+    /// from `levels`. None takes the ramp of a face in fluid, and leaves the windows of surfaces, projections and planes at their defaults.
     ///
     /// # Errors
-    /// As for [`Layers::finish`].
+    /// One line: the layers together are no valid settings.
     pub fn completed(&self, geometry: &Geometry, levels: Option<&EchoLevels>) -> Result<Completed, LoadError> {
         let chosen = self.clone().finish()?;
         let mut found =

@@ -41,8 +41,8 @@ pub struct EchoLevels {
     pub low: f64,
     /// The value above which three of a thousand samples lie.
     pub high: f64,
-    /// Depth behind a bright layer next to the probe, mm as in `region.depth`, at which the default region of interest begins. None if there is no
-    /// such layer.
+    /// Depth at which the default region of interest begins, mm below the probe's face: the middle of the first clear layer behind a bright one next
+    /// to the probe. None if there is no such layer.
     pub start: Option<f64>,
 }
 

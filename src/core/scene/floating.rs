@@ -7,7 +7,7 @@ use crate::probe::{Geometry, Motion};
 const PER_TEXEL: f64 = (1u64 << 30) as f64;
 
 impl Scene {
-    /// True if floating parts are dropped: `floating` is set, and something is rendered from a volume of several slices.
+    /// True if floating parts are dropped: `floating` is set, the mode composites or detects a surface, and the volume has several slices.
     pub fn drops_floating(&self) -> bool {
         let is_still = self.probe().is_some_and(|probe| matches!(probe.motion, Motion::Still { .. }));
         self.settings.floating > 0.0 && (self.composites() || self.detects_surface()) && self.slices() > 1 && !is_still

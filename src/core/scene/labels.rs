@@ -30,7 +30,7 @@ pub struct LabelVolume {
     colours: Vec<[f64; 3]>,
 }
 
-/// Labels that copies of settings share. Two are equal if they are the same.
+/// Labels that copies of settings share. Two are equal only if they share one [`LabelVolume`] in memory, whatever it holds.
 #[derive(Clone)]
 pub struct SharedLabels(Arc<LabelVolume>);
 

@@ -66,7 +66,7 @@ impl Layers {
         self.labels = Some(labels);
     }
 
-    /// One layer that holds all of `settings`. Empty if they cannot be written as TOML.
+    /// One layer that holds all of `settings`. None if they cannot be written as TOML.
     pub fn of(settings: &Settings) -> Option<Layers> {
         let labels = settings.labels.volume.clone();
         settings.to_table().ok().map(|merged| Layers { merged, labels, ..Layers::default() })
@@ -143,16 +143,25 @@ impl Layers {
     }
 
     /// Adds a layer: a table with the keys of a scene file. `layer` names it in messages; relative file names in it refer to `folder`.
+    ///
+    /// # Errors
+    /// One line: a value is invalid, alone or with the layers so far, or a file that it names cannot be read.
     pub fn table(&mut self, layer: &str, table: Table, folder: &Path) -> Result<(), LoadError> {
         self.merge_checked(layer, table, Some(folder))
     }
 
     /// Adds the assignment of a flag `--set key.path=value`. The value is TOML, or a plain word.
+    ///
+    /// # Errors
+    /// One line: it is no assignment, or the value is invalid, alone or with the layers so far.
     pub fn set(&mut self, assignment: &str) -> Result<(), LoadError> {
         self.set_by(&format!("--set {assignment}"), assignment)
     }
 
-    /// Like [`Layers::set`], for another flag that sets a value. `flag`: the flag as it was typed, for messages.
+    /// Adds an assignment `key.path=value`, whose value is TOML or a plain word. `flag`: the flag that it comes from, as it was typed, for messages.
+    ///
+    /// # Errors
+    /// One line: it is no assignment, or the value is invalid, alone or with the layers so far.
     pub fn set_by(&mut self, flag: &str, assignment: &str) -> Result<(), LoadError> {
         let fault = |fault: &str| LoadError::Layer { layer: flag.into(), fault: fault.into() };
         let (path, text) = assignment.split_once('=').ok_or_else(|| fault("must read key.path=value"))?;

@@ -136,11 +136,11 @@ pub struct TileMarks {
     pub letters: Vec<(Edge, &'static str)>,
     /// The edge at which the dot for the probe's marker is drawn. None if it is not shown.
     pub probe: Option<Edge>,
-    /// Letter and colour of the plane. None if only one plane is shown.
+    /// Letter and colour of the plane. None for a rendering, for the slices of tomography, and if only one plane is shown.
     pub plane: Option<(&'static str, [f64; 3])>,
     /// For a curved plane the length of its line, mm; else None.
     pub along: Option<f64>,
-    /// For a plane across an axis of the volume, the name of the axis and the position on it, mm; else None.
+    /// For a plane across an axis of the volume, the name of the axis and the position on it, mm (depth from the probe's face); else None.
     pub place: Option<(&'static str, f64)>,
 }
 
@@ -150,7 +150,8 @@ impl Scene {
         self.marks_with(&self.settings.marks)
     }
 
-    /// As [`Scene::marks`], by these marks instead of those of the scene's settings, which may be older than the picture on display.
+    /// The marks of every tile, in the order of the tiles, the rendering last; by `marks` in place of those in the scene's settings, which a viewer
+    /// may have changed since.
     pub fn marks_with(&self, marks: &Marks) -> Vec<TileMarks> {
         let mut all = Vec::new();
         if self.cuts_planes() {

@@ -107,7 +107,7 @@ impl SliceGrid {
 #[derive(Clone, Copy, Debug)]
 pub struct View {
     pub window: [f64; 2],
-    /// Lower corner of the box, at the start depth where that is deeper than the region, mm in space.
+    /// Lower corner of the box, at the start depth where that is deeper than the region's near face, mm in space.
     pub low: DVec3,
     /// Upper corner of the box, mm in space.
     pub high: DVec3,
@@ -175,7 +175,7 @@ pub struct Scene {
     pub low: DVec3,
     pub high: DVec3,
     pub rays: Rays,
-    /// Distance between samples along a ray, mm.
+    /// Distance between samples along a ray, mm; the shortest one if steps grow along it (`ray.spread`).
     pub step: f64,
     /// The ring of the surface detector, whose own step divides the length of an edge evenly.
     pub ring: Ring,
@@ -593,7 +593,7 @@ impl Scene {
         })
     }
 
-    /// The length that the transfer function's opacities refer to: one slice pixel, mm.
+    /// The length that the transfer function's opacities refer to, mm: one slice pixel, along its shorter edge.
     pub fn reference_length(&self) -> f64 {
         self.grid.pitch[0].min(self.grid.pitch[1])
     }

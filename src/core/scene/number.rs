@@ -319,7 +319,7 @@ impl Settings {
     }
 }
 
-/// Lowest and highest start depth, mm below the probe's face, that leaves at least 1 mm of the region.
+/// Lowest and highest start depth, mm below the probe's face, that leaves at least 1 mm of the region. The lowest is -infinity: no limit.
 pub fn start_depths(scene: &Scene) -> [f64; 2] {
     [f64::NEG_INFINITY, scene.high.y - depth_offset(&scene.geometry) - 1.0]
 }

@@ -78,7 +78,7 @@ impl<'a> Picker<'a> {
         std::array::from_fn(|a| ((ray[a] as f64 + 0.5) / self.rays_per_pixel + self.corner[a]) as usize)
     }
 
-    /// The position on the picture of a point in space, mm. None behind the camera.
+    /// The position on the picture, pixels, of a point in space, mm. None behind the camera of a perspective view.
     pub fn project(&self, point: DVec3) -> Option<[f64; 2]> {
         let r = self.rays;
         let from = point - r.origin;

@@ -120,7 +120,7 @@ impl Scene {
         View { window: self.settings.planes.window, low, high }
     }
 
-    /// The clip planes that cut planes: (n, w) as in [`Scene::clips`]. None cuts the section volume.
+    /// The clip planes that cut planes: (n, w), which remove the points p with dot(n, p) > w, mm. None cuts the section volume.
     pub(crate) fn planes_clips(&self) -> impl Iterator<Item = (DVec3, f64)> {
         let is_cut = !self.has_sections();
         self.clips().filter(move |_| is_cut)
@@ -202,7 +202,7 @@ impl Scene {
         NEXT_POINT * (high - low).length()
     }
 
-    /// The settings of the curved plane. None if this mode does not show it.
+    /// The settings of the curved plane. None if there is none, or if the layout and the mode do not show it.
     pub fn curve(&self) -> Option<&Curve> {
         let planes = &self.settings.planes;
         planes.curve.as_ref().filter(|curve| match (self.settings.layout, self.settings.mode) {
@@ -237,15 +237,15 @@ impl Scene {
     }
 
     /// The place in space, mm, of a point given by its coordinates on a plane, mm right and down: lateral and depth on A, elevation and depth on B,
-    /// lateral and -elevation on C, from the origins of [`Scene::point_of`]. A plane that is turned turns them about the middle of the insonified
-    /// region.
+    /// lateral and -elevation on C, counted from lateral, depth (below the probe's face) and elevation 0. A plane that is turned turns them about the
+    /// middle of the insonified region.
     pub fn place_on_plane(&self, name: PlaneName, [across, along]: [f64; 2]) -> DVec3 {
         let (plane, origin) = (self.plane(name), self.plane_origin(name));
         let place = origin + plane.right * across + plane.down * along;
         place + plane.normal * (plane.at - place).dot(plane.normal)
     }
 
-    /// The coordinates on a plane, as of [`Scene::place_on_plane`], of a place in space, mm, projected onto it.
+    /// The opposite of [`Scene::place_on_plane`]: the coordinates on a plane, mm right and down, of a place in space, mm, projected onto it.
     pub fn point_on_plane(&self, name: PlaneName, place: DVec3) -> [f64; 2] {
         let (plane, from) = (self.plane(name), place - self.plane_origin(name));
         [from.dot(plane.right), from.dot(plane.down)]
@@ -334,7 +334,8 @@ impl Scene {
         self.line_on_tile(tiling, self.settings.planes.curve.as_ref()?)
     }
 
-    /// As [`Scene::curve_line`], for a curved plane that is not in the settings.
+    /// Where the line of the curved plane `curve`, which need not be that of the settings, lies on the tile of the plane that it is drawn on. None if
+    /// there is no such tile.
     pub fn line_on_tile(&self, tiling: &Tiling, curve: &Curve) -> Option<CurveLine> {
         let is_its = |n: &usize| self.plane_of_tile(*n) == Some(curve.plane);
         let number = (0..tiling.tiles.len()).find(is_its).filter(|_| self.cuts_planes())?;
@@ -528,7 +529,8 @@ impl Tiling {
         }
     }
 
-    /// Where a point in space lies on a tile: its position on the picture, and its distance from the plane along its normal, mm.
+    /// Where a point in space lies on a tile: its position on the picture, pixels, and its distance from the plane, mm: along the normal, negative on
+    /// the other side; of a curved plane never negative.
     pub fn project(&self, tile: &Tile, point: DVec3) -> ([f64; 2], f64) {
         let from = point - tile.plane.at;
         let (along, off) = match &tile.section {

@@ -88,8 +88,8 @@ impl Scene {
         Some(StartCurve::new(&points.iter().map(|[lateral, depth]| [*lateral, depth + offset]).collect::<Vec<_>>()))
     }
 
-    /// For each column and slice of the volume, the column fastest, the first row that is not in front of the start curve. All 0 without
-    /// one.
+    /// For each column and slice of the volume, the column fastest, the first row that is not in front of the start curve, or the number of rows if
+    /// all are. All 0 without a curve.
     pub fn start_curve_rows(&self) -> Vec<u32> {
         let [columns, rows] = self.grid.size;
         let Some(curve) = self.start_curve() else { return vec![0; (columns * self.slices()) as usize] };

@@ -134,8 +134,8 @@ pub fn table(points: &[TransferPoint], threshold: f64, entries: usize) -> Vec<[f
     table_by(points, threshold, entries, Absorption::of_length(1.0))
 }
 
-/// As [`table`], for the settings of volume rendering: with [`Volume::extinction`] in place of opacities of one reference length. `reference_length`:
-/// mm.
+/// The table of volume rendering's settings: red, green, blue and absorption over one reference length at equidistant sample values from 0 to 1, by
+/// [`Volume::extinction`] if it is set, and 0 below the threshold. `reference_length`: mm.
 pub(crate) fn table_of(volume: &Volume, reference_length: f64, entries: usize) -> Vec<[f64; 4]> {
     table_by(&of(volume), volume.threshold, entries, Absorption::of(volume, reference_length))
 }

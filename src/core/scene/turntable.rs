@@ -14,7 +14,7 @@ impl Scene {
     /// direction turns right by 360 / `count` degrees about the picture's vertical axis through the target.
     ///
     /// # Errors
-    /// The mode shows planes, which do not turn with the view; or, as [`Scene::new`], the region has no volume.
+    /// The mode shows planes, which do not turn with the view; or a start depth leaves nothing of the region.
     pub fn turntable(&self, count: u32) -> Result<Vec<Camera>, SceneError> {
         if self.is_flat() {
             return refuse("mode", "shows planes, which do not turn with the view: a turntable needs a rendering");

@@ -113,7 +113,8 @@ pub fn switches(from: &Settings, follow: impl Fn(Settings) -> Settings) -> Vec<V
     variants
 }
 
-/// As [`switches`], and also every way to sample the volume in every mode, every mode of every preset, and every filter and light.
+/// All variants of `from` that [`switches`] gives, and also every way to sample the volume in every mode, every mode of every preset, and every
+/// filter and light.
 pub fn all(from: &Settings) -> Vec<Variant> {
     let mut variants = switches(from, |settings| settings);
     for sampling in SAMPLINGS {

@@ -50,8 +50,8 @@ pub trait Medium {
     fn at(&self, place: Place) -> Option<[f64; 4]>;
     /// Mean colour weighted by absorption, and mean absorption, over a step along which the sample value changes linearly from `from` to `to`.
     fn between(&self, from: Place, to: Place) -> Option<[f64; 4]>;
-    /// Premultiplied red, green, blue, and opacity, of the same step of `length` reference lengths: the integral of its light, each place dimmed by
-    /// the step's own matter in front of it.
+    /// Premultiplied red, green, blue, and opacity, of a step of `length` reference lengths along which the sample value changes linearly from `from`
+    /// to `to`: the integral of its light, each place dimmed by the step's own matter in front of it.
     fn self_attenuated(&self, from: Place, to: Place, length: f64) -> Option<[f64; 4]>;
 }
 
@@ -70,8 +70,8 @@ pub struct March {
 }
 
 impl March {
-    /// Returns red, green, blue and opacity of the ray, and the offset, mm, at which its opacity reaches `hit`; None if it does not. `offset` maps a
-    /// number of steps to mm behind the entry, and rises with it.
+    /// Returns premultiplied red, green, blue, and opacity, of the ray, and the offset, mm, at which its opacity reaches `hit`; None if it does not.
+    /// `offset` maps a number of steps to mm behind the entry, and rises with it.
     pub fn through(&self, medium: &impl Medium, offset: impl Fn(f64) -> f64) -> ([f64; 4], Option<f64>) {
         let mut light = [0.0; 3];
         let mut opacity = 0.0;

@@ -205,7 +205,7 @@ fn marked(marks: &Texels, tile: usize) -> u32 {
     marks.values[2 * tile..2 * tile + 2].iter().map(|word| (*word as u32).count_ones()).sum()
 }
 
-/// Lists the marked pixels in the order of their tiles; a single workgroup counts them.
+/// Counts the marked pixels in the tiles before each tile, and the workgroups that `REFINE` needs for all of them. It is a single workgroup.
 pub const LIST: Pass = Pass {
     name: "tolerance_list",
     shader: |_, _| "tolerance/list",

@@ -208,7 +208,7 @@ fn kind(scene: &Scene) -> Kind {
     }
 }
 
-/// The length that the transfer function's opacities refer to: one slice pixel, mm.
+/// The length that the transfer function's opacities refer to, mm: one slice pixel, along its shorter edge.
 pub fn reference_length(scene: &Scene) -> f64 {
     scene.reference_length()
 }

@@ -25,7 +25,8 @@ impl Default for Cine {
 }
 
 impl Cine {
-    /// The numbers of the volumes that are played, ascending, for a recording of `count` volumes. Empty if `first` and `last` are not among them.
+    /// The numbers of the volumes that are played, ascending, for a recording of `count` volumes. Empty if `first` lies beyond the last volume, or
+    /// after `last`; a `last` beyond the last volume counts as that one.
     pub fn volumes(&self, count: usize) -> Vec<usize> {
         let first = self.first.map_or(0, |first| first as usize);
         let last = self.last.map_or(count.saturating_sub(1), |last| last as usize);

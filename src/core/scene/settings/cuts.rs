@@ -39,7 +39,7 @@ pub struct Cut {
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Brush {
-    /// Distance from its strokes within which it removes.
+    /// Distance from its strokes, mm, within which it removes.
     pub radius: f64,
     /// Points that straight lines join, mm: lateral, depth (from the probe's face), elevation. A stroke of one point is a ball. All strokes have 1 to
     /// 512 points together.
@@ -61,9 +61,9 @@ pub struct CutView {
     pub at: [f64; 3],
     /// Direction of the view, away from the viewer, of any length but 0: the normal of the contour's plane.
     pub direction: [f64; 3],
-    /// The upward direction, not parallel to the other; of it, what lies in the plane.
+    /// The upward direction of the view, not parallel to `direction`; only its part in the contour's plane counts.
     pub up: [f64; 3],
-    /// Perspective: distance of the viewer's eye from the contour's plane, in front of its origin. Absent: a parallel view.
+    /// Perspective: distance of the viewer's eye from the contour's plane, mm, in front of its origin. Absent: a parallel view.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub eye: Option<f64>,
 }

@@ -9,15 +9,15 @@ use serde::{Deserialize, Serialize};
 pub struct Marks {
     /// The scan line at which the marker on the probe's housing is. A dot shows its side on every tile.
     pub probe: ProbeMarker,
-    /// The patient's sides from the first scan line (-lateral) to the last (+lateral). Of three axes two say the third: others are refused as those of a
-    /// mirrored patient.
+    /// The patient's sides from the first scan line (-lateral) to the last (+lateral). Two axes determine the third: sides that fit only a mirrored
+    /// patient are refused.
     pub lateral: Sides,
     /// The patient's sides from the probe's face down.
     pub depth: Sides,
     /// The patient's sides from the first slice (-elevation) to the last (+elevation).
     pub elevation: Sides,
-    /// `render` draws the sides on the tiles, and a bar below the picture: scale, depth, mode, time and "not a medical device". The picture is
-    /// as many pixels higher. The viewer has a switch of its own for saved pictures.
+    /// `render` draws the sides on the tiles, and a bar below the picture: scale, depth, mode, time and "not a medical device". The picture becomes
+    /// higher by the bar. The viewer has a switch of its own for saved pictures.
     pub bar: bool,
 }
 
@@ -34,7 +34,7 @@ pub enum ProbeMarker {
     Hidden,
 }
 
-/// The sides of the patient at the two ends of an axis.
+/// The sides of the patient at the two ends of an axis, from the low end to the high one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sides {
@@ -81,7 +81,8 @@ impl Sides {
         }
     }
 
-    /// The sides along an axis that runs in this direction of the patient, as [`Sides::direction`].
+    /// The sides along an axis that runs in this direction of the patient, in the axes to the left, to the back and to the head: those that are
+    /// nearest to it.
     pub(crate) fn along(direction: DVec3) -> Sides {
         let all = [Sides::RightLeft, Sides::FrontBack, Sides::FeetHead];
         let all = all.into_iter().flat_map(|sides| [sides, sides.exchanged()]);

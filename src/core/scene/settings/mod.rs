@@ -78,7 +78,7 @@ pub struct Settings {
     pub surface: Surface,
     /// Stage 2: projections (modes mip, minip and mean).
     pub projection: Projection,
-    /// Stage 2: planes (modes plane, orthogonal and tomography, and 4-up).
+    /// Stage 2: planes (modes plane, orthogonal and tomography, and layouts four and beside).
     pub planes: Planes,
     /// Stage 2: the solid block (mode cube).
     pub cube: Cube,
@@ -103,7 +103,8 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// The settings while the view moves: one ray for four pixels. Stage 1 stays the same.
+    /// The settings while the view moves: one ray for four pixels, or as few as `ray.subsampling` says if that is more than 2. Stage 1 stays the
+    /// same.
     pub fn moving(&self) -> Settings {
         let subsampling = self.ray.subsampling.max(2);
         Settings { ray: Ray { subsampling, rays: 1, ..self.ray.clone() }, ..self.clone() }
@@ -116,7 +117,7 @@ impl Settings {
         Settings { measure, body_marks, marks: other.marks.clone(), cine: other.cine, ..self }
     }
 
-    /// These settings without anything that is drawn over the picture.
+    /// These settings without measurements, annotations, body marks and marks, and with the cine loop of a whole recording. Labels stay.
     pub fn without_drawings(self) -> Settings {
         self.with_drawings_of(&Settings::default())
     }
@@ -233,14 +234,14 @@ pub struct Region {
     pub depth: Option<[f64; 2]>,
     /// Elevation bounds, mm.
     pub elevation: Option<[f64; 2]>,
-    /// Curved render start: 3 to 5 points [lateral, depth] of a line, mm, lateral ascending, by a hundred-thousandth of the line's width at least. What is nearer to the probe than the
-    /// line is not rendered, at any elevation. The line is a monotone cubic: smooth, and between two points never beyond their depths; left of the
-    /// first point and right of the last it stays at their depths. Planes and the block of mode cube show everything; a 4-up picture has the line in
-    /// green on its planes. With `unveil`, start depths and the region, rendering starts at the deepest of them. Takes a second volume. Absent:
-    /// rendering starts at the region's near face.
+    /// Curved render start: 3 to 5 points [lateral, depth] of a line, mm, lateral ascending, by a hundred-thousandth of the line's width at least.
+    /// What is nearer to the probe than the line is not rendered, at any elevation. The line is a monotone cubic: smooth, and between two points
+    /// never beyond their depths; left of the first point and right of the last it stays at their depths. Planes and the block of mode cube show
+    /// everything; planes beside a rendering have the line in green. With `unveil`, start depths and the region, rendering starts at the deepest of
+    /// them. Takes a second volume. Absent: rendering starts at the region's near face.
     pub start_curve: Option<Vec<[f64; 2]>>,
-    /// Length over which what is composited fades towards the faces of the region, except the shallowest. It is also the radius of the
-    /// region's edges and corners.
+    /// Length, mm, over which what is composited fades towards the faces of the region, except the shallowest. It is also the radius of the region's
+    /// edges and corners.
     pub fade: f64,
 }
 

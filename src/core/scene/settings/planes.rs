@@ -8,10 +8,10 @@ use crate::scene::planes::MAX_TILES;
 use crate::scene::{Mode, Scene, Settings};
 use serde::{Deserialize, Serialize};
 
-/// Modes plane, orthogonal and tomography, and the planes of a 4-up picture. A position and three angles define one coordinate frame for
-/// all planes: A is the B-mode plane (lateral to the right, depth down), B is perpendicular to it (elevation to the right, depth down),
-/// C is the coronal plane (lateral to the right, elevation up). All tiles have the same scale and are centred on the middle of the
-/// region, so that scrolling does not shift them.
+/// Modes plane, orthogonal and tomography, and the planes of layouts four and beside. A position and three angles define one coordinate frame for all
+/// planes: A is the B-mode plane (lateral to the right, depth down), B is perpendicular to it (elevation to the right, depth down), C is the coronal
+/// plane (lateral to the right, elevation up). All tiles have the same scale and are centred on the middle of the region, so that scrolling does not
+/// shift them.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Planes {
@@ -46,9 +46,9 @@ pub struct Planes {
     /// Draws cross-lines where the other planes cut a tile, and a frame in the plane's colour: A yellow, B magenta, C cyan. Tomography has
     /// thin grey lines between tiles.
     pub lines: bool,
-    /// 4-up: Gaussian of a volume of their own that the planes are cut from. It is filtered by nothing else and has all of the sector: region, clip
-    /// planes and filters of the rendering are the rendering's. Absent: the planes are cut from what is rendered. It takes a second volume's
-    /// memory, and scan conversion and this Gaussian once more for each frame.
+    /// Layouts four and beside: Gaussian of a volume of their own that the planes are cut from. It is filtered by nothing else and has all of the
+    /// sector: region, clip planes and filters of the rendering are the rendering's. Absent: the planes are cut from what is rendered. It takes a
+    /// second volume's memory, and scan conversion and this Gaussian once more for each frame.
     pub smooth: Option<Smooth>,
     /// A curved plane: the section along a line that is drawn on one of the planes, perpendicular to that plane, straightened. Mode orthogonal shows it in
     /// its fourth tile, mode plane below or beside the plane that the line is drawn on. Across it shows the length along the line, down the direction
@@ -130,7 +130,7 @@ pub struct Cube {
     pub inset: Inset,
     /// Tilt of each face about its middle.
     pub tilt: Tilt,
-    /// Darkening of a face that is seen edge-on; 0 shows samples unchanged.
+    /// Share of its brightness that a face loses where it is seen edge-on; 0 shows samples unchanged.
     pub shading: f64,
     /// Draws thin lines where two faces meet. The borders of the insonified region count as faces.
     pub edges: bool,

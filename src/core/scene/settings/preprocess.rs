@@ -323,12 +323,12 @@ pub enum Scheme {
     /// Forward Euler: one dispatch per step.
     #[default]
     Explicit,
-    /// Additive operator splitting (Weickert, ter Haar Romeny and Viergever 1998): semi-implicit, stable at any step, inaccurate at large
-    /// ones; four dispatches per step.
+    /// Additive operator splitting (Weickert, ter Haar Romeny and Viergever 1998): semi-implicit, stable at any step, inaccurate at large ones; two
+    /// or four dispatches per step, on a CPU four.
     Aos,
-    /// AOS with Richardson's extrapolation: twice the result of two half steps, less that of one step. Second order in the limit of short steps; on smooth
-    /// data 1.1 at steps of 4 to 1.7 at steps of 1/4. Stable, but values may leave the range of their neighbours. Slices only; twelve dispatches per
-    /// step.
+    /// AOS with Richardson's extrapolation: twice the result of two half steps, less that of one step. Second order in the limit of short steps; on
+    /// smooth data 1.1 at steps of 4 to 1.7 at steps of 1/4. Stable, but values may leave the range of their neighbours. Slices only; six or twelve
+    /// dispatches per step, on a CPU twelve.
     AosRichardson,
     /// Runge-Kutta-Legendre super time steps of first order (RKL1; Meyer, Balsara and Aslam 2014): explicit stages, as many as the step needs
     /// to be stable, about sqrt(8 step). Slices only; a dispatch per stage.
@@ -484,7 +484,7 @@ impl Default for Blur {
 }
 
 impl Blur {
-    /// True if slices are blurred in a mode of planes (`is_flat`) or in one that casts rays (not `is_flat`).
+    /// True if slices are blurred. `is_flat`: true for modes of planes, false for modes that cast rays.
     pub fn is_on(self, is_flat: bool) -> bool {
         match self {
             Blur::Always(on) => on,

@@ -102,8 +102,8 @@ impl Default for Ray {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Sampling {
-    /// The fastest for the device. A GPU filters in hardware. A CPU loads texels faster than it emulates a sampler; it uses quads if a
-    /// picture takes at least six samples per texel, or with `slices.still`, and if at most 2^27 of them are needed.
+    /// The fastest for the device. A GPU filters in hardware. A CPU loads texels faster than it emulates a sampler; it uses quads if a picture takes
+    /// at least six samples per texel, or with `slices.still`, and if the volume has at most 2^27 texels.
     #[default]
     Auto,
     /// The trilinear filter of the device. Its weights may have only 8 bits.

@@ -103,7 +103,7 @@ pub struct Light {
     pub colour: [f64; 3],
     /// Colour of the surface.
     pub surface_colour: [f64; 3],
-    /// How much a weak echo at the surface darkens its colour.
+    /// How much a weak echo at the surface darkens its colour: 0 not at all, 1 in proportion to the echo.
     pub texture: f64,
     /// Neighbours whose distances differ by more than this belong to two surfaces, mm. Normals do not cross the gap.
     pub cliff: f64,
@@ -159,26 +159,26 @@ impl Default for Light {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct LightVolume {
-    /// Edge of a cell. Absent: half the standard deviation of the Gaussian that the volume is smoothed with (`slices.smooth`), and a slice
-    /// pixel at least. Where there would be more cells than `cells` they are larger; `--explain` says what they are and why.
+    /// Edge of a cell, mm. Absent: half the standard deviation of the Gaussian that the volume is smoothed with (`slices.smooth`), and a slice pixel
+    /// at least. Where there would be more cells than `cells` they are larger; `--explain` says what they are and why.
     pub cell: Option<f64>,
     /// Most cells, nearly; also at most 1024 along an edge. A cell takes 44 bytes of the device's memory.
     pub cells: u32,
     /// Samples along each edge of a cell.
     pub taps: u32,
-    /// Depth of light: the path through the most opaque tissue after which 1/e of green light is left.
+    /// Depth of light: the path through the most opaque tissue, mm, after which 1/e of green light is left.
     pub depth: f64,
     /// Warmth: how much deeper red light goes than green, and green than blue; 0 is grey.
     pub warmth: f64,
     /// Standard deviation over which light has spread after 1 mm, mm; it grows with the square root of the path. The lattice spreads light
     /// over at least half a cell a layer.
     pub widening: f64,
-    /// Standard deviation over which tissue scatters green light; red further, blue less.
+    /// Standard deviation over which tissue scatters green light, mm; red further, blue less.
     pub scatter: f64,
     /// Reach of ambient light, mm: matter farther away than this does not occlude it.
     pub reach: f64,
-    /// Slope of the echo from which on the orientation of a surface is certain: half that of skin in fluid after a Gaussian of 1.5 mm. Where the
-    /// echo is flatter, light depends less on the orientation.
+    /// Slope of the echo (0..1) per mm from which on the orientation of a surface is certain: half that of skin in fluid after a Gaussian of 1.5 mm.
+    /// Where the echo is flatter, light depends less on the orientation.
     pub slope: f64,
     /// How much light depends on the orientation of the tissue's surface: 0 not at all, 1 fully.
     pub relief: f64,
@@ -293,7 +293,7 @@ impl Default for Occlusion {
 pub struct Skin {
     /// How far the light wraps around the terminator: 0 not at all, 1 fully.
     pub wrap: f64,
-    /// Translucency: light that passes through thin tissue.
+    /// Translucency: factor, 0..1, of the light that passes through thin tissue.
     pub translucency: f64,
     /// Depth behind the surface over which echoes are averaged, mm.
     pub depth: f64,
@@ -320,7 +320,7 @@ pub struct Post {
     /// Antialiasing of surfaces, and of cut faces, that have one ray a pixel: pixels at outlines and folds mix what is near and what is far by the share that
     /// each covers, by the edge's places in the distance map around them. Folds are steps of `light.cliff`.
     pub antialias: bool,
-    /// Added to the brightness.
+    /// Added to the brightness, whose range is 0..1, after the contrast.
     pub brightness: f64,
     /// Contrast factor about middle grey.
     pub contrast: f64,

@@ -6,8 +6,8 @@ use crate::scene::number::{Group, Number, number};
 use serde::{Deserialize, Serialize};
 
 /// Automatic render start: what lies in front of the fluid before a face, such as the uterine wall, is not rendered. In each volume the start surface
-/// is the near face of the pocket of fluid, within the region. Planes and the block of mode cube show everything; a 4-up picture has the surface as
-/// a green line on its planes. Where no pocket can be told from the tissue around it, nothing is removed and one line says so: rendering starts at the
+/// is the near face of the pocket of fluid, within the region. Planes and the block of mode cube show everything; planes beside a rendering have the
+/// surface as a green line. Where no pocket can be told from the tissue around it, nothing is removed and one line says so: rendering starts at the
 /// region's or the mode's start depth. Takes a second volume, the whole sector in stage 1, and time of the CPU for each volume.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]

@@ -35,7 +35,8 @@ fn sums(n: u32) -> [Slot; 2] {
     }
 }
 
-/// The slots that hold the sums over all paths of each pixel: light and number of collisions, and the squares of luminance.
+/// The slots that hold the sums over all paths of each pixel: first light and the number of paths that met matter, then the squares of the paths'
+/// luminances.
 pub fn final_sums(scene: &Scene) -> [Slot; 2] {
     sums(still(scene).dispatches())
 }
