@@ -83,7 +83,7 @@ impl<'a, B: DrawingBackend> Canvas<'a, B> {
             .map_err(|e| fault(&e))
     }
 
-    /// Draws a marker of a data point, about 9 pixels across. `shape` modulo 5 selects one of five shapes that differ without colour.
+    /// Draws a marker of a data point, 8 to 12 pixels across. `shape` modulo 5 selects one of five shapes that differ without colour.
     pub fn mark(&self, at: [f64; 2], shape: usize, colour: RGBColor) -> Drawn {
         let polygon = |corners: &[[f64; 2]]| {
             let points: Vec<_> = corners.iter().map(|c| self.pixel([at[0] + c[0], at[1] + c[1]])).collect();
@@ -121,7 +121,7 @@ impl<'a, B: DrawingBackend> Canvas<'a, B> {
     /// Returns the text, shortened with an ellipsis if it is wider than `max_width` pixels in letters of `size` pixels.
     ///
     /// # Errors
-    /// As of [`Canvas::measure`].
+    /// One line: the text cannot be measured.
     pub fn cut(&self, text: &str, size: u32, max_width: f64) -> Result<String, String> {
         let mut cut = text.to_string();
         while self.measure(&cut, size)?[0] > max_width && cut.chars().count() > 1 {

@@ -35,7 +35,7 @@ pub fn sha256_of_file(path: &Path) -> io::Result<(String, u64)> {
 }
 
 /// SHA-256 of a recording, and the length of its files in bytes. For a recording of several files (samples apart from the header, a probe file) it
-/// is the hash of their digests, one a line.
+/// is the SHA-256 of their digests in hexadecimal, one a line, in the order of `files`. A path that is listed twice counts once.
 ///
 /// # Errors
 /// One line that names the file.

@@ -29,7 +29,8 @@ pub fn check(bytes: u64) -> Result<(), String> {
     }
 }
 
-/// Parses a number of bytes as users type it: a number with K, M, G or T, which are powers of 1024, or `none` for no limit.
+/// Parses a number of bytes above 0 as users type it: a number alone or with K, M, G or T, which are powers of 1024 (`8G`, `8GB` and `8GiB` are the
+/// same), or `none` for no limit, which gives `u64::MAX`.
 ///
 /// # Errors
 /// One line: what is allowed.

@@ -8,7 +8,7 @@ pub fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
     Some(low + at.fract() * (high - low))
 }
 
-/// As [`quantile`], for values in any order.
+/// The quantile at `share` (0..1, clamped) of values in any order, computed by [`quantile`]. None without values.
 pub fn quantile_of(values: impl IntoIterator<Item = f64>, share: f64) -> Option<f64> {
     let mut sorted: Vec<f64> = values.into_iter().collect();
     sorted.sort_by(f64::total_cmp);

@@ -79,8 +79,9 @@ pub fn failed(error: impl std::fmt::Display) -> Failure {
     Failure::Failed(error.to_string())
 }
 
-/// Prints a line on standard output. A write error is reported when the command ends: a reader may close the pipe at any time, but a full
-/// disk is a failure. Once standard output carries data ([`keep_standard_output`]), the line goes to standard error.
+/// Prints a line on standard output, with control characters escaped. A write error is kept for [`take_write_error`], to be reported when the
+/// command ends: a reader may close the pipe at any time, but a full disk is a failure. Once standard output carries data
+/// ([`keep_standard_output`]), the line goes to standard error.
 pub fn print(line: std::fmt::Arguments) {
     let line = without_control_characters(&line.to_string());
     if IS_DATA.load(Ordering::Relaxed) {
@@ -102,7 +103,8 @@ pub fn keep_standard_output() -> Result<(), &'static str> {
     Ok(())
 }
 
-/// Writes bytes to standard output unchanged. A write error is reported when the command ends, as with [`print`].
+/// Writes bytes to standard output unchanged. A write error is kept for [`take_write_error`]; that the reader closed the pipe is none
+/// ([`is_closed`]).
 pub fn write(bytes: &[u8]) {
     match std::io::stdout().write_all(bytes).and_then(|()| std::io::stdout().flush()) {
         Ok(()) => {}
@@ -111,7 +113,7 @@ pub fn write(bytes: &[u8]) {
     }
 }
 
-/// Prints a warning on standard error as one line. The command goes on, and its exit code stays 0.
+/// Prints a warning on standard error as one line. It does not change the exit code of the command.
 pub fn remark(message: &str) {
     let _ = writeln!(std::io::stderr(), "echolume: {}", single_line(message));
 }
@@ -151,7 +153,8 @@ pub fn is_closed() -> bool {
     IS_CLOSED.load(Ordering::Relaxed)
 }
 
-/// Takes the first error of writing to standard output since the last call; None if there was none.
+/// Takes the first error of writing to standard output since the last call; None if there was none. That the reader closed the pipe is no
+/// such error ([`is_closed`]).
 pub fn take_write_error() -> Option<std::io::Error> {
     WRITE_ERROR.lock().unwrap_or_else(|e| e.into_inner()).take()
 }

@@ -18,7 +18,7 @@ pub fn printable(message: &str) -> String {
     line
 }
 
-/// Like [`printable`], cut at 400 characters.
+/// The text on one line, cut at 400 characters: line breaks become spaces, other control characters become escapes.
 pub fn single_line(text: &str) -> String {
     printable(text).chars().take(MAX_LINE).collect()
 }

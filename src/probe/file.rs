@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 /// Largest size of a probe file, bytes.
 pub(super) const MAX_BYTES: u64 = 1 << 20;
-/// Thickness of the slab as which a single frame is drawn, mm.
+/// Thickness of the slab as which a single frame is drawn where the probe file states none, mm.
 pub const SLAB: f64 = 1.0;
 /// Time stamps are rounded: a motor that turns by one frame in a frame's time may seem to turn by so much more, as a share.
 const ROUNDED: f64 = 1e-3;
@@ -61,7 +61,7 @@ impl ProbeFile {
     }
 
     /// The probe file in the folder of a recording: `<stem>.probe.toml`, which is for this recording alone, otherwise `probe.toml`,
-    /// which is for all recordings of the folder.
+    /// which is for all recordings of the folder. None if there is neither.
     pub fn find_for(recording: &Path) -> Option<PathBuf> {
         let own = recording.file_stem().map(|stem| {
             let mut name = stem.to_os_string();

@@ -18,12 +18,13 @@ pub struct Frame {
     /// Rigid map from the volume's coordinates, mm, to the world (LPS) or to the space of a tracker; None if it is not known. The pose of a
     /// volume is that of its first frame that has one.
     pub pose: Option<DAffine3>,
-    /// Samples of the stored type (`Header::stored` of the source), little-endian, line by line (samples fastest).
+    /// Samples of the stored type (`Header::stored` of the source), little-endian, line by line (samples fastest). A Cartesian slice is stored row
+    /// by row (lateral fastest).
     pub bytes: Vec<u8>,
 }
 
 impl Frame {
-    /// A frame of a volume that was swept forwards, without time stamp and pose.
+    /// A frame of a volume that was swept forwards, without time stamp and pose. Its [`Frame::number`] is `slice`.
     pub fn of_slice(volume: u32, slice: usize, bytes: Vec<u8>) -> Frame {
         Frame { volume, number: slice as u32, slice, backward: false, time: None, pose: None, bytes }
     }

@@ -178,7 +178,8 @@ impl Probe {
         }
     }
 
-    /// In-plane point (x, y) and slice position of a point in space: the inverse of [`Probe::sweep_map`].
+    /// In-plane point (x, y) and slice position of a point in space: the inverse of [`Probe::sweep_map`] for in-plane points beyond the wobble axis.
+    /// The position is 0 for a still probe.
     pub fn inverse_sweep_map(&self, place: DVec3) -> (f64, f64, f64) {
         match self.motion {
             Motion::Fan { .. } => {
@@ -197,7 +198,7 @@ impl Probe {
         Indices { sample, line, slice: self.slice_index(position, line) }
     }
 
-    /// Fractional slice index of a slice position, for samples of the given line.
+    /// Fractional slice index of a slice position, for samples of the given line. 0 if there is only one slice.
     pub fn slice_index(&self, position: f64, line: f64) -> f64 {
         let share = line / self.lines.len() as f64;
         match &self.advance {
@@ -297,8 +298,8 @@ impl Probe {
         }
     }
 
-    /// Lowest and highest slice position of any line, rad or mm. They are the same for both directions of the motor, so that the bounds do not
-    /// alternate.
+    /// Bounds (low, high) of the slice positions of all lines, rad or mm, that hold for both directions of the motor. If the motor moves during a
+    /// frame, one of the two bounds is therefore beyond the positions of this volume.
     pub fn slice_bounds(&self) -> (f64, f64) {
         let last = (self.slices.len() - 1) as f64;
         let share = 1.0 - 1.0 / self.lines.len() as f64;
@@ -428,11 +429,11 @@ pub struct Volumes {
     pub count: usize,
     /// Number of frames after the last complete volume.
     pub left_over: usize,
-    /// Every second volume was swept in the direction opposite to that of the first.
+    /// True if every second volume was swept in the direction opposite to that of the first.
     pub both_ways: bool,
     /// True if the first volume was swept backwards.
     pub first_backward: bool,
-    /// Share of the distance between two frames that the motor travels while one frame is acquired (s), 0..=1.
+    /// Share of the distance between two frames that the motor travels while one frame is acquired, 0..=1.
     pub speed_ratio: f64,
     pub firing: Firing,
 }
@@ -479,8 +480,8 @@ impl Volumes {
     }
 
     /// `probe` with the motor's motion in the volume of this index: where each slice was at its line 0, and how far the motor travels over its
-    /// lines. The line that fires j-th of L in frame k, in the order of time, is at f = f_first + dir df (k + s j / L) (thesis 4.4.2.2, Fig.
-    /// 40).
+    /// lines. The line that fires j-th of L in frame k, in the order of time, is at f = f_first + dir df (k + s j / L), with dir 1 or -1, the
+    /// pitch df and the [`Volumes::speed_ratio`] s (thesis 4.4.2.2, Fig. 40).
     pub fn swept(&self, volume: usize, probe: &Probe) -> Probe {
         let (lines, last) = (probe.lines.len() as f64, probe.slices.len() - 1);
         let late = (lines - 1.0) / lines;

@@ -103,8 +103,9 @@ impl Geometry {
         self == other || (self.equals_except_advance(other) && travels(self) == travels(other))
     }
 
-    /// The geometry of a volume that has slices of both directions: those that `marked` selects as in `backward`, the others as in `self`. None
-    /// if the last lines of neighbouring slices would cross, or if the two geometries differ in more than the motor's travel.
+    /// The geometry of a volume that has slices of both directions: slice k is as in `backward` if `marked[k]` is true, otherwise as in `self`.
+    /// None for Cartesian geometries, if the last lines of neighbouring slices would cross, or if the two geometries differ in more than the
+    /// motor's travel.
     pub fn with_mixed_directions(&self, backward: &Geometry, marked: &[bool]) -> Option<Geometry> {
         let (Geometry::Sweep(forward), Geometry::Sweep(back)) = (self, backward) else { return None };
         let of = |k: usize| if marked.get(k) == Some(&true) { back } else { forward };

@@ -9,7 +9,7 @@ use std::str::FromStr;
 /// Its text has six numbers with commas between them: the shift, mm, then the turn, degrees.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Rigid {
-    /// mm.
+    /// The translation after the rotation, mm.
     pub shift: DVec3,
     /// The rotation vector, degrees: its direction is the axis, its length the angle, anticlockwise as seen against the axis.
     pub turn: DVec3,
@@ -18,7 +18,7 @@ pub struct Rigid {
 }
 
 impl Rigid {
-    /// The motion as a map of places.
+    /// The motion as an affine map of positions, mm.
     pub fn map(&self) -> DAffine3 {
         let rotation = DQuat::from_scaled_axis(self.turn * 1f64.to_radians());
         DAffine3::from_translation(self.about + self.shift)

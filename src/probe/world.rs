@@ -99,7 +99,7 @@ impl World {
         Grid { size, spacing, origin: origin.to_array().map(|v| v + 0.0) }
     }
 
-    /// The map of another grid, `other`, in the same drawn coordinates. `of`: the grid of `self`.
+    /// The map from voxel indices of `other`, a grid in the same drawn coordinates as `of`, to the world. `of`: the grid whose voxels `self` maps.
     pub fn on(&self, of: &Grid, other: &Grid) -> World {
         if of.spacing == other.spacing && of.origin == other.origin {
             return *self;
@@ -117,7 +117,7 @@ impl World {
         is_rigid(pose).then(|| World { voxel_to_world: DMat4::from(*pose) * lattice(of) })
     }
 
-    /// For each axis of the lattice the anatomical direction of the world that it points to most, in words.
+    /// For each axis of the lattice the anatomical direction of the world that it points to most, for example `left` or `superior`.
     pub fn nearest(&self) -> [&'static str; 3] {
         [0, 1, 2].map(|n| {
             let step = self.axis(n);
@@ -159,7 +159,7 @@ pub struct AxisOrder {
     pub reversed: [bool; 3],
 }
 
-/// The stored axis that is drawn as depth.
+/// The stored axis that is drawn as depth. Its text is x, y or z, with a minus if depth increases from the last index to the first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DepthAxis {
     axis: usize,
@@ -206,7 +206,7 @@ impl AxisOrder {
     }
 
     /// The order for an image orientation of the PLUS toolkit: two or three letters, one for each stored axis. M(arked) and U(nmarked) are
-    /// lateral, F(ar) and N(ear) depth, A(scending) and D(escending) elevation. None for other words.
+    /// lateral, F(ar) and N(ear) depth, A(scending) and D(escending) elevation; without a third letter it is A. None for other words.
     pub fn of_plus(word: &str) -> Option<AxisOrder> {
         let letters: Vec<char> = word.chars().chain("A".chars().filter(|_| word.len() == 2)).collect();
         let mut order = AxisOrder { stored: [3; 3], reversed: [false; 3] };

@@ -9,8 +9,9 @@ use std::sync::Arc;
 /// Most samples of a line, lines of a frame, and frames.
 const WANTED: [usize; 3] = [128, 64, 48];
 
-/// Reduces a volume to about 128 samples a line, 64 lines and 48 frames; shorter axes keep their lengths. Each sample is the mean of a block of
-/// samples; what is less than a block at the far end of an axis is dropped. None if a frame is missing or has another size.
+/// Reduces a volume to 128 to 255 samples a line, 64 to 127 lines and 48 to 95 frames; axes of less than 256, 128 and 96 keep their lengths. Each
+/// sample is the mean of a block of samples; what is less than a block at the far end of an axis is dropped. None if a frame is missing or has
+/// another size.
 pub fn coarse(geometry: &Geometry, stored: StoredType, frames: &[Arc<Frame>]) -> Option<(Geometry, Vec<Frame>)> {
     let [samples, lines] = geometry.frame_size();
     let slices = geometry.slices();

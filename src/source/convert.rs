@@ -53,12 +53,13 @@ impl Target {
     /// Checks, before any work is done, that the file of this name can hold the volume.
     ///
     /// # Errors
-    /// The extension is no format, an axis is too long for the format, or the type of the samples does not have the value outside.
+    /// The extension is no format, an axis is too long for the format, the type of the samples does not have the value outside, or a secondary
+    /// capture is to be written to another file than `.dcm`.
     pub fn check(&self, path: &Path) -> Result<(), InputError> {
         self.check_as(self.format(path)?, path)
     }
 
-    /// As [`Target::check`], for a file of the given format whatever its extension.
+    /// Checks that a file of the given format, whatever its extension, can hold the volume. The error is that of [`Target::check`].
     pub(super) fn check_as(&self, format: VolumeFile, path: &Path) -> Result<(), InputError> {
         let most = format.most_along_axis();
         if let Some(long) = self.grid.size.iter().find(|n| **n > most) {
@@ -128,10 +129,11 @@ impl Volume {
         Volume { geometry, stored, size, frames: vec![Vec::new(); size[2]] }
     }
 
-    /// Reads a volume of a recording, and counts its frames: a `.frames` file may lack some. `each` sees every frame before it is kept.
+    /// Reads the volume with this number, from 0, of a recording. Returns it and the number of its frames that are there: a `.frames` file may lack
+    /// some. `each` sees every frame before it is kept.
     ///
     /// # Errors
-    /// The recording cannot be read, or has no volume with this number.
+    /// The recording cannot be read, or reports that it has no volume with this number. A `.frames` file has 0 frames of it instead.
     pub fn read(
         source: &mut dyn Source,
         number: usize,
@@ -236,7 +238,8 @@ impl Volume {
         moved
     }
 
-    /// Fills a slice of a grid with stored values, lateral fastest; NaN outside the insonified region.
+    /// Fills the slice with index `z` of a grid with stored values, lateral fastest; NaN outside the insonified region. `out` has one value for each
+    /// voxel of the slice.
     pub fn slice(&self, grid: &Grid, z: usize, out: &mut [f64]) {
         let target = Target::new(*grid, self.stored.into());
         out.par_chunks_mut(grid.size[0].max(1)).enumerate().for_each(|(y, row)| {
@@ -271,7 +274,7 @@ impl Volume {
     /// `each` is called after every slice.
     ///
     /// # Errors
-    /// As [`Target::check`], and a full disk. No file is left then.
+    /// The file cannot hold the volume ([`Target::check`]), or the disk is full. No file is left then.
     pub fn write(&self, target: &Target, path: &Path, each: impl Fn()) -> Result<(), InputError> {
         write_voxels(target, path, |voxel| self.value(target, voxel), each)
     }
@@ -279,16 +282,16 @@ impl Volume {
     /// Writes only the voxels, without a header.
     ///
     /// # Errors
-    /// Those of writing.
+    /// The file cannot be written.
     pub(super) fn write_samples(&self, target: &Target, file: &mut impl Write) -> io::Result<()> {
         write_slices(target, file, |voxel| self.value(target, voxel), || ())
     }
 
-    /// Writes a mask on the grid of `target`: 1 in voxels inside the insonified region, 0 outside. It is a segmentation if the file's name ends
-    /// so.
+    /// Writes a mask on the grid of `target`: 1 in voxels inside the insonified region, 0 outside. The file is a segmentation if its name ends in
+    /// `.seg.nrrd` or `.seg.dcm`, otherwise a volume.
     ///
     /// # Errors
-    /// As [`Volume::write`].
+    /// The file cannot hold the mask, or the disk is full.
     pub fn write_mask(&self, target: &Target, path: &Path) -> Result<(), InputError> {
         if segmentation::is_one(path) || segmentation::is_dicom(path) {
             let segment = Segment { label: 1, name: "insonified".into(), colour: [0.4, 0.6, 0.8] };
@@ -302,10 +305,10 @@ impl Volume {
 
 impl Volume {
     /// Writes a segmentation on the grid of `target`: label 1, "tissue", in voxels with a stored value of at least `threshold`, otherwise 0.
-    /// `each` is called after every slice.
+    /// It is DICOM if the file's name ends in `.seg.dcm`, otherwise NRRD. `each` is called after every slice.
     ///
     /// # Errors
-    /// As [`Volume::write`].
+    /// The format cannot hold the segmentation, or the disk is full.
     pub fn write_tissue(
         &self,
         target: &Target,
@@ -319,10 +322,10 @@ impl Volume {
     }
 }
 
-/// Writes a segmentation on a grid along the axes of the world. `label` gives the label at a position, mm.
+/// Writes a segmentation on a grid along the axes of the world. `label` gives the label at a position, mm; 0 is in no segment.
 ///
 /// # Errors
-/// As [`Volume::write`].
+/// The format cannot hold the segmentation, or the disk is full.
 pub(super) fn write_labels(
     grid: &Grid,
     segments: &[Segment],
@@ -341,7 +344,7 @@ pub fn no_echo(source: &dyn Source) -> f64 {
 /// after every slice.
 ///
 /// # Errors
-/// As [`Volume::write`].
+/// The file cannot hold the volume ([`Target::check`]), or the disk is full.
 pub(super) fn write_grid(
     grid: &Grid,
     sample: SampleType,

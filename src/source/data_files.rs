@@ -107,7 +107,7 @@ impl Pattern {
         format!("{}{text:>width$}{}", self.before, self.after, width = self.width)
     }
 
-    /// The file names for the numbers `first`, `first + step` ... up to `last`.
+    /// The file names for the numbers `first`, `first + step` ... up to and including `last`, if it is one of them.
     ///
     /// # Errors
     /// In words: the step is 0 or leads away from `last`, or there are too many files.
@@ -136,7 +136,7 @@ fn conversion(form: &str) -> Option<(usize, usize)> {
     (width <= MAX_DIGITS && digits <= MAX_DIGITS && !form.starts_with(['+', '-'])).then_some((width, digits))
 }
 
-/// Locates the samples in each file of a list, as [`beside`].
+/// Locates the samples in each file of a list: whole files in the folder of the header or below it.
 ///
 /// # Errors
 /// No file, too many of them, or what is wrong with a name or with a file.

@@ -22,8 +22,8 @@ pub(super) struct Drawn {
 }
 
 impl Drawn {
-    /// Applies the axis order of the file, or the one for `depth` if that is given, and reverses one axis if the volume would look mirrored.
-    /// `bytes`: size of a stored sample. A reversal is added to `remarks`.
+    /// Applies the axis order of the file and reverses one axis if the volume would look mirrored. `depth`: the axis, counted in the file's
+    /// order, that is drawn as depth; None: the second. `bytes`: size of a stored sample. A reversal is added to `remarks`.
     ///
     /// # Errors
     /// The grid is impossible, or frames have to be put together from more than 2 GiB of voxels.
@@ -69,8 +69,8 @@ impl Drawn {
         self.order == AxisOrder::STORED
     }
 
-    /// A stored frame with its pixels in drawn order, and the drawn slice that it is. `number`: its index in the stored volume; `width`: bytes
-    /// of a sample.
+    /// A stored frame with its pixels in drawn order, and the index of the drawn slice that it is, for an order that keeps frames
+    /// ([`AxisOrder::keeps_frames`]). `number`: its index in the stored volume; `width`: bytes of a sample.
     pub fn frame(&self, bytes: &[u8], number: usize, width: usize) -> (Vec<u8>, usize) {
         let [columns, rows, slices] = self.stored;
         let slice = if self.order.reversed[2] { slices - 1 - number } else { number };

@@ -39,7 +39,7 @@ pub struct Format {
 pub(super) enum Reads {
     /// A reader of layouts: whole volumes, whose frames can be read at random. The file may be packed by gzip.
     Layout(fn(&InputFile) -> Result<Layout, InputError>),
-    /// As `Layout`, and the reader needs the user's options, too.
+    /// A reader of layouts, as in `Layout`, that also needs the user's options.
     Stated(fn(&InputFile, &OpenOptions) -> Result<Layout, InputError>),
     /// A `.frames` file: frames in the order in which they arrived.
     Frames,

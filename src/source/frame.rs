@@ -43,7 +43,7 @@ pub struct Header {
     /// True if frames may have poses.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub posed: bool,
-    /// The frames are of the phantom, not of a patient. A `.frames` file stores this with its frames.
+    /// True if the frames are of the phantom, not of a patient. A `.frames` file stores this with its frames.
     #[serde(skip)]
     pub synthetic: bool,
 }
@@ -144,7 +144,7 @@ pub trait Source: Send {
     /// Moves forwards or back, so that the next frame is the first of this volume.
     ///
     /// # Errors
-    /// The volume does not exist, or the data cannot be read.
+    /// The data cannot be read, or the volume does not exist; some sources then have no next frame instead.
     fn skip_to_volume(&mut self, volume: usize) -> Result<(), InputError>;
     /// The next frame; None after the last.
     ///
@@ -158,7 +158,8 @@ pub trait Source: Send {
     fn prepare(&mut self) -> Result<(), InputError> {
         Ok(())
     }
-    /// True if the first volume is swept backwards.
+    /// True if the first volume is swept backwards. A source that does not know it tells by the motor's travel during the frames: false if there is
+    /// none.
     fn goes_back(&self) -> bool {
         travels_back(&self.geometry(0))
     }
@@ -179,8 +180,8 @@ pub trait Source: Send {
     fn world_of(&self, _volume: usize) -> Option<World> {
         self.world()
     }
-    /// The pose of all frames that have none of their own. None if the axes of the volume are those of the world, and if each frame states
-    /// whether it has a pose.
+    /// The pose of all frames that have none of their own. None for sweeps, if the axes of the volume are those of the world, and if each frame
+    /// states whether it has a pose.
     fn pose(&self) -> Option<DAffine3> {
         let Geometry::Cartesian(grid) = self.geometry(0) else { return None };
         let world = self.world().filter(|world| *world != World::of(&grid))?;

@@ -8,7 +8,7 @@ pub(super) trait Gathered: std::fmt::Debug + Send + Sync {
     /// Opens the samples as one stream, from `skip` bytes after their beginning.
     ///
     /// # Errors
-    /// Those of opening and reading the files.
+    /// A file cannot be opened or read.
     fn open(&self, skip: u64) -> io::Result<Box<dyn Read + Send>>;
     /// The files that hold the samples.
     fn files(&self) -> Vec<PathBuf>;
@@ -21,7 +21,7 @@ pub(super) trait Decoded: Clone + std::fmt::Debug + Send + Sync + 'static {
     /// The decoded samples of the picture or frame with this index; empty behind the last.
     ///
     /// # Errors
-    /// Those of reading and decoding.
+    /// The picture or frame cannot be read or decoded.
     fn decode(&self, number: usize) -> io::Result<Vec<u8>>;
     fn files(&self) -> &[PathBuf];
 }

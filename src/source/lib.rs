@@ -87,10 +87,11 @@ pub struct OpenOptions<'a> {
     pub freehand: freehand::FreehandArguments,
 }
 
-/// Opens a recording with default options: see [`open_with`]. `probe`: path of the probe file.
+/// Opens a recording of any format with default options ([`open_with`]). `probe`: path of the probe file; None: the one that belongs to the
+/// recording, if there is one.
 ///
 /// # Errors
-/// As [`open_with`].
+/// One line that names the file: it cannot be read, is of no known format, is damaged, or the probe file does not fit it.
 pub fn open(path: &Path, probe: Option<&Path>) -> Result<Box<dyn Source>, InputError> {
     open_with(path, OpenOptions { probe, ..OpenOptions::default() })
 }
@@ -103,7 +104,7 @@ pub fn is_dicom(path: &Path) -> bool {
 /// Opens a recording of any format, which its content decides, among them `.frames` files and saved streams of frames. `-` is standard input.
 ///
 /// # Errors
-/// As [`recorder::Reader::open`] and [`Recording::open_with`].
+/// One line that names the file: it cannot be read, is of no known format, is damaged, its volume is too large, or an option does not fit it.
 pub fn open_with(path: &Path, options: OpenOptions) -> Result<Box<dyn Source>, InputError> {
     if standard_input::is_meant(path) {
         let source = open_file(&standard_input::file()?, options).map_err(standard_input::renamed)?;
@@ -129,7 +130,7 @@ fn open_file(path: &Path, options: OpenOptions) -> Result<Box<dyn Source>, Input
 /// Describes a recording for users, without the name or number of a patient.
 ///
 /// # Errors
-/// As [`open_with`]. A `.frames` file is read completely, which may fail, too.
+/// One line that names the file: the recording cannot be opened ([`open_with`]). A `.frames` file is read completely, which may fail, too.
 pub fn description(path: &Path, options: OpenOptions) -> Result<Description, InputError> {
     if standard_input::is_meant(path) {
         return file_description(&standard_input::file()?, options).map_err(standard_input::renamed);

@@ -108,7 +108,7 @@ pub struct PlaybackSource {
 }
 
 impl PlaybackSource {
-    /// Plays `source` `rounds` times. Volume numbers continue from round to round.
+    /// Plays `source` `rounds` times, at least once. Volume numbers continue from round to round.
     pub fn new(source: Box<dyn Source>, playback: Playback, rounds: u32) -> PlaybackSource {
         PlaybackSource {
             source,

@@ -104,7 +104,7 @@ impl<'a> InputFile<'a> {
     /// Opens the unpacked bytes from the start of the file.
     ///
     /// # Errors
-    /// Those of opening the file.
+    /// The file cannot be opened.
     pub fn open(&self) -> io::Result<PixelStream> {
         self.pixels(0).open(0)
     }
@@ -112,7 +112,7 @@ impl<'a> InputFile<'a> {
     /// The first `bytes` unpacked bytes, or all if there are fewer.
     ///
     /// # Errors
-    /// The file cannot be read.
+    /// The file cannot be read. A packed file that is cut short or corrupt gives fewer bytes instead.
     pub fn start(&self, bytes: u64) -> Result<Vec<u8>, InputError> {
         let mut start = Vec::new();
         let read = self.open().and_then(|file| file.take(bytes).read_to_end(&mut start));
@@ -173,12 +173,12 @@ impl Pixels {
         Pixels { path: path.into(), offset: 0, length, encoding, inside: 0, gathered: Some(Arc::new(from)) }
     }
 
-    /// All files that the samples are read from.
+    /// All files that the samples are read from, after the path that the user named.
     pub(super) fn files(&self) -> Vec<PathBuf> {
         [self.path.clone()].into_iter().chain(self.gathered.iter().flat_map(|gathered| gathered.files())).collect()
     }
 
-    /// True if the samples are compressed.
+    /// True unless the encoding is [`Encoding::Raw`]: pictures and frames of DICOM count as compressed, also where they are not.
     pub(crate) fn is_compressed(&self) -> bool {
         self.encoding != Encoding::Raw
     }
@@ -186,7 +186,7 @@ impl Pixels {
     /// Opens the stream `skip` bytes after the first sample. A compressed stream is decompressed up to there.
     ///
     /// # Errors
-    /// Those of reading the file.
+    /// The file cannot be read, or is cut short or corrupt.
     pub fn open(&self, skip: u64) -> io::Result<PixelStream> {
         if let Some(gathered) = &self.gathered {
             return Ok(PixelStream::Packed(gathered.open(skip)?));
@@ -224,7 +224,7 @@ impl PixelStream {
     /// which may come from a false header.
     ///
     /// # Errors
-    /// Those of reading the file.
+    /// The file cannot be read, or is cut short or corrupt.
     pub fn fill(&mut self, bytes: u64, out: &mut Vec<u8>) -> io::Result<()> {
         match self {
             PixelStream::Raw(file) => file.take(bytes).read_to_end(out)?,
@@ -233,10 +233,11 @@ impl PixelStream {
         Ok(())
     }
 
-    /// Reads a compressed stream to its end, where its checksum is verified. Returns how many decompressed bytes it had left.
+    /// Reads a compressed stream to its end, where its checksum is verified. Returns how many decompressed bytes it had left; always 0 for samples
+    /// that are not compressed.
     ///
     /// # Errors
-    /// Those of reading the file, and a wrong checksum.
+    /// The file cannot be read, is cut short or corrupt, or its checksum is wrong.
     pub fn finish(&mut self) -> io::Result<u64> {
         match self {
             PixelStream::Raw(_) => Ok(0),

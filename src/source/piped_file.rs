@@ -33,7 +33,7 @@ pub(super) struct PipedFile {
 }
 
 impl PipedFile {
-    /// True if a file that begins with these bytes is a saved stream of frames.
+    /// True if a file that begins with these bytes may be a saved stream of frames: the first one is `{`.
     pub fn is_one(start: &[u8]) -> bool {
         start.starts_with(b"{")
     }

@@ -187,7 +187,7 @@ impl PlusWords<'_> {
     /// as stored.
     ///
     /// # Errors
-    /// The frames hold undetected signals.
+    /// The frames hold undetected signals, or the axes are impossible.
     pub(super) fn pictures(
         &self,
         size: [usize; 3],

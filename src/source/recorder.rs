@@ -104,7 +104,8 @@ impl Writer {
     /// volumes are on the disk.
     ///
     /// # Errors
-    /// The size or the slice of the frame does not fit the header, or the disk is full. Earlier frames are kept, and the next call may succeed.
+    /// The size or the slice of the frame does not fit the header, its volume is before that of the last frame, or the disk is full. Earlier frames
+    /// are kept, and the next call may succeed.
     pub fn frame(&mut self, frame: &Frame, arrived: f64) -> Result<(), InputError> {
         let fault = |field: &str, fault: String| Err(InputError::new(&self.path, field, fault));
         let expected = self.header.frame_bytes().unwrap_or(0);
@@ -292,12 +293,12 @@ impl Reader {
         &self.header
     }
 
-    /// Number of valid frames.
+    /// Number of frames that the index lists. If the index is the stored one, damaged frames among them are noticed only when they are read.
     pub fn frames(&self) -> usize {
         self.index.len()
     }
 
-    /// Number of frames that were left out because of a wrong checksum.
+    /// Number of frames that were left out so far because of a wrong checksum or field.
     pub fn damaged(&self) -> u64 {
         self.damaged
     }
@@ -312,7 +313,7 @@ impl Reader {
         self.rebuilt
     }
 
-    /// Time of arrival of the last frame that was returned, s on the recorder's clock.
+    /// Time of arrival of the last frame that was returned, s on the recorder's clock; 0 before the first.
     pub fn arrived(&self) -> f64 {
         self.arrived
     }

@@ -50,10 +50,11 @@ enum Placement {
 }
 
 impl Recording {
-    /// Opens a recording with default options: see [`Recording::open_with`]. `probe`: path of the probe file.
+    /// Opens a recording with default options ([`Recording::open_with`]). `probe`: path of the probe file; None: the one that belongs to the
+    /// recording, if there is one.
     ///
     /// # Errors
-    /// As [`Recording::open_with`].
+    /// A file that cannot be read, has an unknown format or is damaged, or a geometry that is missing or impossible.
     pub fn open(path: &Path, probe: Option<&Path>) -> Result<Recording, InputError> {
         Recording::open_with(path, OpenOptions { probe, ..OpenOptions::default() })
     }
@@ -157,7 +158,7 @@ impl Recording {
         self.replaced.not_finite
     }
 
-    /// Number of denormal f32 samples that were replaced by 0, counted like [`Recording::replaced`].
+    /// Number of denormal f32 samples that were replaced by 0: in the frames read so far, or in all frames if the range was measured.
     pub fn flushed(&self) -> u64 {
         self.replaced.denormal
     }

@@ -47,16 +47,17 @@ pub fn stem(path: &Path) -> Option<String> {
 /// its voxels.
 ///
 /// # Errors
-/// The file cannot be read, or states a label that is no number of 8 bits.
+/// The file cannot be read, is not NRRD, or states a label that is no number of 8 bits.
 pub fn segments(path: &Path) -> Result<Vec<Segment>, InputError> {
     let segment = |(label, name, colour): (u8, String, [f64; 3])| Segment { label, name: name.into(), colour };
     Ok(nrrd::segments(path)?.into_iter().map(segment).collect())
 }
 
-/// Writes a segmentation on a grid. `label` gives the label of a voxel index; 0 is in no segment. `each` is called after every slice.
+/// Writes a segmentation on a grid: DICOM if the file's name ends in `.seg.dcm`, otherwise NRRD. `label` gives the label of a voxel index; 0 is in
+/// no segment. `each` is called after every slice.
 ///
 /// # Errors
-/// The disk is full, or the folder cannot be written.
+/// The disk is full, the folder cannot be written, or DICOM cannot hold the segmentation: it has too many voxels, or none in any segment.
 pub fn write(
     path: &Path,
     grid: &Grid,

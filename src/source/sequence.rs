@@ -8,7 +8,7 @@ use crate::probe::{Geometry, ProbeFile, Volumes};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-/// Largest number of frames of a file. Their time stamps are in its header, of which readers accept 1 MiB.
+/// Largest number of frames of a file. Their time stamps are in its header, which is at most 1 MiB long.
 pub(super) const MAX_FRAMES: usize = 20_000;
 const MAX_HEADER_BYTES: usize = 1 << 20;
 /// Name of the MetaImage field for remarks.
@@ -182,7 +182,8 @@ fn unwritable(path: &Path) -> impl Fn(io::Error) -> InputError {
     move |e| InputError::unwritable(path, &e)
 }
 
-/// Writes a sequence and its probe file: either both are written or neither. `samples` writes the samples after the header.
+/// Writes a sequence and its probe file. If one of them cannot be written completely, no sequence is left. `samples` writes the samples after the
+/// header.
 ///
 /// # Errors
 /// One line that names the file: its extension is wrong, or it cannot be written.

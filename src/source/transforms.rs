@@ -40,7 +40,7 @@ impl std::fmt::Display for TransformName {
     }
 }
 
-/// A constant transform, such as the calibration of a probe.
+/// A constant transform, such as the calibration of a probe. Its matrix maps positions in the frame `from` of its name to the frame `to`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Calibration {
     pub name: TransformName,

@@ -90,7 +90,7 @@ impl VolumeFile {
     /// Creates a file and writes its header. `world`: map from the voxels to the world.
     ///
     /// # Errors
-    /// Those of writing.
+    /// The file cannot be written.
     pub(super) fn create(
         self,
         path: &Path,
@@ -173,7 +173,8 @@ pub(super) fn nrrd_start(size: [usize; 3], world: &World, sample: SampleType, vo
     )
 }
 
-/// The fields of an NRRD header that state the axes and the origin of the voxels in the world. `volumes`: as for [`nrrd_start`].
+/// The fields of an NRRD header that state the axes and the origin of the voxels in the world. `volumes`: number of volumes of a sequence; None for
+/// a single volume.
 pub(super) fn nrrd_axes([x, y, z]: [usize; 3], world: &World, volumes: Option<usize>) -> String {
     let [size, direction, kind] = match volumes {
         Some(count) => [format!(" {count}"), " none".into(), " list".into()],
@@ -239,7 +240,7 @@ impl VolumeWriter {
     /// Renames the complete file to its target.
     ///
     /// # Errors
-    /// Those of writing.
+    /// The file cannot be written.
     pub fn finish(self) -> io::Result<()> {
         let mut file = match self {
             VolumeWriter::Plain(file) => file,

@@ -96,7 +96,7 @@ impl VolumeSequence {
     /// Checks, before any work is done, that the file can hold volumes on the grid of `target`.
     ///
     /// # Errors
-    /// As [`Target::check`].
+    /// An axis is too long for NRRD, the type of the samples does not have the value outside, or a secondary capture is asked for.
     pub fn check(target: &Target, path: &Path) -> Result<(), InputError> {
         match target.capture {
             Some(_) => Err(InputError::new(path, "--secondary-capture", "is for .dcm")),
@@ -108,7 +108,7 @@ impl VolumeSequence {
     /// every volume.
     ///
     /// # Errors
-    /// As [`VolumeSequence::check`]; the source can no longer be read, or the disk is full. No file is left then.
+    /// The file cannot hold the volumes ([`VolumeSequence::check`]), the source can no longer be read, or the disk is full. No file is left then.
     pub fn write(
         &self,
         source: &mut dyn Source,

@@ -39,10 +39,10 @@ pub fn read(path: &Path, max_bytes: u64, what: &str) -> Result<Vec<u8>, String> 
     if bytes.len() as u64 > max_bytes { too_long() } else { Ok(bytes) }
 }
 
-/// Like [`read`], for text.
+/// Reads a text file of at most `max_bytes` bytes. `what` names its kind in messages.
 ///
 /// # Errors
-/// Those of [`read`], and bytes that are not UTF-8.
+/// The fault without the file's name: it is not a regular file, is longer than `max_bytes`, cannot be read, or is not UTF-8.
 pub fn read_text(path: &Path, max_bytes: u64, what: &str) -> Result<String, String> {
     String::from_utf8(read(path, max_bytes, what)?).map_err(|_| "cannot be read: it is not UTF-8 text".into())
 }
@@ -67,8 +67,8 @@ pub fn follow_umask() {
     FOLLOWS_UMASK.store(true, Ordering::Relaxed);
 }
 
-/// Sets the options for a file that may hold frames of a patient: only its owner may read a new file, as with [`Unfinished`] and
-/// [`replace`].
+/// Sets the options for a file that may hold frames of a patient: only its owner may read a new file, unless [`follow_umask`] was called. Without
+/// effect except on Unix.
 pub fn private(options: &mut OpenOptions) -> &mut OpenOptions {
     #[cfg(unix)]
     std::os::unix::fs::OpenOptionsExt::mode(options, Readers::Owner.mode());
@@ -89,7 +89,7 @@ impl Readers {
 pub const PRIVATE: &str = "ECHOLUME_PRIVATE";
 
 /// Replaces a file atomically: writes a temporary file next to it, then renames. A full disk or a signal leaves the old file unchanged. Only
-/// its owner may read the new one.
+/// its owner may read the new one, unless [`follow_umask`] was called. A device or a pipe is written to directly.
 ///
 /// # Errors
 /// One line that names the file and the fault.
@@ -97,18 +97,18 @@ pub fn replace(file: &Path, bytes: &[u8]) -> Result<(), String> {
     replace_file(file, bytes, Readers::Owner)
 }
 
-/// Like [`replace`], but the umask decides who may read the file: for content that tells nothing about patients.
+/// Replaces a file atomically, as [`replace`] does, but the umask decides who may read it: for content that tells nothing about patients.
 ///
 /// # Errors
-/// As for [`replace`].
+/// One line that names the file and the fault.
 pub fn replace_shared(file: &Path, bytes: &[u8]) -> Result<(), String> {
     replace_file(file, bytes, Readers::Umask)
 }
 
-/// Like [`replace_shared`], but every user may read the file, whatever the umask is, because another service has to read it.
+/// Replaces a file atomically, as [`replace`] does, but every user may read it, whatever the umask is, because another service has to read it.
 ///
 /// # Errors
-/// As for [`replace`].
+/// One line that names the file and the fault.
 pub fn replace_for_all(file: &Path, bytes: &[u8]) -> Result<(), String> {
     replace_file(file, bytes, Readers::All)
 }
@@ -182,7 +182,7 @@ impl WorkFolder {
 }
 
 /// A file that is written under a temporary name until it is complete. Dropping it earlier deletes it. After a signal, writes fail, so that the
-/// writer stops; the signal takes effect when the file is deleted.
+/// writer stops; the signal takes effect once the temporary file is deleted or renamed.
 pub struct Unfinished {
     file: BufWriter<Part>,
     target: PathBuf,
@@ -195,7 +195,7 @@ struct Part {
 }
 
 impl Unfinished {
-    /// Creates the temporary file in the folder of `target`. Only its owner may read it.
+    /// Creates the temporary file in the folder of `target`. Only its owner may read it, unless [`follow_umask`] was called.
     ///
     /// # Errors
     /// The folder cannot be written, or the target exists and is not a regular file.
@@ -246,7 +246,7 @@ impl Unfinished {
         file.seek(SeekFrom::End(0)).map(drop)
     }
 
-    /// Flushes everything to the disk.
+    /// Flushes everything to the disk. The file keeps its temporary name until [`Unfinished::rename`].
     ///
     /// # Errors
     /// The disk is full, or a signal arrived.
@@ -258,7 +258,7 @@ impl Unfinished {
     /// Renames the file to its target, atomically.
     ///
     /// # Errors
-    /// The disk is full, or a signal arrived before everything was written.
+    /// The disk is full, a signal arrived before everything was written, or the file cannot be renamed.
     pub fn rename(self) -> io::Result<()> {
         let Part { file, signals } = self.file.into_inner().map_err(io::IntoInnerError::into_error)?;
         let named = file.persist(&self.target).map_err(|e| e.error);
@@ -347,7 +347,7 @@ pub fn quoted(value: &str) -> String {
     format!("'{}'", escaped(value, MAX_QUOTE))
 }
 
-/// The first `longest` characters of a text, with control characters and other invisible ones escaped.
+/// The first `longest` characters of a text, with control characters and other invisible ones escaped; `...` follows if the text is longer.
 pub fn escaped(text: &str, longest: usize) -> String {
     let mut line = String::new();
     for (i, c) in text.chars().enumerate() {

@@ -43,7 +43,7 @@ thread_local! {
 }
 
 impl Progress {
-    /// Runs `work` on this thread and adds all that it reads to this progress.
+    /// Runs `work` on this thread and adds all bytes that it reads from [`CountedFile`]s to this progress.
     pub fn during<T>(&self, work: impl FnOnce() -> T) -> T {
         /// Puts back what was there before, also if the work panics.
         struct Before(Option<Progress>);
@@ -94,7 +94,7 @@ fn of_thread() -> Option<Progress> {
 }
 
 /// Announces that this thread will read `bytes` bytes of input, to which progress is counted from now on. Ignored if at least as many announced
-/// bytes are still to be read: then this reading is a part of what was announced.
+/// bytes are still to be read: then this reading is a part of what was announced. Does nothing outside [`Progress::during`].
 pub fn expect_bytes(bytes: u64) {
     if let Some(Progress(counts)) = of_thread() {
         let done = counts.bytes.load(Ordering::Relaxed) - counts.before.load(Ordering::Relaxed);
@@ -106,7 +106,7 @@ pub fn expect_bytes(bytes: u64) {
     }
 }
 
-/// Announces that this thread will read the headers of `count` files next.
+/// Announces that this thread will read the headers of `count` files next. Does nothing outside [`Progress::during`].
 pub fn expect_files(count: u64) {
     if let Some(Progress(counts)) = of_thread() {
         counts.files.store(0, Ordering::Relaxed);
@@ -114,14 +114,14 @@ pub fn expect_files(count: u64) {
     }
 }
 
-/// Counts the header of one more file as read.
+/// Counts the header of one more file as read by this thread. Does nothing outside [`Progress::during`].
 pub fn file_read() {
     if let Some(Progress(counts)) = of_thread() {
         counts.files.fetch_add(1, Ordering::Relaxed);
     }
 }
 
-/// Counts bytes that were read by a library which opens its file itself.
+/// Counts bytes that were read on this thread by a library which opens its file itself. Does nothing outside [`Progress::during`].
 ///
 /// # Errors
 /// The reading was cancelled.

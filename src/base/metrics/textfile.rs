@@ -10,7 +10,7 @@ use std::time::Duration;
 /// Longest wait for the last text at the end.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-/// A file of metrics that a thread of its own writes. Dropping it writes the last text.
+/// A file of metrics that a thread of its own writes. Dropping it writes the last text and waits at most 2 s for that.
 pub struct Textfile {
     shared: Arc<Shared>,
 }

@@ -14,7 +14,7 @@ const FILTER: &str = "scale=out_color_matrix=bt709:out_range=tv,pad=ceil(iw/2)*2
 const COLOURS: [&str; 8] =
     ["-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "iec61966-2-1", "-color_range", "tv"];
 
-/// The program that encodes films.
+/// Path of the program that encodes films: ffmpeg, found in PATH.
 ///
 /// # Errors
 /// One line: there is none.
@@ -38,7 +38,7 @@ pub struct FilmWriter {
 }
 
 impl FilmWriter {
-    /// Begins a film of pictures of `size` pixels at `rate` pictures a second.
+    /// Begins a film of pictures of `size` pixels (width, height) at `rate` pictures a second.
     ///
     /// # Errors
     /// One line without the file's name: there is no ffmpeg, or a folder cannot be written.

@@ -32,10 +32,10 @@ const TILES: usize = 4;
 const SEQUENCE_HEADER: u8 = 1;
 const TEMPORAL_DELIMITER: u8 = 2;
 
-/// The program that encodes films: this one.
+/// Path of another program that encodes films. It is empty in this build, which has an encoder of its own.
 ///
 /// # Errors
-/// None; a program without this encoder has some.
+/// Never. A build without the feature `video` needs ffmpeg, and fails here if it is missing.
 pub fn encoder() -> Result<PathBuf, &'static str> {
     Ok(PathBuf::new())
 }
@@ -56,7 +56,7 @@ pub struct FilmWriter {
 }
 
 impl FilmWriter {
-    /// Begins a film of pictures of `size` pixels at `rate` pictures a second.
+    /// Begins a film of pictures of `size` pixels (width, height) at `rate` pictures a second.
     ///
     /// # Errors
     /// One line without the file's name: a size that AV1 does not have, a folder that cannot be written.

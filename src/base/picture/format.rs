@@ -32,11 +32,10 @@ const ENDINGS: [(&str, PictureFormat); 7] = [
 ];
 
 impl PictureFormat {
-    /// The format for the ending of a file name. A name without an ending means PNG, and so does a path that is not a regular file, such as
-    /// a device or a pipe.
+    /// The format for the ending of a file name, in upper or lower case. A name without an ending means PNG, for example `/dev/stdout`.
     ///
     /// # Errors
-    /// One line that names the known endings.
+    /// The ending is unknown: one line that names the known ones.
     pub fn of(file: &Path) -> Result<PictureFormat, String> {
         let Some(ending) = file.extension() else { return Ok(PictureFormat::Png) };
         if let Some((_, format)) = ENDINGS.iter().find(|(known, _)| ending.eq_ignore_ascii_case(known)) {

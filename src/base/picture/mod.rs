@@ -55,7 +55,7 @@ impl Picture {
     /// Encodes an opaque PNG; with one channel if all pixels are grey.
     ///
     /// # Errors
-    /// As [`Picture::encoded`].
+    /// One line: there are no pixels, or their number does not match the size.
     pub fn png(&self) -> Result<Vec<u8>, String> {
         self.encoded(PictureFormat::Png)
     }

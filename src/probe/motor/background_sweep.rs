@@ -87,7 +87,7 @@ impl BackgroundSweep {
     /// Stops the motor and waits until it has stopped.
     ///
     /// # Errors
-    /// The fault or the signal that ended the sweep before; or the motor could not be stopped.
+    /// The fault that ended the sweep before, or the motor could not be stopped. A sweep that a signal ended is no error if the motor was stopped.
     pub fn stop(&mut self) -> Result<(), MotorError> {
         self.interrupter.interrupt();
         if self.thread.take().is_some_and(|thread| thread.join().is_err()) {
@@ -154,7 +154,7 @@ impl PositionLog {
         self.start.checked_add(since).unwrap_or(self.start)
     }
 
-    /// The position of the array at a time, see [`Track::at`].
+    /// The position of the array at a time in s on the clock of the positions, interpolated as [`Track::at`] does.
     pub fn at(&self, time: f64) -> ArrayState {
         self.lock().track.at(time)
     }

@@ -31,7 +31,8 @@ pub struct MotorStatus {
     pub watchdog: Option<Duration>,
 }
 
-/// An open motor. Dropping it stops the motor in every case, as the module `guard` describes.
+/// An open motor. Dropping it, also in a panic, stops the motor if it may be moving. While it exists, SIGINT, SIGTERM and SIGHUP do not end the
+/// process: they end the current operation, and the motor is stopped.
 pub struct Drive {
     pub(super) guard: Guard,
     pub(super) table: MotorTable,
@@ -100,7 +101,7 @@ impl Drive {
     /// Opens the port and stops the motor before anything else is requested, whichever module is there.
     ///
     /// # Errors
-    /// As [`Drive::stop`], and [`Fault::NotOpened`].
+    /// The port cannot be opened ([`Fault::NotOpened`]), the module does not confirm the stop, or the motor keeps moving.
     pub fn stop_at(settings: &PortSettings, table: &MotorTable) -> Result<(), MotorError> {
         Drive::connect("stop", settings, table)?.stop()
     }

@@ -46,10 +46,11 @@ impl Guard {
         Guard { port, address: table.address, motor: table.motor, moving: false, searching: false, held, interrupter }
     }
 
-    /// Sends a request; see [`Port::ask`].
+    /// Sends a request and waits for its reply. Requests that can be repeated without harm are tried three times, others once ([`Port::ask`]).
     ///
     /// # Errors
-    /// Those of [`Port::ask`], and [`Fault::Interrupted`] once a signal has come or the [`Interrupter`] was used.
+    /// [`Fault::NoReply`], [`Fault::Checksum`], [`Fault::Refused`], [`Fault::Unplugged`], and [`Fault::Interrupted`] once a signal has come or the
+    /// [`Interrupter`] was used.
     pub fn ask(&mut self, request: &Request) -> Result<Answer, Fault> {
         self.interrupted()?;
         // Set before it is sent: a request without a reply may have been carried out.
@@ -58,10 +59,10 @@ impl Guard {
         self.port.ask(request)
     }
 
-    /// See [`Port::ask_raw`].
+    /// Sends a request whose reply of nine bytes has no checksum. Returns the bytes ([`Port::ask_raw`]).
     ///
     /// # Errors
-    /// As [`Guard::ask`].
+    /// [`Fault::NoReply`], [`Fault::Unplugged`], and [`Fault::Interrupted`] once a signal has come or the [`Interrupter`] was used.
     pub(crate) fn ask_raw(&mut self, request: &Request) -> Result<[u8; LENGTH], Fault> {
         self.interrupted()?;
         self.port.ask_raw(request)

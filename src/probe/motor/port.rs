@@ -55,7 +55,7 @@ pub(crate) struct Answer {
     pub value: i32,
     /// Time of the value: the middle between sending the request and receiving the reply.
     pub at: Instant,
-    /// The request was sent more than once, so that `at` may belong to another reply than `value`.
+    /// True if the request was sent more than once, so that `at` may belong to another reply than `value`.
     pub repeated: bool,
 }
 

@@ -59,7 +59,7 @@ pub struct MotorTable {
     pub microsteps: u32,
     /// Revolutions of the motor for one revolution of the array, 0.001 to 10000.
     pub gear: f64,
-    /// Increasing positions of the motor move the array towards smaller angles.
+    /// True if increasing positions of the motor move the array towards smaller angles.
     #[serde(default)]
     pub reversed: bool,
     /// Address of the module in TMCL requests, 1 to 255.
@@ -75,7 +75,7 @@ pub struct MotorTable {
     /// Direction in which the motor first rotates to find the home switch.
     #[serde(default)]
     pub home_direction: Side,
-    /// The input of the home switch reads 0 when the switch is closed; otherwise 1.
+    /// True if the input of the home switch reads 0 while the switch is closed; false if it then reads 1.
     #[serde(default)]
     pub home_inverted: bool,
     /// Angle of the array at home, degrees; 0 is the middle of the sweep.

@@ -40,10 +40,10 @@ pub struct Cycle {
 }
 
 impl Cycle {
-    /// Sorts the frames of one slow sweep, given in order of acquisition, `rate` frames a second.
+    /// Sorts the frames of one slow sweep, given in order of acquisition, `rate` frames a second. `rhythm`: the phases of these frames.
     ///
     /// # Errors
-    /// One line: fewer than four cycles, or numbers of phases or slices out of their range.
+    /// One line: fewer than four cycles, another number of phases than frames, or numbers of volumes or slices out of their range.
     pub fn new(
         probe: &Probe,
         stored: StoredType,
@@ -89,8 +89,8 @@ impl Cycle {
         }
     }
 
-    /// The frames of the volume at a phase (an index from 0 up to `phases`), by slice. The time stamp of all
-    /// is that of the phase, s from the start of the cycle.
+    /// The frames of the volume at a phase (an index from 0 to `phases` - 1), by slice. The time stamp of all is that of the phase, s from the
+    /// start of the cycle.
     pub fn volume(&self, phase: usize) -> Vec<Frame> {
         let share = phase as f64 / self.phases as f64;
         let (begin, end) = (self.rhythm.phases[0], self.rhythm.phases[0] + self.rhythm.cycles());

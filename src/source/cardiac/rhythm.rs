@@ -199,7 +199,8 @@ impl Spectrum {
 /// The phase of the heart in each frame of a sweep.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rhythm {
-    /// For each frame the number of heart cycles, rising and fractional, since the first frame or the first R wave.
+    /// For each frame the number of heart cycles, rising and fractional, since the first frame or, if R waves were given, since the first of them
+    /// (negative before it).
     pub phases: Vec<f64>,
     /// Mean heart rate, cycles a frame: over the frames that show a heart, or over all if R waves were given.
     pub mean: f64,
@@ -257,7 +258,8 @@ impl Rhythm {
     /// wave and after the last, the nearest cycle is repeated.
     ///
     /// # Errors
-    /// One line: fewer than two R waves during the sweep, or times that do not rise.
+    /// One line: no frames, fewer than two R waves during the sweep, more than two cycles of the sweep before the first or after the last, times that
+    /// do not rise, or R waves less than 0.06 s or more than 6 s apart.
     pub fn of_triggers(times: &[f64], triggers: &[f64]) -> Result<Rhythm, String> {
         for (name, of) in [("R wave", triggers), ("frame", times)] {
             if let Some(n) = (1..of.len()).find(|n| !(of[*n] > of[*n - 1] && of[*n].is_finite() && of[0].is_finite())) {

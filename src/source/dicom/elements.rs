@@ -133,7 +133,8 @@ pub(super) struct Fragment {
     pub length: u64,
     /// The first bytes of the fragment, zeros after its end.
     pub head: [u8; 8],
-    /// True if the fragment ends with the end mark of JPEG or JPEG 2000, padding apart.
+    /// True if the fragment may end a frame: its last bytes are the end mark of JPEG or JPEG 2000, or the second byte of it, padding apart, or only
+    /// padding.
     pub ends: bool,
 }
 

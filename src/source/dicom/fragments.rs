@@ -21,7 +21,8 @@ pub(super) struct Stream<'a> {
 }
 
 /// Divides fragments among frames. `stated`: the numbers of frames that are consistent with the file's header, empty if it states none. `table`:
-/// the offsets of frames. If the header, the table and the code streams contradict each other, the frames that are there count, with a warning.
+/// the offsets of frames in bytes from the first fragment; empty if there is none. If the header, the table and the code streams contradict each
+/// other, the frames that are there count, with a warning.
 ///
 /// # Errors
 /// One line: nothing tells how to divide the fragments, or there are fewer frames than stated.

@@ -56,7 +56,7 @@ pub(super) struct Frames {
     pub(super) parts: Arc<[(u64, u64)]>,
     pub(super) coding: Coding,
     pub(super) arrangement: Arrangement,
-    /// Uncompressed bytes are in big-endian words of 16 bits, so that the second byte of a word is the first pixel.
+    /// True if uncompressed bytes are in big-endian words of 16 bits, so that the second byte of a word is the first pixel.
     pub(super) swapped: bool,
     /// Columns and rows of a stored picture.
     pub(super) stored: [usize; 2],

@@ -32,7 +32,7 @@ pub(super) struct Image {
     pub parts: Vec<(u64, u64)>,
     /// True if the decoder turns colours into luminance, so that `pixel` shows one channel although the file has colours.
     pub from_colour: bool,
-    /// Uncompressed bytes are in big-endian words of 16 bits.
+    /// True if uncompressed bytes are in big-endian words of 16 bits, so that the second byte of a word is the first pixel.
     pub swapped: bool,
     /// One line for each statement of the file that is wrong or missing.
     pub warnings: BTreeSet<String>,

@@ -174,7 +174,7 @@ pub(super) fn in_patient(root: &Item, flat: &Flat) -> Option<(DVec3, [DVec3; 2])
 /// The frames of a file of 2D pictures as a series in time.
 ///
 /// # Errors
-/// As [`of_pictures`].
+/// One line that names the file: the geometry that it states is impossible.
 pub(super) fn pictures(path: &Path, root: &Item, image: &Image, options: &OpenOptions) -> Result<Placed, InputError> {
     let flat = flat(root, image.size);
     let frames = image.places.len();
@@ -204,7 +204,7 @@ fn slice_step(root: &Item, frames: usize) -> Option<f64> {
 }
 
 /// The geometry of a file of pictures: each is a volume of one slice. A secondary capture that states evenly spaced positions of its slices is
-/// one volume.
+/// one volume. [`StoredGeometry::Missing`] if neither the file nor `options.voxel_spacing` states a distance between pixels.
 ///
 /// # Errors
 /// One line that names the file: the geometry that it states is impossible.

@@ -67,8 +67,8 @@ pub(super) const PALETTE_ABOUT: [Tag; 3] = [0x0028_1101, 0x0028_1102, 0x0028_110
 pub(super) const PALETTE: [Tag; 3] = [0x0028_1201, 0x0028_1202, 0x0028_1203];
 pub(super) const SEGMENTED_PALETTE: [Tag; 3] = [0x0028_1221, 0x0028_1222, 0x0028_1223];
 pub(super) const PIXEL_MEASURES: Tag = 0x0028_9110;
-/// Private elements of Philips' Cartesian volumes, as public readers know them: their creator, and the number of slices, unit and spacing of the
-/// third axis.
+/// Private element that names the creator of Philips' Cartesian volumes, as public readers know it. The three constants after it are the number of
+/// slices, and unit and spacing of the third axis.
 pub(super) const PHILIPS: Tag = 0x3001_0010;
 pub(super) const PHILIPS_SLICES: Tag = 0x3001_1001;
 pub(super) const PHILIPS_UNIT: Tag = 0x3001_1002;
@@ -83,7 +83,7 @@ pub(super) const META_SYNTAX: Tag = 0x0002_0010;
 pub(super) const ITEM: Tag = 0xfffe_e000;
 pub(super) const ITEM_END: Tag = 0xfffe_e00d;
 pub(super) const SEQUENCE_END: Tag = 0xfffe_e0dd;
-/// Group number of GE's private elements that hold a Kretz file, and the name of the creator that reserves a block of it.
+/// Group number of GE's private elements that hold a Kretz file. [`KRETZ_CREATOR`] is the name of the creator that reserves a block of it.
 pub(super) const KRETZ_GROUP: u32 = 0x7fe1;
 pub(super) const KRETZ_CREATOR: &str = "KRETZ_US";
 

@@ -17,7 +17,7 @@ const UID_LENGTH: usize = 44;
 const ENHANCED_VOLUME: &str = "1.2.840.10008.5.1.4.1.1.6.2";
 const CAPTURE: &str = "1.2.840.10008.5.1.4.1.1.7.2";
 const EXPLICIT_LITTLE_ENDIAN: &str = "1.2.840.10008.1.2.1";
-/// Names of this program in a file.
+/// Name of this program, as manufacturer and model in the files that it writes.
 pub(super) const NAME: &str = "Echolume";
 /// Offset of the length of the file meta information, and of the first byte that it counts.
 const META_LENGTH_AT: usize = 140;
@@ -71,7 +71,7 @@ impl DicomWriter {
     /// Writes all elements before the samples. `size`: columns, rows, slices.
     ///
     /// # Errors
-    /// Those of writing.
+    /// The file cannot be written.
     pub fn create(file: Unfinished, size: [usize; 3], world: &World, form: Form) -> io::Result<DicomWriter> {
         DicomWriter::begin(file, Header::new(size, world, form))
     }
@@ -87,7 +87,7 @@ impl DicomWriter {
     /// Writes the unique identifiers, which depend on the content, into the header, and renames the complete file to its target.
     ///
     /// # Errors
-    /// Those of writing.
+    /// The file cannot be written.
     pub fn finish(mut self) -> io::Result<()> {
         if !self.bytes.is_multiple_of(2) {
             self.write_all(&[0])?;
@@ -254,7 +254,7 @@ impl Header {
         self.bytes[META_LENGTH_AT..META_BEGIN].copy_from_slice(&length.to_le_bytes());
     }
 
-    /// Group 0008 up to the scanner, and the patient.
+    /// Appends the elements of group 0008 from the type of the image to the modality; date, time and accession number are empty.
     pub(super) fn general(&mut self, class: &str, image_type: &str, modality: &str) {
         self.text(0x0008_0008, b"CS", image_type);
         self.text(tags::SOP_CLASS, b"UI", class);

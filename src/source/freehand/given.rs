@@ -7,15 +7,15 @@ use std::path::Path;
 /// Options of a freehand volume that a user gives. None: the value that the file states, otherwise the default.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FreehandArguments {
-    /// See [`CompoundingOptions::clip`].
+    /// The part of each picture that is used: first column, first row, columns, rows.
     pub clip: Option<[usize; 4]>,
-    /// See [`CompoundingOptions::spacing`], mm.
+    /// Distance between voxels along each axis, mm.
     pub spacing: Option<f64>,
-    /// See [`CompoundingOptions::max_hole`], mm.
+    /// Widest gap between pictures that is filled, mm; 0 fills none.
     pub max_hole: Option<f64>,
-    /// See [`CompoundingOptions::extent`], mm.
+    /// Least length of the volume along the normal of the pictures, mm ([`CompoundingOptions::extent`]).
     pub extent: Option<f64>,
-    /// See [`CompoundingOptions::max_voxels`].
+    /// Largest number of voxels of the volume.
     pub max_voxels: Option<usize>,
 }
 

@@ -14,7 +14,8 @@ const MAX_COARSENING: f64 = 2.01;
 
 impl Compounder {
     /// Enlarges the volume until it contains a picture of this pose. Returns false, without a change, if the volume would have more than 2048
-    /// voxels along an edge, or more voxels than its options allow even at twice its first spacing.
+    /// voxels along an edge, or more voxels than its options allow even at twice its first spacing. A pose that [`Compounder::push`] refuses
+    /// changes nothing and gives true.
     ///
     /// Memory: that of both volumes while the old one is copied to the new one.
     pub(crate) fn grow_around(&mut self, pose: &Pose) -> bool {

@@ -111,7 +111,8 @@ fn axes(right: DVec3, down: DVec3) -> Option<DMat3> {
     Some(DMat3::from_cols(x, y, x.cross(y)))
 }
 
-/// The grid from corner `low` to corner `high`, mm, with `spacing` made coarser until there are at most `most` voxels.
+/// The grid from corner `low` to corner `high`, mm, with `spacing` (mm) made coarser until there are at most `most` voxels, and at most 2048 along
+/// an edge.
 ///
 /// # Errors
 /// One line: no spacing is coarse enough.

@@ -322,7 +322,7 @@ impl TrackedFrame<'_> {
     /// Checks the pose and the number of samples.
     ///
     /// # Errors
-    /// As [`Pose::check`], and a number of samples that is not that of the pixels.
+    /// One line: a pose that [`Pose::check`] refuses, or a number of samples that is not that of the pixels.
     pub fn check(&self) -> Result<(), String> {
         self.pose.check()?;
         let [columns, rows] = self.pose.size;

@@ -105,9 +105,9 @@ impl Sweep {
         }
     }
 
-    /// Brings the volume up to date if its [`Schedule`] says that it is to be emitted. None if it is not. Otherwise true if a slice changed. A
-    /// volume that was not placed yet is placed first, and what is refused then is passed to `refuse`. `at_once`: emit now, because no more
-    /// pictures follow.
+    /// Brings the volume up to date if its [`Schedule`] says that it is to be emitted. None if it is not, or without new pictures. Otherwise true
+    /// if a slice changed. A volume that was not placed yet is placed first, and what is refused then is passed to `refuse`. `at_once`: emit now,
+    /// because no more pictures follow.
     pub fn update(&mut self, at_once: bool, mut refuse: impl FnMut(Refusal)) -> Option<bool> {
         let waited = self.since?.elapsed();
         let is_placed = self.is_placed();
@@ -157,7 +157,8 @@ impl Sweep {
         Some(self.compounder.as_ref()?.lattice())
     }
 
-    /// Samples of slice `k` of the volume. None beyond the last slice, and before the volume was placed.
+    /// Samples of slice `k` of the volume, as [`Compounder::slice`] returns them: lateral fastest, little-endian. None beyond the last slice, and
+    /// before the volume was placed.
     pub fn slice(&self, k: usize) -> Option<&[u8]> {
         self.compounder.as_ref()?.slice(k)
     }

@@ -42,17 +42,17 @@ pub struct ClientOptions {
     pub message_timeout: Duration,
     /// Longest time without a message, after which the connection is closed: a peer that lost power does not close it.
     pub silence_timeout: Duration,
-    /// Wait before the first attempt to reconnect. It doubles with every connection that brings no message.
+    /// Wait before the first attempt to reconnect. It doubles with every attempt that brings no message.
     pub first_wait: Duration,
     /// Longest wait before an attempt to reconnect.
     pub longest_wait: Duration,
-    /// Largest body of a message, bytes; larger messages are refused.
+    /// Largest body of a message, bytes. After the header of a larger one the connection is closed.
     pub body_limit: usize,
     /// Largest number of messages in the queue; at least the newest is always kept.
     pub queue_messages: usize,
     /// Largest memory of the queued messages, bytes. The newest message is kept even if it alone is larger.
     pub queue_bytes: usize,
-    /// Accept messages whose checksum is 0 without verifying it: some senders compute none.
+    /// True if messages whose checksum is 0 are accepted without verifying it: some senders compute none.
     pub takes_no_checksum: bool,
 }
 
@@ -92,7 +92,7 @@ pub struct ClientStatistics {
     pub dropped: u64,
     /// Number of connections that ended within a message.
     pub cut_short: u64,
-    /// Number of connections that were closed because bytes were no header where one had to be.
+    /// Number of connections that were closed because bytes were no header where one had to be, or it stated too large a body.
     pub lost_framing: u64,
     /// Number of connections after the first.
     pub reconnects: u64,
@@ -129,7 +129,7 @@ struct ConnectionEnd {
 }
 
 impl Client {
-    /// Starts to connect to `address`: a name or a number, followed by a colon and the port unless it is [`PORT`]. If the server cannot be
+    /// Starts to connect to `address`: a host name or an IP address, followed by a colon and the port unless it is [`PORT`]. If the server cannot be
     /// reached, the client keeps trying, and [`last_error`](Client::last_error) says why.
     ///
     /// # Errors
@@ -176,7 +176,7 @@ impl Client {
         self.shared.lock().statistics.clone()
     }
 
-    /// The last error of the connection, on one line; None if there was none.
+    /// The last error of the connection or of a message that was skipped, on one line; None if there was none.
     pub fn last_error(&self) -> Option<String> {
         self.shared.lock().last_error.clone()
     }

@@ -34,7 +34,8 @@ pub fn decode(bytes: &[u8], limit: usize) -> Result<Decoded, DecodeError> {
     decode_with(bytes, limit, false)
 }
 
-/// As [`decode`]. `takes_zero`: accept messages with the checksum 0 without verifying it, as some senders compute none.
+/// Decodes the message at the start of `bytes`, see [`decode`]. `takes_zero`: true to accept messages with the checksum 0 without verifying it, as
+/// some senders compute none.
 pub(super) fn decode_with(bytes: &[u8], limit: usize, takes_zero: bool) -> Result<Decoded, DecodeError> {
     let Some(head) = bytes.first_chunk::<HEADER>() else { return Ok(Decoded::Need(HEADER - bytes.len())) };
     let framing =
@@ -143,7 +144,7 @@ pub fn encode(message: &Message, version: Version) -> Result<Vec<u8>, MessageErr
 /// Encodes a message of any type and body, in version 1. `kind`: name of the type; `time`: s since 1970.
 ///
 /// # Errors
-/// As for [`encode`].
+/// A name that is too long or has zero bytes, or a time before 1970 or after 2106.
 pub(super) fn packed(kind: &str, device: &str, time: f64, body: &[u8]) -> Result<Vec<u8>, MessageError> {
     let mut bytes = vec![0; HEADER];
     bytes.extend_from_slice(body);
@@ -546,8 +547,8 @@ pub enum DecodeError {
     /// The body is invalid for its type. The next message begins after `length` bytes.
     #[error("{error}")]
     Content { length: usize, error: MessageError },
-    /// The bytes are no header. The format has no marks of message boundaries, so that the stream cannot be resynchronised and the connection
-    /// has to be renewed.
+    /// The bytes are no header, or one of another version or with too large a body. The format has no marks of message boundaries, so that the
+    /// stream cannot be resynchronised and the connection has to be renewed.
     #[error("{error}; the stream cannot be re-synchronised")]
     Framing { error: MessageError },
 }

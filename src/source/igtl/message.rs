@@ -40,7 +40,7 @@ pub struct Tool {
     /// Name of the tool; a name of more than 20 bytes is not sent, but refused.
     pub name: String,
     pub kind: ToolKind,
-    /// Pose of the tool, see [`Transform::matrix`].
+    /// Pose of the tool: upper three rows of the 4 x 4 matrix, all finite. Its last column is a translation in mm.
     pub matrix: [[f32; 4]; 3],
 }
 

@@ -26,7 +26,9 @@ use std::time::{Duration, Instant};
 /// Where the poses of 2D frames come from.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Poses {
-    /// From TRANSFORM and TDATA messages. The fields are arguments of [`Pairing::new`]; `tolerance` and `patience` are in s.
+    /// From TRANSFORM and TDATA messages. `device`: name of the TRANSFORM's device or of the TDATA's tool; None: any TRANSFORM. `tolerance`:
+    /// largest difference between the time stamps of a frame and its pose, s. `patience`: largest time by which frames may be ahead of the poses,
+    /// s.
     Messages { device: Option<String>, tolerance: f64, patience: f64 },
     /// From the matrix of each image.
     Image,
@@ -111,7 +113,7 @@ struct VolumeOutput {
 }
 
 impl Network {
-    /// Starts to connect to a server, see [`Client::connect`].
+    /// Starts to connect to a server; `address` is that of [`Client::connect`]. If the server cannot be reached, the source keeps trying.
     ///
     /// # Errors
     /// The thread cannot be started.

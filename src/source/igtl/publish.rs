@@ -94,11 +94,11 @@ struct Whole {
 }
 
 impl Publisher {
-    /// Starts a server that listens at `address`, see [`Server::bind`]. `spacing`: voxel spacing of the volumes that are sent, mm; None: for a
-    /// Cartesian volume its own, for a sweep 1 mm.
+    /// Starts a server that listens at `address`, a host name or an IP address with a port; port 0 takes a free one. `spacing`: voxel spacing of
+    /// the volumes that are sent, mm; None: for a Cartesian volume its own, for a sweep 1 mm.
     ///
     /// # Errors
-    /// As for [`Server::bind`].
+    /// An address that is not of this machine, a port that is in use or not allowed, a thread that cannot be started.
     pub fn bind(address: &str, spacing: Option<f64>, options: ServerOptions) -> io::Result<Publisher> {
         let server = Arc::new(Server::bind(address, options)?);
         let shared = Arc::new(Shared { mail: Mutex::default(), changed: Condvar::new(), spacing });
@@ -120,7 +120,7 @@ impl Publisher {
         PublisherStatistics { server: self.server.statistics(), pictures, volumes, replaced, fault }
     }
 
-    /// Queues a picture of 8-bit red, green, blue, alpha, rows from the top. `size`: width and height.
+    /// Queues a picture of 8-bit red, green, blue, alpha, rows from the top; ignored while no client is connected. `size`: width and height.
     pub fn picture(&self, size: [u32; 2], pixels: Vec<u8>) {
         if self.server.has_clients() {
             let mut mail = self.shared.lock();
@@ -145,7 +145,7 @@ impl Publisher {
         }
     }
 
-    /// A function to be called with every event of a source. It collects frames and queues each complete volume.
+    /// A function to be called with every event of a source. While a client is connected it collects frames and queues each complete volume.
     pub fn listener(&self) -> impl FnMut(&Event) + Send + use<> {
         let (shared, server) = (self.shared.clone(), self.server.clone());
         let mut listener = Listener { shared, server, header: None, filling: None };

@@ -32,9 +32,9 @@ pub struct ServerOptions {
     pub queue_messages: usize,
     /// Largest number of bytes that wait for a client. The newest message is always kept.
     pub queue_bytes: usize,
-    /// Time without reading anything after which a client is disconnected.
+    /// Longest time in which a client reads nothing of a message that is being sent to it; after it the client is disconnected.
     pub stall_timeout: Duration,
-    /// Longest time for sending one message to a client; after it the client is disconnected, however many bytes it still reads.
+    /// Longest time from the first byte of a message of a client, such as a query, to its last; after it the client is disconnected.
     pub message_timeout: Duration,
     /// Longest time that dropping the server waits until its last messages are sent.
     pub last: Duration,
@@ -69,7 +69,8 @@ pub struct ServerStatistics {
     pub sent: u64,
     /// Number of messages that were dropped from a client's queue in favour of newer ones.
     pub dropped: u64,
-    /// Number of clients that were disconnected because they read nothing or sent something that is not a message.
+    /// Number of clients that were disconnected because they read nothing, asked and did not read the answers, or sent something that is not a
+    /// message or did not end in time.
     pub disconnected: u64,
 }
 
@@ -158,7 +159,7 @@ impl Queue {
 }
 
 impl Server {
-    /// Listens at `address`, a name or a number with a port; port 0 takes a free one.
+    /// Listens at `address`, a host name or an IP address with a port; port 0 takes a free one.
     ///
     /// # Errors
     /// An address that is not of this machine, a port that is in use or not allowed, a thread that cannot be started.
@@ -184,7 +185,7 @@ impl Server {
         self.shared.lock().statistics.clients > 0
     }
 
-    /// Queues a message for every client, and returns at once.
+    /// Queues a message for every client that has not asked to be sent none (STP_IMAGE), and returns at once.
     ///
     /// # Errors
     /// A message that the format cannot hold.

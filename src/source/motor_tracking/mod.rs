@@ -42,7 +42,7 @@ const REPORT_INTERVAL: Duration = Duration::from_secs(1);
 pub enum Clock {
     /// From the frame's arrival, minus the time that sound needs for all its lines, minus `delay` s, the time from the last line to the arrival.
     Arrival { delay: f64 },
-    /// From the frame's time stamp, s since 1970 on this machine's clock. A frame without one is left out.
+    /// From the frame's time stamp, which is taken as that of its first line: s since 1970 on this machine's clock. A frame without one is left out.
     Stamp,
 }
 
@@ -50,8 +50,8 @@ pub enum Clock {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotorTrackingOptions {
     pub clock: Clock,
-    /// Read the source only once the array sweeps, which suits a file. A source with its own clock has to be read from the start, because frames
-    /// that had waited would be taken for new ones.
+    /// True if the source is read only once the array sweeps, which suits a file. A source with its own clock has to be read from the start,
+    /// because frames that had waited would be taken for new ones.
     pub holds: bool,
 }
 
@@ -286,7 +286,7 @@ impl FreeRunning {
     /// allows, and with the motor's travel during each frame.
     ///
     /// # Errors
-    /// As [`Phantom::new`].
+    /// An option of the phantom is out of its range.
     pub fn phantom(options: PhantomOptions, speed: f64) -> Result<Phantom, InputError> {
         let options = PhantomOptions { both_ways: true, volumes: options.volumes.next_multiple_of(2), ..options };
         let ratio = |options: &PhantomOptions| {

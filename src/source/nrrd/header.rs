@@ -69,7 +69,7 @@ const SPELLINGS: [(&str, &str); 10] = [
     ("sampleunits", "sample units"),
 ];
 
-/// Keys in which PLUS states properties of a whole sequence: its orientation and its type.
+/// Key in which PLUS states the orientation of the pictures of a whole sequence. [`IMAGE_TYPE`] is the one in which it states their type.
 pub(super) const ORIENTATION: &str = "ultrasound image orientation";
 pub(super) const IMAGE_TYPE: &str = "ultrasound image type";
 
@@ -250,10 +250,10 @@ impl<'a> Header<'a> {
         Ok(numbers)
     }
 
-    /// The vectors of a field. An inner None stands for the word `none`; the result is None if the field is absent.
+    /// The vectors of a field. An inner None stands for the word `none` or a vector of NaN; the result is None if the field is absent.
     ///
     /// # Errors
-    /// The field is not a list of vectors in brackets.
+    /// The field is not a list of vectors of 2 to 4 finite numbers in brackets.
     pub(super) fn vectors(&self, field: &str) -> Result<Option<Vec<Option<Vector>>>, InputError> {
         let Some(mut rest) = self.get(field) else { return Ok(None) };
         let mut vectors = Vec::new();

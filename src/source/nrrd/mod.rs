@@ -105,10 +105,10 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
     Ok(layout)
 }
 
-/// Label, name and colour (red, green, blue, 0..=1) of each segment of a segmentation, in their order.
+/// Label, name and colour (red, green, blue, 0..=1) of each segment of a segmentation, in their order; none if the header states no segments.
 ///
 /// # Errors
-/// The file cannot be read, or states a label that is no number of 8 bits.
+/// The file cannot be read, is not NRRD, or states a label that is no number of 8 bits.
 pub(super) fn segments(path: &Path) -> Result<Vec<(u8, String, [f64; 3])>, InputError> {
     let file = InputFile::new(path)?;
     if !is_one(&file.start(8)?) {

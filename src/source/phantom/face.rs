@@ -11,7 +11,7 @@ const RELIEF: f32 = 5.0;
 /// Every part that a ball encloses is at least so far inside of it, mm, with the reach of its joins.
 const MARGIN: f32 = 3.0;
 
-/// Centre of the vault of the skull in the head's coordinates, and the half axes of the skin on it, mm.
+/// Centre of the vault of the skull in the head's coordinates, mm. [`VAULT_RADII`] are the half axes of the skin on it, mm.
 pub(super) const VAULT: Vec3 = vec3(0.0, 17.0, -41.5);
 pub(super) const VAULT_RADII: Vec3 = vec3(37.0, 37.5, 44.5);
 

@@ -113,7 +113,8 @@ pub struct PhantomOptions {
 }
 
 impl PhantomOptions {
-    /// The point between the eyes of the head that is not moved, mm in the coordinates of [`Probe`]: 55 mm below the array's face.
+    /// The point between the eyes of the head where [`PhantomOptions::moved`] is no motion, mm in the coordinates of [`Probe`]: 55 mm below the
+    /// array's face.
     pub const CENTRE: DVec3 = DVec3::new(0.0, ARRAY_RADIUS + 55.0, 0.0);
 }
 
@@ -224,7 +225,8 @@ impl Phantom {
         self.volumes.swept(volume, &self.probe)
     }
 
-    /// The ground truth of the scanned object: positions in the coordinates of [`Probe`], grey values without speckle.
+    /// The ground truth of the scanned object where it was before [`PhantomOptions::moved`]: positions in the coordinates of [`Probe`], grey values
+    /// without speckle.
     pub fn truth(&self) -> Truth {
         self.scatterers.truth()
     }
@@ -291,8 +293,8 @@ impl Phantom {
         ((volume * frames + self.number_of(volume, slice)) * lines + line) as f64 * each
     }
 
-    /// Writes all volumes as a PLUS sequence (`.mha`), and the probe file `<stem>.probe.toml`. Either both files exist and are complete, or
-    /// neither does.
+    /// Writes all volumes as a PLUS sequence (`.mha`), and the probe file `<stem>.probe.toml`. The sequence exists only if both files are
+    /// complete.
     ///
     /// # Errors
     /// More than 20000 frames, a path that does not end in .mha, or a file that cannot be written.

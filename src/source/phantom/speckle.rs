@@ -112,7 +112,8 @@ struct Field {
     im: Vec<f32>,
 }
 
-/// Grey values of all slices of a volume with speckle. `echoes` and the result: one list for each slice, in geometric order.
+/// Grey values of all slices of a volume with speckle. `echoes` and the result: one list for each slice, in geometric order. `seed` and `volume`
+/// determine the noise.
 pub(super) fn slices(echoes: &[Vec<Echo>], probe: &Probe, psf: &PointSpread, seed: u64, volume: u64) -> Vec<Vec<u8>> {
     let blur = Blur::new(probe, psf);
     let fields: Vec<Field> = echoes

@@ -49,7 +49,7 @@ impl Phantom {
     /// from the blood; mm, negative inside. It is exact on the surface and correct to first order near it.
     ///
     /// # Errors
-    /// As [`Phantom::label`].
+    /// The body is neither head nor vessels; [`Phantom::truth`] has its formula.
     pub fn distance(&self, volume: usize, place: DVec3) -> Result<f64, InputError> {
         Ok(match self.labelled()? {
             Labelled::Head(head) => f64::from(head.distance(self.own(place).as_vec3(), self.time_at(volume, place))),
@@ -70,8 +70,8 @@ impl Phantom {
     /// names. Distances (f32, mm, see [`Phantom::distance`]) go to [`distance_path`], a MetaImage. Both have values outside the sector, too.
     ///
     /// # Errors
-    /// The body is neither head nor vessels, the path does not end in .mha or .seg.nrrd, or a file cannot be written. A file that exists is
-    /// complete.
+    /// The body is neither head nor vessels, the path does not end in .mha or .seg.nrrd, or a file cannot be written: the labels may then exist
+    /// without the distances, but neither file is incomplete.
     pub fn write_truth(&self, path: &Path, grid: &Grid) -> Result<(), InputError> {
         self.labelled()?;
         let label = |place| self.label(0, place).ok().map(|label| label as u8);
