@@ -50,7 +50,7 @@ pub struct Agreement {
     pub same_bytes: bool,
     /// True if the difference is within what the class allows.
     pub agrees: bool,
-    /// Errors between the two pictures, each with its limit in `verify`; empty if the bytes are equal.
+    /// Errors between the two pictures, with their limits in `verify`; empty if the bytes are equal or the sizes differ.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub figures: Vec<Figure>,
     /// One line that describes the difference; None if the pictures agree.

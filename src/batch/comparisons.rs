@@ -4,7 +4,8 @@ use super::agreement::{Class, Drawer};
 use super::results::{Record, Status};
 use std::collections::BTreeMap;
 
-/// Comparisons of outputs of the same units by two devices: how many there are, how many outputs have the same bytes, and which do not agree.
+/// Comparisons of outputs of the same units by two devices: how many there are, how many outputs have the same bytes, and which do not agree (by more
+/// than the tolerance of `verify`, or, with one device and driver, in any byte).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Pair {
     pub compared: usize,
@@ -13,8 +14,9 @@ pub struct Pair {
     pub faults: Vec<(String, String, String)>,
 }
 
-/// All comparisons in the results, by class and the devices of both outputs, that of the stored or earlier output first (None: no device was
-/// used). There is one for each unit that was drawn again and, by the digests of its outputs, for each unit that two processes did.
+/// All comparisons in the results, by class and the devices of both outputs, that of the stored or earlier output first (None: no device was used).
+/// There is one for each unit that was drawn again and, by the digests of its outputs, for each unit that two processes did. Where two different
+/// drivers gave other bytes in the second way, nothing is compared, because a digest does not say how far they differ.
 pub fn pairs(records: &[Record]) -> BTreeMap<(Class, Option<Drawer>, Option<Drawer>), Pair> {
     let mut pairs: BTreeMap<(Class, Option<Drawer>, Option<Drawer>), Pair> = BTreeMap::new();
     let mut first: BTreeMap<&str, &Record> = BTreeMap::new();

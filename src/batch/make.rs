@@ -23,7 +23,7 @@ pub enum Found {
 /// The files that `patterns` name, sorted, each once: files, folders with all recordings below them, and patterns with `*`, `?`, `**` and `[...]`.
 ///
 /// # Errors
-/// A pattern is invalid or matches nothing.
+/// A pattern is invalid or matches nothing, or a folder cannot be read or is more than 64 folders deep.
 pub fn files(patterns: &[String]) -> Result<Vec<PathBuf>, Failure> {
     let mut found = Vec::new();
     for pattern in patterns {
@@ -69,8 +69,8 @@ fn walk(folder: &Path, depth: usize, found: &mut Vec<PathBuf>) -> Result<(), Str
     Ok(())
 }
 
-/// Makes the unit of a file: its absolute path, digest, length and expected cost. The file is opened and read. `command`: what is to be done
-/// with it.
+/// Makes the unit of a file: its absolute path, digest, length and expected cost. The file is opened and read; one that cannot be is left
+/// out. `command`: what is to be done with it, the words of a command line; render if it is empty.
 ///
 /// # Errors
 /// The command is wrong, independently of the file.
@@ -109,8 +109,8 @@ pub fn unit(file: &Path, command: &[String]) -> Result<Found, Failure> {
     }
 }
 
-/// Expected cost: 1 plus the MiB of the volume's samples times the cost of this kind of work relative to drawing. The ratios are rough; it matters only
-/// that a large recording costs more than a small one.
+/// Expected cost: 1 plus the MiB of the volume's samples times the cost of this kind of work relative to drawing. The ratios are rough; it matters
+/// only that a large recording costs more than a small one.
 fn expected_cost(kind: Kind, source: &dyn Source, volume: usize) -> f64 {
     let geometry = source.geometry(volume);
     let [width, height] = geometry.frame_size();

@@ -35,7 +35,7 @@ pub struct Unit {
     /// What is done: `render`, `convert`, `measure` or `verify` with its flags. None: `render`, with `scene` if that is given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub command: Option<Vec<String>>,
-    /// File names of the outputs, one for each output of the command.
+    /// File names of the outputs, without a folder, one for each output of the command. Empty: a name by the kind of work, such as `picture.png`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub outputs: Vec<String>,
 }
@@ -152,10 +152,11 @@ pub fn units(file: &Path, is_chosen: impl Fn(usize) -> bool) -> Result<Vec<Numbe
     Ok(units)
 }
 
-/// Calls `each` with every unit of a manifest. Only one is in memory at a time.
+/// Calls `each` with every unit of a manifest, in its order. Only one is in memory at a time. Lines are parsed, but values are not checked as by
+/// [`units`].
 ///
 /// # Errors
-/// As of [`units`].
+/// One line that names the file, the line and the fault.
 pub fn for_each_unit(file: &Path, mut each: impl FnMut(&Unit)) -> Result<(), String> {
     for_each_line(file, |_, text| {
         each(&serde_json::from_str(text).map_err(|e| format!("is no unit: {e}"))?);

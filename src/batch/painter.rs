@@ -11,7 +11,7 @@ use crate::verify::Findings;
 use crate::verify::{compare_picture, render};
 use std::sync::Arc;
 
-/// Which Vulkan device is used, and how long it may take for a submission before it is given up.
+/// Which Vulkan device is used, the time limit of a submission, and when to stop waiting.
 #[derive(Clone)]
 pub struct DeviceOptions {
     pub device: Option<DeviceChoice>,
@@ -49,11 +49,11 @@ impl Painter {
         }
     }
 
-    /// Draws a volume. If the device is lost, it is opened again and the work is repeated in smaller and smaller parts. `is_whole`: `frames` has
-    /// every slice.
+    /// Draws a volume. If the device is lost, it is opened again and the work is repeated in smaller and smaller parts. `is_whole`: true if `frames`
+    /// has every slice.
     ///
     /// # Errors
-    /// The device lacks a feature, has too little memory, or was lost again.
+    /// The device lacks a feature, has too little memory, or was lost too often, or [`DeviceOptions::stop`] ended the wait for it.
     pub fn draw(&mut self, scene: &Scene, frames: &[Frame], is_whole: bool) -> Result<Picture, GpuError> {
         self.losses = Losses::default();
         loop {
@@ -95,7 +95,8 @@ impl Painter {
     }
 }
 
-/// Compares a picture with that of the f64 reference renderer, as `verify` does. `frames`: one for every slice.
+/// Compares a picture with that of the f64 reference renderer, within the tolerance of `verify`. `frames`: one for every slice. The findings have a
+/// fault if the picture differs by more.
 pub fn against_reference(scene: &Scene, frames: &[Frame], picture: &Picture) -> Findings {
     let format = Slot::Frames.format(scene);
     let [width, height] = scene.geometry.frame_size();

@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-/// A unit, its parsed work and the path of its recording.
+/// A unit, its parsed work and the path of its recording, which is absolute or relative to the working folder.
 #[derive(Clone)]
 pub struct Task {
     pub numbered: Numbered,
@@ -28,7 +28,7 @@ pub struct Task {
 pub enum Read {
     /// Nothing is to be done: an earlier run did the unit and left this record.
     Finished(Task, Box<Record>),
-    /// The unit is to be done. `earlier`: the record of an earlier run if the unit is drawn again only for comparison.
+    /// The unit is to be done. `earlier`: the record of an earlier run if the unit is drawn again only for comparison. `seconds`: time for reading.
     Ready {
         task: Task,
         key: Key,
@@ -257,7 +257,7 @@ impl Statistics {
     }
 }
 
-/// The file name of a path as text for messages.
+/// A path as text for messages: its first 300 characters, with invisible ones escaped.
 pub fn shown(path: &Path) -> String {
     escaped(&path.display().to_string(), 300)
 }

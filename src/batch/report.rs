@@ -61,8 +61,8 @@ impl<'a> Merged<'a> {
     }
 }
 
-/// The HTML report of a batch. `folder`: that of the batch, from which thumbnails are read. `torn`: number of incomplete lines that killed
-/// processes left in the results.
+/// The HTML report of a batch. `folder`: that of the batch, from which thumbnails are read. `torn`: number of lines of the results that are no
+/// records, such as those that killed processes left incomplete.
 pub fn html(records: &[Record], torn: usize, folder: &Path) -> String {
     let merged = Merged::of(records);
     let (units, failures) = (merged.units.len(), merged.failures().count());

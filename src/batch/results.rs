@@ -76,7 +76,7 @@ pub struct Record {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub outputs: Vec<OutputFile>,
     pub seconds: Seconds,
-    /// The device that was used; None if none was needed.
+    /// The device that was used; None if none was needed, or none was open when the attempt ended.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub drawer: Option<Drawer>,
     pub program: String,
@@ -149,11 +149,11 @@ impl Asked {
 /// Results that earlier runs wrote into a folder.
 #[derive(Debug, Default)]
 pub struct Earlier {
-    /// True if the folder has files of results, even if these have no line.
+    /// True if the folder of the batch has the folder `results`, even an empty one.
     pub is_begun: bool,
-    /// True if there is at least one line of results.
+    /// True if the files that were read have at least one record.
     pub has_lines: bool,
-    /// True if at least one line is about a unit of the present manifest.
+    /// True if at least one of these records is about a unit of the present manifest. False if the manifest was not given.
     pub is_of_these: bool,
     /// Keys and recordings of this shard's units with a line that says done.
     done: HashSet<(String, String)>,
@@ -164,8 +164,8 @@ pub struct Earlier {
 }
 
 impl Earlier {
-    /// Reads the earlier results of a shard. If `asked`, the units of the manifest, is given, results of all other shards are read, too,
-    /// also of divisions into another number of shards. Each file is read once, and nothing is written.
+    /// Reads the earlier results of a shard; a folder without results has none. If `asked`, the units of the manifest, is given, results of all other
+    /// shards are read, too, also of divisions into another number of shards. Each file is read once, and nothing is written.
     ///
     /// # Errors
     /// One line that names the file that cannot be read.
@@ -310,7 +310,8 @@ fn files_of(folder: &Path) -> Result<Vec<PathBuf>, (PathBuf, io::Error)> {
     Ok(files)
 }
 
-/// All results in a folder, without their figures, and the number of incomplete lines that killed processes left.
+/// All results in a folder, without their figures, and the number of lines that are no records of this format, such as those that killed processes
+/// left incomplete.
 ///
 /// # Errors
 /// One line: there are no results, or they cannot be read.

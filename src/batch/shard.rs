@@ -20,7 +20,7 @@ impl Shard {
     /// Part `index` of `count`.
     ///
     /// # Errors
-    /// There is no such part.
+    /// One line: `index` is not below `count`, or `count` is not in 1..=1048576.
     pub fn new(index: u32, count: u32) -> Result<Shard, String> {
         match () {
             _ if count == 0 || count > MAX_SHARDS => Err(format!("{count} shards: must be 1..={MAX_SHARDS}")),
@@ -31,10 +31,10 @@ impl Shard {
 
     /// The shard of this process according to the environment variables of Slurm (task of an array) or Kubernetes (completion of an Indexed
     /// Job); the whole manifest if there are none. `count`: the number of shards, which Kubernetes does not state; if it is given, an array that
-    /// is submitted again in part keeps its division.
+    /// is submitted again in part keeps its division. `variable`: returns the value of an environment variable, None if it is not set.
     ///
     /// # Errors
-    /// One line: an invalid number, an array with gaps, or a Job without a count.
+    /// One line: an invalid number, an array with gaps, a Job without a count, or a count above 1 without any of these variables.
     pub fn from_environment(count: Option<u32>, variable: impl Fn(&str) -> Option<String>) -> Result<Shard, String> {
         let number = |name: &str| match variable(name) {
             None => Ok(None),
@@ -74,7 +74,7 @@ impl Shard {
 impl FromStr for Shard {
     type Err = String;
 
-    /// Reads `I/N`, I from 0.
+    /// Reads `I/N`: part I, from 0, of N.
     fn from_str(text: &str) -> Result<Shard, String> {
         let parts = text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
         let (index, count) = parts.ok_or("must read I/N, as 0/8 for the first of eight")?;

@@ -110,7 +110,7 @@ struct MeasureUnit {
 /// What is done with a recording: a checked command with all its settings. Units that differ only in their recording share it.
 pub struct Work {
     pub kind: Kind,
-    /// The command or the scene as text in the results ([`text`]).
+    /// The command, or the scene as JSON, as text in the results ([`text`]).
     pub text: String,
     pub geometry: GeometryArgs,
     /// Index of the volume in the recording, from 0.
@@ -127,7 +127,7 @@ pub struct Work {
     digest: Vec<u8>,
 }
 
-/// The command or the scene of a unit as text in the results.
+/// The command of a unit, or `scene` and its settings as JSON, as text in the results; `render` if the unit states neither.
 pub fn text(unit: &Unit) -> String {
     match (&unit.scene, &unit.command) {
         (Some(scene), _) => format!("scene {}", serde_json::to_string(scene).unwrap_or_default()),
@@ -239,7 +239,7 @@ impl Work {
         Ok(hash.finalize().to_vec())
     }
 
-    /// The key of the outputs of this work for a recording with this digest.
+    /// The key of the outputs of this work for a recording with this digest (SHA-256, 64 hexadecimal digits).
     pub fn key(&self, digest: &str) -> Key {
         let mut hash = Sha256::new();
         hash.update(&self.digest);

@@ -41,7 +41,7 @@ pub struct Job<'a> {
     pub verifies: bool,
     /// Share of the finished pictures that are drawn again and compared, 0..=1.
     pub recheck: f64,
-    /// Results that earlier runs wrote for this shard. [`Job::run`] takes them.
+    /// Results that earlier runs wrote for this shard ([`Earlier::read`]).
     pub earlier: Earlier,
     /// True if the run begins with a line that states how many units were done before.
     pub resumes: bool,
@@ -49,7 +49,7 @@ pub struct Job<'a> {
     pub stops: &'a dyn Fn() -> bool,
 }
 
-/// How the run of a shard ended: numbers of all units and of those that failed.
+/// How the run of a shard ended: the number of all units of the shard, done or not, and of those that failed in this run.
 #[derive(Debug, Default)]
 pub struct Ended {
     pub units: usize,

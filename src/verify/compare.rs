@@ -16,7 +16,7 @@ pub struct Comparison {
     pub largest: f64,
     /// Largest error of the texels within tolerance, divided by the error that is allowed there (0..1).
     pub used: f64,
-    /// Share of the texels beyond tolerance, less the share that is allowed additionally; the largest of all outputs.
+    /// Share (0..1) of the texels beyond tolerance, less the share that [`ExtraTolerance`] allows, at least 0; the largest of all outputs.
     pub outliers: f64,
     /// Absolute value of the mean signed error of the texels within tolerance, divided by the error that is allowed there; the largest
     /// of all outputs that have enough written texels. It is small if errors are roundings, which have both signs.
@@ -78,8 +78,8 @@ pub(super) fn tolerance_of(pass: &Pass, extra: ExtraTolerance, slot: Slot, forma
     tolerance + 1.01 * Texels::spacing(format, expected) + extra.at(slot)
 }
 
-/// Compares all outputs of a dispatch with those of the reference. `poison`: value of the outputs before the dispatch. Where the reference
-/// has NaN, this value must be unchanged.
+/// Compares all outputs of a dispatch, the bindings `writes`, with those of the reference. `poison`: value of the outputs before the dispatch. Where
+/// the reference has NaN, this value must be unchanged.
 pub fn compare_outputs(
     pass: &Pass,
     scene: &Scene,

@@ -18,7 +18,7 @@ pub struct PassCoverage {
     pub constants: BTreeMap<&'static str, BTreeSet<i32>>,
     /// Pipelines of the check: each is a shader with the values of all its constants.
     pub pipelines: BTreeSet<(&'static str, Vec<(&'static str, i32)>)>,
-    /// Largest number of workgroups along x, y and z.
+    /// Largest number of workgroups of a dispatch along x, y and z.
     pub groups: [u32; 3],
     /// Classes of instructions that occur in its shaders.
     pub classes: BTreeSet<&'static str>,

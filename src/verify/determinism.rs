@@ -141,7 +141,7 @@ fn again(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     Ok(findings)
 }
 
-/// Checksums of the pictures of every mode, one line for each mode.
+/// Checksums of the pictures of every mode, one line for each mode: CRC-64 in hexadecimal, and the name of the mode.
 ///
 /// # Errors
 /// The device fails.

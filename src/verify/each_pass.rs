@@ -256,8 +256,8 @@ impl PassSummary {
     }
 }
 
-/// Kinds of inputs of single passes: noise, all zero, all one, a single bright texel, and noise beside empty texels. For distances noise is a smooth
-/// surface with cliffs and misses; for volumes it is blurred, so that it resembles tissue.
+/// Kinds of inputs of single passes: noise, all zero, all one, a single bright texel, and noise beside empty texels. For distances, mm, noise is a
+/// smooth surface with cliffs and misses, and an empty texel is a miss; for volumes noise is blurred, so that it resembles tissue.
 pub const KINDS: [&str; 5] = ["noise", "zero", "one", "hot", SPLIT];
 
 /// Noise to one side of a column, and nothing to the other, so that some invocations of a subgroup are done before the others: only then do its

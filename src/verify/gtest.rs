@@ -4,8 +4,8 @@
 use super::report::{CheckName, Outcome, Run, Verdict, failure};
 
 /// A pattern list in the syntax of `--gtest_filter`: `POSITIVE[-NEGATIVE]`, each a list of patterns separated by `:`. In a pattern `*` is
-/// any text and `?` any single character. A name is selected if it matches a positive pattern and no negative one. Without positive
-/// patterns it is selected if it matches no negative one.
+/// any text and `?` any single character. A name is selected if it matches a positive pattern and no negative one. If the list begins
+/// with `-`, it is selected if it matches no negative one. An empty list selects nothing.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Filter {
     positive: Vec<String>,
@@ -103,8 +103,8 @@ pub fn begins(check: &CheckName) -> String {
     format!("[ RUN      ] {}", full_name(check))
 }
 
-/// The lines that are printed after a check, with its faults if it did not pass. Brackets in a message become parentheses, because runners search
-/// every line for the verdict.
+/// The lines that are printed after a check: its faults if it failed, its notes if it has no result, and the verdict. Brackets in a message become
+/// parentheses, because runners search every line for the verdict.
 pub fn ends(outcome: &Outcome) -> String {
     let name = full_name(&outcome.check());
     let ms = milliseconds(outcome.seconds);

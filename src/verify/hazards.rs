@@ -35,7 +35,7 @@ pub fn checks(_: Level) -> Vec<Check> {
 /// shaders access, unless a setting says otherwise.
 ///
 /// # Errors
-/// As [`DeviceUnderTest::another`].
+/// The device cannot be opened again, or fails.
 pub(crate) fn validation_notices_a_dropped_barrier(dut: &DeviceUnderTest) -> Result<bool, GpuError> {
     // The last ones: they lie between passes over the picture.
     const TRIED: usize = 8;
@@ -122,7 +122,8 @@ fn volume_waited_for(
 }
 
 /// Renders `rounds` pictures on `queues` queues from two volume images in turn. During each, the next volume is sent into the volume image that
-/// `into` returns for the round, from 0. If the images alternate, the volumes do not mix; sent into the image that is being rendered, they would.
+/// `into` returns for the number of the round, which is counted from 0. If the images alternate, the volumes do not mix; sent into the image that is
+/// being rendered, they would.
 /// Returns the numbers of pictures that were compared and that differ.
 ///
 /// # Errors

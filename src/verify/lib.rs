@@ -72,8 +72,8 @@ pub fn checks(level: Level) -> Vec<Check> {
     groups.into_iter().flat_map(|group| group(level)).collect()
 }
 
-/// Runs checks one after the other in this process, and calls `tell` with the outcome of each. Once `stop` returns a signal's name, the remaining
-/// checks get the verdict interrupted.
+/// Runs checks one after the other in this process, and calls `tell` with the outcome of each that was run. Once `stop` returns a signal's name, the
+/// remaining checks get the verdict interrupted.
 pub fn run(
     dut: &mut DeviceUnderTest,
     checks: &[Check],
@@ -87,8 +87,8 @@ pub fn run(
     dut.run_of(outcomes, begun)
 }
 
-/// Runs checks one after the other by `one`, which gets their indices in `names`, and calls `tell` with the outcome of each. Once `stop` returns a
-/// signal's name, the remaining checks get the verdict interrupted, so that there is one outcome for each name.
+/// Runs checks one after the other by `one`, which gets their indices in `names`, and calls `tell` with the outcome of each that was run. Once `stop`
+/// returns a signal's name, the remaining checks get the verdict interrupted, so that there is one outcome for each name.
 pub fn run_each(
     names: &[CheckName],
     stop: impl Fn() -> Option<&'static str>,
@@ -157,7 +157,8 @@ impl Findings {
         }
     }
 
-    /// Records a figure, and adds a fault with the text `what` if its value exceeds its limit. NaN exceeds any limit.
+    /// Records a figure, and adds a fault with the text `what` if its value exceeds its limit. NaN exceeds any limit; without a limit every value
+    /// passes.
     pub fn error(&mut self, figure: Figure, what: impl FnOnce() -> String) {
         let within = figure.allowed.is_none_or(|allowed| figure.value <= allowed);
         self.expect(within, what);
@@ -184,7 +185,8 @@ impl Check {
         Check { group, name: name.into(), work: Box::new(work) }
     }
 
-    /// Runs the check. A check that fails is run again as described at `Outcome::explained`. An error of the device is a fault. After the loss of the
+    /// Runs the check. A check that fails is run up to three times more, and passes, marked as flaky, once it passes. If it never does, it is run
+    /// once while the host waits for each submission, and a note says if it passes then. An error of the device is a fault. After the loss of the
     /// device the next check gets a new context.
     pub fn run(&self, dut: &mut DeviceUnderTest) -> Outcome {
         let first = self.run_once(dut);
@@ -280,7 +282,8 @@ pub struct DeviceUnderTest {
     scenes: Rc<Vec<(String, Scene)>>,
     /// Called on every new context.
     prepare: Option<fn(&Context)>,
-    /// The `echolume` program, which checks start as a child process. None if this process is another program.
+    /// The `echolume` program, which checks start as a child process: at first the executable of this process. Another program has to set None, and
+    /// such checks are then skipped.
     pub program: Option<PathBuf>,
     modes: Option<Rc<Vec<Drawn>>>,
     /// Fault injected into every new context.
@@ -294,18 +297,18 @@ pub struct DeviceUnderTest {
 }
 
 impl DeviceUnderTest {
-    /// Opens the device.
+    /// Opens the device, and makes the built-in scenes.
     ///
     /// # Errors
-    /// There is no device, or no validation layer although it is requested.
+    /// There is no device, it cannot be opened, or there is no validation layer although it is requested.
     pub fn new(options: &ContextOptions, level: Level) -> Result<DeviceUnderTest, GpuError> {
         DeviceUnderTest::prepared(options, level, None)
     }
 
-    /// As [`DeviceUnderTest::new`], but calls `prepare` on every context before anything is made from it.
+    /// Opens the device, and makes the built-in scenes. `prepare` is called on this context and on every later one before anything is made from it.
     ///
     /// # Errors
-    /// As [`DeviceUnderTest::new`].
+    /// There is no device, it cannot be opened, or there is no validation layer although it is requested.
     pub fn prepared(
         options: &ContextOptions,
         level: Level,
@@ -336,7 +339,7 @@ impl DeviceUnderTest {
     /// Opens the same device again, with the same scenes and with an injected fault.
     ///
     /// # Errors
-    /// As [`DeviceUnderTest::new`].
+    /// The device cannot be opened again.
     pub fn with_fault(&self, change: Change) -> Result<DeviceUnderTest, GpuError> {
         let mut dut = DeviceUnderTest {
             context: self.context.clone(),
@@ -376,10 +379,10 @@ impl DeviceUnderTest {
         &mut self.pass_runner
     }
 
-    /// Opens another context on the same device, because the present one was lost or will be.
+    /// Opens another context on the same device with the same options and injected fault, because the present one was lost or will be.
     ///
     /// # Errors
-    /// As [`DeviceUnderTest::new`].
+    /// The device cannot be opened again.
     pub fn another(&self) -> Result<Arc<Context>, GpuError> {
         self.another_with(self.options.clone())
     }
@@ -409,7 +412,7 @@ impl DeviceUnderTest {
     /// report states that it was active. Without validation the result is false.
     ///
     /// # Errors
-    /// As [`DeviceUnderTest::another`].
+    /// The device cannot be opened again, or fails.
     pub fn prove_validation(&mut self) -> Result<bool, GpuError> {
         let notices = hazards::validation_notices_a_dropped_barrier(self)?;
         self.validation_is_blind = !notices;
@@ -451,7 +454,7 @@ impl IsolatedContext {
     /// Opens a context for a check that uses one queue.
     ///
     /// # Errors
-    /// As [`DeviceUnderTest::another`].
+    /// The device cannot be opened again.
     pub fn new(dut: &DeviceUnderTest) -> Result<IsolatedContext, GpuError> {
         IsolatedContext::of_queues(dut, 1)
     }
@@ -459,7 +462,7 @@ impl IsolatedContext {
     /// Opens a context for a check with `queues` queues; on a device with fewer, one queue acts as several.
     ///
     /// # Errors
-    /// As [`DeviceUnderTest::another`].
+    /// The device cannot be opened again.
     pub(crate) fn of_queues(dut: &DeviceUnderTest, queues: usize) -> Result<IsolatedContext, GpuError> {
         let context = dut.another()?;
         Ok(IsolatedContext { hears_submissions: context.queue_count() >= queues, context })
@@ -468,7 +471,7 @@ impl IsolatedContext {
     /// Opens a context for a check whose renderers change often, or are made again after slots were read back.
     ///
     /// # Errors
-    /// As [`DeviceUnderTest::another`].
+    /// The device cannot be opened again.
     pub(crate) fn of_changes(dut: &DeviceUnderTest) -> Result<IsolatedContext, GpuError> {
         Ok(IsolatedContext { hears_submissions: false, context: dut.another()? })
     }
@@ -476,7 +479,7 @@ impl IsolatedContext {
     /// Opens a context of a device that lacks features: `change` edits the known capabilities before anything is made from the context.
     ///
     /// # Errors
-    /// As [`DeviceUnderTest::another`].
+    /// The device cannot be opened again.
     pub(crate) fn lacking(
         dut: &DeviceUnderTest,
         change: impl FnOnce(&mut Context),

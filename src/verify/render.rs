@@ -9,7 +9,8 @@ use crate::reference;
 use crate::scene::Scene;
 use std::sync::Arc;
 
-/// Makes a renderer and sends it a volume. `frames`: one array for each slice in geometric order, with the values that a shader reads (0..1).
+/// Makes a renderer and sends it a volume, which the next picture shows. `frames`: one array for each slice in geometric order, with the values that
+/// a shader reads (0..1).
 ///
 /// # Errors
 /// The device fails.
@@ -39,7 +40,7 @@ pub fn send(renderer: &mut Renderer, frames: &[Texels], image: u32) -> Result<()
     renderer.show(image)
 }
 
-/// Renders one picture with a new renderer.
+/// Renders one picture with a new renderer. `frames`: one array for each slice in geometric order, with the values that a shader reads (0..1).
 ///
 /// # Errors
 /// The device fails.

@@ -33,7 +33,7 @@ pub fn checks(level: Level) -> Vec<Check> {
     vec![check(SECONDS[usize::from(level == Level::Full)])]
 }
 
-/// The check that runs a stress test of `seconds` s.
+/// The check that runs a stress test of `seconds` s. It runs longer until at least four pictures have been compared.
 pub fn check(seconds: f64) -> Check {
     Check::new("stress", "everything at once", move |dut: &mut DeviceUnderTest| stress(dut, seconds, &|_, _| Ok(())))
 }
@@ -86,7 +86,8 @@ struct Stress<'a> {
     pipelines: usize,
 }
 
-/// Runs the stress test for `seconds` s. `before_picture` is called with the renderer and the volume image before each picture.
+/// Runs the stress test for `seconds` s, or longer until at least four pictures have been compared. Eight faults or a signal end it early.
+/// `before_picture` is called with the renderer and the index of the volume image before each picture.
 ///
 /// # Errors
 /// The device fails.

@@ -33,7 +33,7 @@ pub struct Field<'a> {
 }
 
 impl<'a> Field<'a> {
-    /// `range`: smallest and largest texel of the volume; `window`: the grey values that become 0 and 1.
+    /// `range`: smallest and largest texel of the volume; `window`: the texel values that become 0 and 1.
     pub fn new(line: &'a Line<'a>, volume: &'a Texels, window: [f64; 2], range: [f64; 2]) -> Field<'a> {
         Field { line, volume, window, range }
     }

@@ -24,22 +24,22 @@ use rayon::prelude::*;
 pub struct Effort {
     /// The width (upper less lower bound, 0..1) of the widest channel that is narrow enough.
     pub width: f64,
-    /// Largest number of parts that a ray is divided into.
+    /// Number of parts from which on a ray is not divided further. Its first division, at the faces of cells, may have more.
     pub parts: usize,
 }
 
 /// Proven bounds of the light of every ray of a picture.
 #[derive(Clone, Debug)]
 pub struct PictureBounds {
-    /// Lower bounds of red, green, blue and opacity before stage 4; `high` has the upper bounds.
+    /// Lower bounds of red, green, blue and opacity before stage 4, a texel for each ray; `high` has the upper bounds.
     pub low: Texels,
     pub high: Texels,
-    /// Number of parts into which all rays were divided.
+    /// Number of parts of all rays together, without those that are surely transparent.
     pub parts: u64,
 }
 
 impl PictureBounds {
-    /// For each ray the width, upper less lower bound, of its widest channel.
+    /// For each ray, row by row, the width, upper less lower bound, of its widest channel.
     pub fn widths(&self) -> Vec<f64> {
         let pairs = self.low.values.chunks_exact(4).zip(self.high.values.chunks_exact(4));
         pairs.map(|(low, high)| (0..4).map(|c| high[c] - low[c]).fold(0.0, f64::max)).collect()
@@ -47,7 +47,7 @@ impl PictureBounds {
 }
 
 impl PictureBounds {
-    /// As [`PictureBounds::widths`], only for the rays whose opacity may be above 0; the others have no width.
+    /// The width, upper less lower bound, of the widest channel of each ray whose opacity may be above 0, row by row. Other rays have no entry.
     pub fn widths_of_hits(&self) -> Vec<f64> {
         let hits = self.high.values.chunks_exact(4).map(|high| high[3] > 0.0);
         self.widths().into_iter().zip(hits).filter(|(_, hit)| *hit).map(|(width, _)| width).collect()
@@ -110,13 +110,14 @@ pub fn fault(scene: &Scene) -> Option<&'static str> {
     }
 }
 
-/// The bounds of all rays of a scene. `volume`: the texels that stage 1 makes.
+/// The bounds of all rays of a scene for which [`fault`] returns None. `volume`: the texels that stage 1 makes.
 pub fn picture(scene: &Scene, volume: &Texels, effort: Effort) -> PictureBounds {
     enclosed(scene, volume, effort, |_, _| false)
 }
 
-/// Bounds that are as narrow as needed to prove for each pixel of the picture `drawn` (red, green, blue and opacity before stage 4) that its error is
-/// within `tolerance`, levels of 255 after toning, or that it is not.
+/// Bounds that are as narrow as needed, or as `effort` allows, to prove for each pixel of the picture `drawn` (red, green, blue and opacity before
+/// stage 4) that its error is within `tolerance`, levels of 255 after toning, or that it is not. Returns the bounds and a proof for each pixel, row
+/// by row. [`fault`] must return None for the scene.
 ///
 /// # Errors
 /// One line: the toning of the scene does not keep the order of values, or the picture has another size.

@@ -20,7 +20,7 @@ pub struct Medium {
 }
 
 impl Medium {
-    /// `points` are those of [`transfer::resolved`]. Samples below `threshold` are transparent.
+    /// `points`: the control points of the transfer function by ascending sample value ([`transfer::of`]). Samples below `threshold` are transparent.
     pub fn new(points: Vec<TransferPoint>, threshold: f64, absorption: Absorption) -> Medium {
         Medium { points, threshold, absorption, tint: None, fade: None }
     }
@@ -136,7 +136,7 @@ struct Part {
 pub struct Bounds {
     /// Bounds of red, green, blue and opacity.
     pub rgba: [Interval; 4],
-    /// Number of parts into which the ray was divided.
+    /// Number of parts of the ray, without those that are surely transparent.
     pub parts: usize,
 }
 
@@ -147,9 +147,9 @@ impl Bounds {
     }
 }
 
-/// The bounds of a ray. Parts of the ray are halved until the widest channel is narrower than `target`, `enough` is true for the bounds, or there are
-/// `most` parts. `hints`: positions on the field's line in rising order, mm, at which parts end at first. The first and last are the ray's ends;
-/// the bounds hold for any others, such as the faces of cells.
+/// The bounds of a ray. Parts of the ray are halved until the widest channel is no wider than `target`, `enough` is true for the bounds, or there are
+/// `most` parts. `hints`: positions on the field's line in rising order, mm, at which parts end at first, even if these are more than `most`. The
+/// first and last are the ray's ends; the bounds hold for any others, such as the faces of cells.
 pub fn bounds(
     field: &Field,
     medium: &Medium,

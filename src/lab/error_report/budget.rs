@@ -16,8 +16,9 @@ pub const FLOOR: &str = "device";
 #[serde(deny_unknown_fields)]
 pub struct Budget {
     pub reference: Reference,
+    /// Estimate of the error of the reference itself; 0 if it was computed in f64.
     pub reference_error: OwnError,
-    /// Each source of error alone; the last entry is [`FLOOR`].
+    /// Each source of error alone, without those that have their finest setting in the scene. The last entry is [`FLOOR`].
     pub shares: Vec<Share>,
     /// Errors of the scene with its own setting of every source.
     pub total: Errors,
@@ -27,9 +28,9 @@ pub struct Budget {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Share {
-    /// The name of the dial that is the source.
+    /// The name of the dial that is the source, or [`FLOOR`].
     pub source: String,
-    /// Label of the scene's own setting of that dial.
+    /// Label of the scene's own setting of that dial; a remark for [`FLOOR`].
     pub label: String,
     pub errors: Errors,
 }
@@ -66,8 +67,8 @@ pub fn sources(scene: &Scene) -> Vec<Source> {
     numerical.map(source).filter(|source| !source.finest.is_empty()).collect()
 }
 
-/// True for an assignment of a key that the dial's settings assign. The references of some dials have finer steps as well, and settings of some name what
-/// they need unchanged.
+/// True for an assignment of a key that the dial's settings assign. The references of some dials have finer steps as well, and settings of some name
+/// what they need unchanged.
 fn is_own(dial: &Dial, set: &str) -> bool {
     let key = |set: &str| set.split_once('=').map_or(String::new(), |(key, _)| key.to_string());
     let is_assigned = dial.settings.iter().flat_map(|setting| &setting.set).any(|other| key(other) == key(set));

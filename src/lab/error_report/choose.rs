@@ -18,9 +18,9 @@ pub const TIME_MARGIN: f64 = 0.25;
 /// What a chosen combination has to keep.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Bound {
-    /// A largest error, in the unit of the measure.
+    /// A largest error, in the unit of the measure. The estimated error of the reference counts in addition.
     Error(f64),
-    /// A longest time for a volume and its picture, ns.
+    /// A longest time for a volume and its picture, ns. The 95th percentile, increased by the share [`TIME_MARGIN`], must be within it.
     Time(f64),
 }
 
@@ -71,7 +71,7 @@ pub fn choose(report: &Report, measure: Measure, bound: Bound, refused: &[usize]
 
 /// The combinations that may be the fastest with an error by `measure` of at most `error`, as indices of [`Report::choices`]: those that keep it and
 /// whose confidence interval of the time overlaps that of the fastest. The fastest is first; there are at most [`MAX_CONTENDERS`]. More runs have to
-/// decide between them.
+/// decide between them. `refused`: indices of combinations that must not be chosen.
 pub fn contenders(report: &Report, measure: Measure, error: f64, refused: &[usize]) -> Vec<usize> {
     let mut kept: Vec<Candidate> =
         candidates(report, measure).filter(|c| c.error <= error && !refused.contains(&c.index)).collect();
@@ -80,7 +80,8 @@ pub fn contenders(report: &Report, measure: Measure, error: f64, refused: &[usiz
     kept.into_iter().filter(|c| c.times[0] <= reach).map(|c| c.index).take(MAX_CONTENDERS).collect()
 }
 
-/// The Pareto front of the measured combinations, from the fastest to the most accurate, as indices of [`Report::choices`].
+/// The Pareto front of the measured combinations by median time and error, from the fastest to the most accurate, as indices of [`Report::choices`].
+/// A combination is left out if the share of its rays that find another surface or none is above 0.1 % and above that of the scene's own settings.
 pub fn front(report: &Report, measure: Measure) -> Vec<usize> {
     let all: Vec<Candidate> = candidates(report, measure).collect();
     let pairs: Vec<[f64; 2]> = all.iter().map(|c| [c.times[1], c.error]).collect();

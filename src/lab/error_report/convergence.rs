@@ -273,13 +273,13 @@ fn rms(differences: impl Iterator<Item = f64>) -> f64 {
     f64::sqrt(sum / n)
 }
 
-/// `count` step lengths from `low` to `high` voxels, logarithmically spaced.
+/// `count` step lengths from `low` to `high` voxels, both included, logarithmically spaced. `count` must be at least 2.
 pub fn steps(low: f64, high: f64, count: usize) -> Vec<f64> {
     (0..count).map(|i| low * (high / low).powf(i as f64 / (count - 1) as f64)).collect()
 }
 
-/// The RMSE of the light of `count` rays for each step length. Returns pairs of step and error, and the error of the exact solution (its difference
-/// from the solution at twice the step).
+/// The RMSE of the light (red, green, blue, about 0..1) of `count` rays for each of `steps`, voxels. Returns pairs of step and error, and the error
+/// of the exact solution: the RMS difference from one that is integrated in steps of twice the length.
 pub fn errors(rule: Rule, field: Field, flaw: Flaw, steps: &[f64], count: usize) -> (Vec<[f64; 2]>, f64) {
     const FINE: f64 = 1.0 / 32.0;
     let rays = rays(count);

@@ -14,7 +14,7 @@ pub struct DialSetting {
     pub label: String,
     /// Assignments `key=value` as for `--set`; empty for the scene's own setting.
     pub set: Vec<String>,
-    /// Value on the dial's axis, in the dial's unit.
+    /// Value on the dial's axis, in the dial's unit. For names it is a number that only gives their order in a plot.
     pub value: f64,
 }
 

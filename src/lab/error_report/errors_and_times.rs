@@ -43,18 +43,20 @@ const MAX_EXACT_SEGMENTS: f64 = 5e7;
 /// How many times more accurate than a point its reference must be, if the point takes part in the fit of an order.
 const BETTER: f64 = 10.0;
 
-/// Largest number of combinations of several dials that are measured.
+/// Largest number of combinations of several dials that are measured, the scene with its own settings included.
 pub const MAX_COMBINATIONS: usize = 24;
 
 /// Which reference errors are measured against.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ReferenceChoice {
-    /// For dials of rays exact rays if they exist, for others f64, each if it takes about a minute or less; otherwise a converged picture of the
-    /// device.
+    /// Exact rays for dials of ways to take samples along rays, if they exist for the scene; otherwise f64, but not for a scene with a light volume.
+    /// Each only if it takes about a minute or less; otherwise a converged picture of the device.
     Auto,
-    /// Exact rays for every dial; an error if they do not exist.
+    /// Exact rays for every dial but looks; an error if they do not exist for the scene.
     Exact,
+    /// The picture of the reference renderer, in f64 on the CPU, however long it takes.
     F64,
+    /// A picture of the device itself, as accurate as the settings allow.
     Converged,
 }
 
@@ -69,6 +71,7 @@ pub struct ErrorMeasurement<'a> {
     pub frames: &'a [Frame],
     /// Description of the input, for the report.
     pub input: &'a str,
+    /// Number of timed runs of each setting.
     pub repeats: u32,
     pub reference: ReferenceChoice,
 }
@@ -82,7 +85,7 @@ enum Kind {
     Converged,
 }
 
-/// The picture of a scene with the finest setting of every numerical dial, against which combinations are measured.
+/// The picture of a scene with the finest setting of every source of error ([`budget::sources`]), against which combinations are measured.
 pub struct Finest {
     rendering: Rendering,
     reference: Reference,
@@ -101,11 +104,12 @@ pub struct Verified {
 }
 
 impl ErrorMeasurement<'_> {
-    /// Measures the dials one after the other, then combinations of them. `progress` is called before each setting is rendered, with the names of the
-    /// dial and the setting. With a bound, more of the combinations are near it.
+    /// Measures the dials one after the other, then combinations of them, then the error budget. `progress` is called before each step, with the name
+    /// of the dial and that of the setting (or "its reference"), then with "combination" and its number, and with "error budget" and an empty text.
+    /// With a bound, more of the combinations are near it.
     ///
     /// # Errors
-    /// A setting is refused, or the device fails.
+    /// A setting is refused, a reference shows nothing or cannot be computed by exact rays as asked for, or the device fails.
     pub fn report(
         &self,
         dials: &[Dial],
@@ -143,11 +147,11 @@ impl ErrorMeasurement<'_> {
         })
     }
 
-    /// Renders the picture against which combinations are measured. It has the finest setting of every numerical dial of the scene, also of dials
+    /// Renders the picture against which combinations are measured. It has the finest setting of every source of error of the scene, also of dials
     /// that are not measured.
     ///
     /// # Errors
-    /// As [`ErrorMeasurement::report`].
+    /// A setting is refused, exact rays were asked for and do not exist for the scene, or the device fails.
     pub fn finest(&self) -> Result<Finest, MeasureError> {
         let sources = budget::sources(self.scene);
         let all = |of: fn(&budget::Source) -> &[String]| sources.iter().flat_map(of).cloned().collect::<Vec<String>>();
@@ -170,8 +174,8 @@ impl ErrorMeasurement<'_> {
         Ok(Finest { rendering, reference, error })
     }
 
-    /// The picture that settings converge to, and its own error: the finest one by its difference from the next, or, of a scene that a light volume lights,
-    /// what three lattices of it converge to.
+    /// The picture that settings converge to, and its own error: the finest one by its difference from the next, or, of a scene that a light volume
+    /// lights, what three lattices of it converge to.
     fn converged(
         &self,
         dial: &'static str,
@@ -265,10 +269,11 @@ impl ErrorMeasurement<'_> {
     }
 
     /// Chooses a combination of the report, and measures it again `runs` times. A combination that does not keep the bound then is discarded, and the
-    /// next best is tried. A time bound is kept if the 95th percentile, increased by [`choose::TIME_MARGIN`], is within it.
+    /// next best is tried. A time bound is kept if the 95th percentile, increased by the share [`choose::TIME_MARGIN`], is within it. With an error
+    /// bound, combinations that may be the fastest are first run alternately, `runs` times each.
     ///
     /// # Errors
-    /// As [`choose::choose`], or the device fails.
+    /// The report has no times, no combination keeps the bound, or the device fails.
     pub fn choose(
         &self,
         finest: &Finest,

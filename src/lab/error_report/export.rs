@@ -5,8 +5,8 @@ use super::{Errors, Measure, Reference, Report, Time, Times, choose};
 use crate::text::csv_field;
 use std::fmt::Write as _;
 
-/// The report as CSV (RFC 4180): a header, then one line for each point. Fields that do not apply are empty. Times are in ms. `on_front` is
-/// true if no other point of the report has both a smaller RMSE and a shorter time.
+/// The report as CSV (RFC 4180): a header, then one line for each point. Fields that do not apply are empty. Times are in ms. `on_front` is true for
+/// the points of the Pareto front of RMSE and time over all dials but looks.
 pub fn csv(report: &Report) -> String {
     let front = report.pareto_front(Measure::Rmse);
     let mut text = String::from(

@@ -69,10 +69,11 @@ pub struct SurfaceError {
     pub jumps: f64,
 }
 
-/// Compares two toned pictures with values in 0..1. `left_out`: pixels for which it is true do not count.
+/// Compares two toned pictures with values in 0..1 by their first three channels. `left_out`: for each pixel, row by row, true if it does not count;
+/// if no pixel counts, all differences are 0.
 ///
 /// # Errors
-/// As [`pictures`].
+/// One line: sizes or channels differ, there is no pixel, or a value is not finite.
 pub fn levels(measured: &Texels, reference: &Texels, left_out: &[bool]) -> Result<Levels, String> {
     check("picture", measured, reference)?;
     let channels = measured.channels;
@@ -89,7 +90,7 @@ pub fn levels(measured: &Texels, reference: &Texels, left_out: &[bool]) -> Resul
 
 /// For each pixel of a picture of `size`, true if the rays of both distance maps differ there: a hit that is lost or gained, or surfaces whose
 /// distances differ by more than `cliff` mm. Neighbours of such pixels are true as well, because their normals and edges change. The maps may have
-/// other sizes than the picture; the ray through the centre of a pixel decides.
+/// other sizes than the picture; the ray through the centre of a pixel decides. Pixels are row by row.
 pub fn changed_rays(measured: &Texels, reference: &Texels, cliff: f64, size: [usize; 3]) -> Vec<bool> {
     let at = |map: &Texels, x: usize, y: usize| {
         let along = |n: usize, axis: usize| {
@@ -134,10 +135,10 @@ pub fn pictures(measured: &Texels, reference: &Texels) -> Result<PictureError, S
     Ok(PictureError { rmse, max, psnr, ssim: similarity(&grey(&a), &grey(&b), measured.size) })
 }
 
-/// Compares two distance maps, mm.
+/// Compares two distance maps, mm. Any difference of two hits counts as an error, none as a jump to another surface.
 ///
 /// # Errors
-/// As [`pictures`].
+/// One line: sizes or channels differ, there is no pixel, or a value is not finite.
 pub fn distances(measured: &Texels, reference: &Texels) -> Result<SurfaceError, String> {
     surfaces(measured, reference, f64::INFINITY)
 }
@@ -145,7 +146,7 @@ pub fn distances(measured: &Texels, reference: &Texels) -> Result<SurfaceError, 
 /// Compares two distance maps, mm. Distances that differ by more than `cliff` mm count as jumps to another surface, not as errors.
 ///
 /// # Errors
-/// As [`pictures`].
+/// One line: sizes or channels differ, there is no pixel, or a value is not finite.
 pub fn surfaces(measured: &Texels, reference: &Texels, cliff: f64) -> Result<SurfaceError, String> {
     check("distance map", measured, reference)?;
     let first = |t: &Texels| t.values.iter().step_by(t.channels).map(|v| is_hit(*v).then_some(*v)).collect::<Vec<_>>();
@@ -157,7 +158,7 @@ pub fn surfaces(measured: &Texels, reference: &Texels, cliff: f64) -> Result<Sur
 /// zero vector is a miss.
 ///
 /// # Errors
-/// As [`pictures`].
+/// One line: there are fewer than 3 channels, sizes or channels differ, there is no pixel, or a value is not finite.
 pub fn normals(measured: &Texels, reference: &Texels) -> Result<SurfaceError, String> {
     if measured.channels < 3 {
         return Err(format!("a map of normals has 3 channels or more, not {}", measured.channels));
@@ -226,7 +227,8 @@ fn spread(mut errors: Vec<f64>) -> Option<ErrorStatistics> {
 }
 
 /// Mean structural similarity of two single-channel pictures with values in 0..1 (SSIM; Wang et al. 2004, equation 13), weighted by the Gaussian
-/// window and averaged over all windows within the picture. None if the picture is smaller than the window.
+/// window and averaged over all windows within the picture. Pixels are row by row; the first two numbers of the size are width and height. None if
+/// the picture is smaller than the window of 11 x 11 pixels.
 pub fn similarity(a: &[f64], b: &[f64], [width, height, _]: [usize; 3]) -> Option<f64> {
     if width < WINDOW || height < WINDOW {
         return None;

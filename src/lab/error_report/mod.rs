@@ -36,7 +36,7 @@ pub struct Report {
     /// Description of the input on the first line, then all settings as TOML, with defaults filled in.
     pub scene: String,
     pub sizes: Sizes,
-    /// Number of runs over which each time is a median.
+    /// Number of runs over which a time is a median; those of the scene's own setting of a dial are more.
     pub repeats: u32,
     pub dials: Vec<Dial>,
     /// Combinations of settings of one dial or of several, each rendered and compared with the scene's finest picture. The first is the scene with
@@ -56,7 +56,7 @@ pub struct Combination {
     pub set: Vec<String>,
     /// Errors against the reference: the scene's picture with the finest numerical settings.
     pub errors: Errors,
-    /// Error of that reference itself; 0 if it was computed in f64.
+    /// Estimate of the error of that reference itself; 0 if it was computed in f64.
     pub reference_error: OwnError,
     /// Times of the combination. None without time stamps.
     pub times: Option<Times>,
@@ -115,12 +115,14 @@ pub struct Dial {
     pub unit: String,
     pub reference: Reference,
     pub points: Vec<Point>,
-    /// The order with which the error depends on the value. None if no order could be fitted.
+    /// The fit of the error as a power of the point's value. None if no order could be fitted, and for other dials than `step`.
     pub order: Option<Fit>,
-    /// RMSE, 0..1, of the device against f64 with the same settings: what arithmetic and texel formats alone make. None if it was not measured.
+    /// RMSE, 0..1, of the device with the settings of the reference against the reference in f64 or of exact rays: what arithmetic and texel formats
+    /// alone make. None for other references, and for other dials than `step`.
     #[serde(default)]
     pub floor: Option<f64>,
-    /// For a dial of rays, why its reference is not exact rays. None if it is.
+    /// For a dial of ways to take samples along rays, why its reference is not exact rays. None if it is, if another reference was asked for, and for
+    /// other dials.
     #[serde(default)]
     pub note: Option<String>,
 }
@@ -177,7 +179,7 @@ pub struct Point {
     pub label: String,
     /// Assignments of the setting, each `key=value` as for `--set`.
     pub set: Vec<String>,
-    /// Value on the dial's axis, in the dial's unit. For names it is the index of the point.
+    /// Value on the dial's axis, in the dial's unit. For names it is a number that only gives their order in a plot.
     pub value: f64,
     pub errors: Errors,
     /// Times with this setting. None without time stamps.
@@ -189,22 +191,24 @@ pub struct Point {
 }
 
 /// Errors of a picture against a reference, and of the surface if it shows one. Pixels that hit a surface in only one of the two, or surfaces further
-/// apart than [`Scene::cliff`](crate::scene::Scene::cliff), are left out of the errors of the picture, and so are their neighbours. `mm` has the shares
-/// of such pixels, without the neighbours.
+/// apart than [`Scene::cliff`](crate::scene::Scene::cliff), are left out of the errors of the picture, and so are their neighbours. `mm` has the
+/// shares of such pixels, without the neighbours.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Errors {
     /// Root mean square difference of red, green and blue before toning, 0..1.
     pub rmse: f64,
+    /// Largest difference of any of these channels of any pixel, 0..1.
     pub max: f64,
     /// Peak signal-to-noise ratio, dB; None (infinite) for equal pictures.
     pub psnr: Option<f64>,
+    /// Structural similarity (SSIM), at most 1. None for a picture smaller than 11 x 11 pixels.
     pub ssim: Option<f64>,
     /// Differences of the pictures as displayed.
     pub levels: Levels,
-    /// Error of the distance map, mm. None without one.
+    /// Error of the distance map, mm. None without one, or if it differs in size from that of the reference.
     pub mm: Option<SurfaceError>,
-    /// Error of the normals, degrees. None without a distance map.
+    /// Error of the normals, degrees. None where `mm` is None.
     pub degrees: Option<SurfaceError>,
 }
 
@@ -246,9 +250,9 @@ impl Time {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Times {
-    /// Work for each frame and volume: upload and stage 1.
+    /// Work for each frame and volume: upload, stage 1, and the value ranges of bricks.
     pub volume: Time,
-    /// Work for each picture: stages 2 to 4, and the structures for empty-space skipping.
+    /// Work for each picture: which bricks rays may skip, stages 2 to 4, and the readback.
     pub picture: Time,
     /// `volume` and `picture` together.
     pub total: Time,

@@ -57,10 +57,10 @@ pub fn svg(report: &Report, figure: Figure, measure: Measure, size: [u32; 2]) ->
     canvas::svg(size, &Diagram { report, figure, measure })
 }
 
-/// The diagram as a picture. `size`: width and height, pixels.
+/// The diagram as a picture, time against the error by `measure`. `size`: width and height, pixels.
 ///
 /// # Errors
-/// As [`svg`].
+/// One line: no point has both a time and this error, or the size is not within 640x400..4096x4096.
 pub fn picture(report: &Report, figure: Figure, measure: Measure, size: [u32; 2]) -> Result<Picture, String> {
     check(size)?;
     canvas::picture(size, &Diagram { report, figure, measure })

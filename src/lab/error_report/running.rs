@@ -54,7 +54,7 @@ impl<'a> Running<'a> {
     /// Makes the renderer, and runs it once, so that its shaders are compiled.
     ///
     /// # Errors
-    /// As [`Running::run`].
+    /// The device cannot hold the scene, or fails, or the time of a part is missing.
     pub fn new(context: &Arc<Context>, frames: &'a [Frame], scene: &Scene) -> Result<Running<'a>, GpuError> {
         // A stamp at every pass: only so are the times of the volume and of the picture told apart.
         let options = RendererOptions { time_stamps: TimeStamps::EachPass, ..RendererOptions::default() };
@@ -129,7 +129,7 @@ impl Runs {
     /// Runs both scenes alternately, `count` times. The default goes first in every other pair, so that what slows the machine down slows both.
     ///
     /// # Errors
-    /// As [`Running::run`].
+    /// The device fails, or it has time stamps and the time of a part is missing.
     pub fn in_turn(own: &mut Running, default: &mut Running, count: u32) -> Result<Runs, GpuError> {
         let mut all = Runs::default();
         for n in 0..count {

@@ -45,7 +45,7 @@ pub enum MeasureError {
 /// each candidate.
 ///
 /// # Errors
-/// The device fails.
+/// `options.pixels` is too small for the measured areas, or the device fails.
 pub fn phantom(
     context: &Arc<Context>,
     options: MeasureOptions<'_>,
@@ -68,7 +68,8 @@ pub fn phantom(
 /// Measures all candidates on the middle frame of a recording's first volume. `after_each` is called after each candidate.
 ///
 /// # Errors
-/// An area is empty or outside the sector; the recording cannot be read; the device fails.
+/// An area is less than 4 pixels wide or high, `crop` reaches beyond the sector, another area beyond `crop`; the recording cannot be read; the device
+/// fails.
 pub fn recording(
     context: &Arc<Context>,
     source: &mut dyn Source,

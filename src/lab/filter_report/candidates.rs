@@ -3,7 +3,7 @@
 /// A filter of slices with settings, one of those that are compared.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Candidate {
-    /// Name of the filter.
+    /// Name of the filter; `none` for no filter.
     pub filter: &'static str,
     /// What varies among candidates of the filter: window and strength.
     pub label: String,
@@ -32,7 +32,8 @@ const AOS_STEPS: u32 = 4;
 /// Standard deviations of the Gaussian, pixels.
 const DEVIATIONS: [f64; 6] = [0.7, 1.0, 2.0, 3.0, 4.0, 6.0];
 
-/// "No filter", and the candidates whose filter's name contains `only`. Candidates of one filter are consecutive. `pitch`: size of a slice pixel, mm.
+/// "No filter", and the candidates whose filter's name contains `only` (all if `only` is empty). Candidates of one filter are consecutive. `pitch`:
+/// lateral and depth size of a slice pixel, mm.
 pub fn candidates(pitch: [f64; 2], only: &str) -> Vec<Candidate> {
     let mut all = candidates_of_all(pitch);
     all.retain(|candidate| candidate.set.is_empty() || candidate.filter.contains(only));

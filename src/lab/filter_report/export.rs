@@ -86,7 +86,7 @@ fn table(subject: &Subject, rows: &[&Row]) -> String {
     markdown_table(&lines)
 }
 
-/// The report as CSV, one line for each frame and candidate. A measure that is not known is an empty field.
+/// The report as CSV: a header, and one line for each frame and candidate. A measure that is not known is an empty field.
 pub fn csv(report: &Report) -> String {
     let mut text = String::from("recording,frame,filter,setting");
     FIGURES.iter().for_each(|f| text.push_str(&format!(",{}", f.name.to_lowercase())));

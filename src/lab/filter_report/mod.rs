@@ -24,7 +24,7 @@ pub struct Area {
 pub struct Areas {
     /// Where all measures except SNR and CNR are taken; the contact sheet shows it. It must lie inside the sector.
     pub crop: Area,
-    /// Tissue of one kind, for SNR, and for CNR against `background`.
+    /// Tissue of one kind, for SNR, and for CNR against `background`. Both must lie within `crop`.
     pub region: Area,
     pub background: Area,
 }
@@ -34,7 +34,7 @@ pub struct Areas {
 pub struct Row {
     pub candidate: candidates::Candidate,
     pub quality: Quality,
-    /// GPU time of the filter's passes for one slice, ms. None without a filter and without time stamps.
+    /// GPU time of the filter's passes for one slice, ms. None without a filter or without time stamps.
     pub time: Option<Spread>,
     /// The filtered slice within `Areas::crop`, row by row, 0..1.
     pub pixels: Vec<f64>,

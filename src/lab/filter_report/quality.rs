@@ -21,12 +21,12 @@ pub struct Quality {
     pub edges: Option<f64>,
     /// Root mean square difference from the clean slice, 0..1. None if that is not known.
     pub rmse: Option<f64>,
-    /// Structural similarity (SSIM) to the clean slice, at most 1. None if that is not known, or too small for the window.
+    /// Structural similarity (SSIM) to the clean slice, at most 1. None if that is not known, or smaller than 11 x 11 pixels.
     pub ssim: Option<f64>,
 }
 
-/// Measures a slice of `size` pixels with values in 0..1. `clean`: the same slice without speckle, if known; `levels`: the regions of tissue and of
-/// background, for SNR and CNR.
+/// Measures a slice of `size` (columns, rows) pixels, row by row, with values in 0..1. `clean`: the same slice without speckle, if known; `levels`:
+/// the regions of tissue and of background, in this order, for SNR and CNR.
 pub fn quality(pixels: &[f64], clean: Option<&[f64]>, size: [usize; 2], levels: [&Region; 2]) -> Quality {
     let [tissue, behind]: [Level; 2] = levels.map(|region| region.level(pixels, size[0] as u32));
     let mean_square = |clean: &[f64]| {

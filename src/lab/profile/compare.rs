@@ -33,7 +33,7 @@ use toml::{Table, Value};
 /// What counts as a difference in a comparison of profiles.
 #[derive(Clone, Copy, Debug)]
 pub struct CompareOptions {
-    /// Largest allowed ratio of the new median to the old one: a pass that is slower by more is a regression.
+    /// Largest allowed ratio of new times to old ones ([`Ratio::estimate`]): a pass that is slower by more is a regression.
     pub threshold: Threshold,
     /// Probability, 0..1, of at least one false alarm in the whole report.
     pub alpha: f64,
@@ -81,11 +81,11 @@ pub enum Verdict {
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
     Pass,
-    /// A span of the host. It is reported, but is never a regression: such spans are short and part of the wall time.
+    /// A span of the host, or the wall time where CPU times are compared. It is reported, but is never a regression.
     Host,
-    /// Wall time from submission until the device is idle.
+    /// Wall time of a repeat, from its first frame to its picture in host memory.
     Wall,
-    /// CPU time of all threads from submission until the device is idle.
+    /// CPU time of all threads of the process, from the first frame of a repeat to its picture in host memory.
     Cpu,
 }
 
@@ -122,11 +122,11 @@ pub struct Line {
     pub note: Option<String>,
     /// True if the line is slower by more than the threshold.
     pub is_regression: bool,
-    /// The smallest slowdown, as a ratio, that would have been detected with this noise. None if no slowdown would.
+    /// The smallest slowdown, as a ratio, that would have been detected with this noise. None if none would, or there was nothing to compare.
     pub limit: Option<f64>,
     /// True if a slowdown by more than the threshold may have been overlooked.
     pub is_unseen: bool,
-    /// True if a slowdown may be overlooked because the pass takes little time (`CompareOptions::minor`).
+    /// True for a pass whose share of the time is below [`CompareOptions::minor`], so that `is_unseen` does not fail the comparison.
     pub is_minor: bool,
 }
 
@@ -134,11 +134,13 @@ pub struct Line {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Comparison {
     pub format: &'static str,
-    /// Which times are compared, for the reader.
+    /// Which times are compared, in words.
     pub time: &'static str,
-    /// The statistical test that was used, for the reader.
+    /// The statistical test that was used, in words.
     pub test: String,
+    /// Largest allowed ratio of new times to old ones.
     pub threshold: f64,
+    /// Differing settings and conditions, and what else to know about the comparison, one line each.
     pub notes: Vec<String>,
     pub lines: Vec<Line>,
 }
@@ -149,8 +151,8 @@ impl Comparison {
         self.lines.iter().filter(|l| l.is_regression)
     }
 
-    /// Why a slowdown by more than the threshold cannot be excluded, in one line: the smallest slowdown that would have been detected, and the lines
-    /// in which even a larger one would not. None if every such slowdown would have been detected.
+    /// Why a slowdown by more than the threshold cannot be excluded, in one line: up to which size one may have been overlooked, and up to four of
+    /// the lines that may hide one, each with its limit. Lines with `is_minor` do not count. None if every such slowdown would have been detected.
     pub fn cannot_tell(&self) -> Option<String> {
         let (worst, named) = hidden(self.lines.iter().filter(|line| line.is_unseen && !line.is_minor))?;
         Some(format!("cannot tell {worst}: {named}"))
@@ -202,15 +204,16 @@ pub fn compare(old: &Profile, new: &Profile, options: &CompareOptions) -> Result
 /// Compares two profiles that were measured alternately in blocks: the n-th repeats of the n-th blocks of both were next to each other in time.
 ///
 /// # Errors
-/// As of [`compare`], or blocks of one profile are of different work.
+/// An option is out of range, a profile has no blocks or is inconsistent, its blocks are of different work, the profiles have different numbers of
+/// blocks, or they are of different work and `force` is not set.
 pub fn in_turn(old: &[Profile], new: &[Profile], options: &CompareOptions) -> Result<Comparison, CompareError> {
     let [old, new] = [("old", old), ("new", new)]
         .map(|(which, blocks)| blocks_as_repeats(blocks, old).map_err(|fault| CompareError::Profile { which, fault }));
     compare_repeats(&old?, &new?, options, Repeats::InTurn)
 }
 
-/// The number of blocks of each profile that [`in_turn`] needs to detect differences of `passes` passes, plus two blocks that may disagree. It is
-/// even, so that each profile goes first equally often.
+/// The number of blocks of each profile that [`in_turn`] needs to detect differences of `passes` passes, plus two blocks that may disagree; 10 to
+/// 100. It is even, so that each profile goes first equally often. `alpha`: probability of a false alarm in the whole report.
 pub fn blocks_in_turn(passes: usize, alpha: f64) -> usize {
     let lines = passes as f64 + 1.0;
     (10..100).step_by(2).find(|n| min_signed_p(n - 2) * lines <= alpha).unwrap_or(100)
@@ -318,7 +321,7 @@ fn counts_cpu(profile: &Profile) -> bool {
     profile.device.is_software && !profile.cpu_ns.is_empty() && profile.passes.iter().all(has)
 }
 
-/// The times of one line in one profile, one for each repeat.
+/// The times of one line in one profile, ns, one for each repeat; `runs` is the number of dispatches in a repeat.
 #[derive(Clone, Copy)]
 pub struct Series<'a> {
     pub stage: &'a str,
@@ -428,7 +431,8 @@ const MIN_BLOCKS: usize = 6;
 /// Minimum number of passes in which a common shift is looked for.
 const MIN_COMMON: usize = 3;
 
-/// The smallest number of blocks per profile with which the test can report any difference among `lines` lines.
+/// The smallest number of blocks per profile, 6 to 100, with which the Mann-Whitney test can report any difference among `lines` lines. `alpha`:
+/// probability of a false alarm in the whole report.
 pub fn blocks_needed(lines: usize, alpha: f64) -> usize {
     (MIN_BLOCKS..100).find(|b| min_p(*b) * lines as f64 <= alpha).unwrap_or(100)
 }
@@ -523,7 +527,7 @@ fn typical_range(passes: &[&BlockTest]) -> f64 {
 /// Compares all pairs, and returns a line for each. `tick`: resolution of the device's clock, ns.
 ///
 /// # Errors
-/// Times that are no sample.
+/// A time is not finite.
 pub fn judge(pairs: Vec<Pair>, method: Method, tick: f64, options: &CompareOptions) -> Result<Vec<Line>, SampleError> {
     let both = pairs.iter().filter(|pair| pair.old.is_some() && pair.new.is_some()).count();
     let alpha = options.alpha / both.max(1) as f64;

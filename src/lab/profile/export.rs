@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use std::fmt::Write as _;
 
 /// A profile as CSV: a line for each pass, then the host spans, `device` (from the begin of the first pass to the end of the last), `wall`, and `cpu`
-/// (of the process, if the system reports it). Without time stamps the time columns of passes are empty.
+/// (CPU time of the process, if the system reports it). Where a line has no times, such as `device` without time stamps, its time columns are empty.
 pub fn csv(profile: &Profile) -> String {
     let mut text = String::from(
         "kind,stage,name,runs_per_picture,repeats,min_ns,p5_ns,median_ns,p95_ns,max_ns,mad_ns,ci_low_ns,ci_high_ns,\
@@ -45,7 +45,8 @@ pub fn csv(profile: &Profile) -> String {
     text
 }
 
-/// All times of a profile, ns, as CSV: a line for each repeat of every pass, host span, and of `device`, `wall` and `cpu` as in [`csv`].
+/// All times of a profile, ns, as CSV: a line for each repeat of every pass, host span, and of `device` (from the begin of the first pass to the end
+/// of the last), `wall`, and `cpu` (CPU time of the process, if the system reports it).
 pub fn csv_samples(profile: &Profile) -> String {
     let mut text = String::from("kind,stage,name,repeat,ns\n");
     let lists = [("pass", &profile.passes), ("host", &profile.host)];
@@ -386,7 +387,7 @@ const MAX_NS: f64 = 9_007_199_254_740_992.0;
 /// no viewer drops them. Without calibration the device's spans are consistent only among themselves, and the trace states that.
 ///
 /// # Errors
-/// A span ends before it begins, or is not finite.
+/// A span ends before it begins, or a time is not finite or beyond 2^53 ns (104 days).
 pub fn chrome_trace(profile: &Profile, spans: &[Span]) -> Result<String, TraceError> {
     for span in spans {
         let fits = |ns: f64| ns.is_finite() && ns.abs() < MAX_NS;

@@ -33,7 +33,7 @@ pub struct Profile {
     /// Description of the input.
     pub input: String,
     pub sizes: Sizes,
-    /// The least time to acquire the volume. None if no probe swept it.
+    /// The least time to acquire the volume. None for a volume that is not a sweep of a probe.
     pub acquisition: Option<Acquisition>,
     /// Number of measured repeats, each of which renders one picture.
     pub repeats: usize,
@@ -42,11 +42,12 @@ pub struct Profile {
     /// Growth of the view's azimuth from each repeat to the next, deg.
     #[serde(default)]
     pub turn: f64,
-    /// The times of the passes, in running order.
+    /// The times of the passes, in running order, copies to and from the device included. Without time stamps there are none.
     pub passes: Vec<PassProfile>,
-    /// The times of host spans: submit, upload, wait, total. They may nest, so they do not add up.
+    /// The times of host spans: `stage` (frames are written into staging memory), `submit` and `wait` (for the picture). They do not add up to
+    /// `wall_ns`.
     pub host: Vec<PassProfile>,
-    /// Wall time from submission until the device is idle again, by the host's clock.
+    /// Wall time of the repeat by the host's clock, from before its first frame is uploaded until the picture is in host memory.
     pub wall_ns: Vec<f64>,
     /// CPU time of the process over the same intervals, all threads, user and system. On a software device it is the cost of the work, independent of
     /// other load. Empty if the system does not report it.
@@ -54,8 +55,9 @@ pub struct Profile {
     pub cpu_ns: Vec<f64>,
     /// Time from the begin of the first pass to the end of the last one, by the device's clock. Empty without time stamps.
     pub device_ns: Vec<f64>,
+    /// None if they were not asked for, or the device has no time stamps.
     pub ceilings: Option<Ceilings>,
-    /// How the volume is sampled and how texels are read, for the reader.
+    /// How the volume is sampled and how texels are read, in words. None in files of earlier versions.
     #[serde(default)]
     pub sampling: Option<String>,
     /// Largest error of the position of device spans on the host's clock, ns. None if the device's clock cannot be read.
@@ -67,7 +69,7 @@ pub struct Profile {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sizes {
-    /// Samples per line, and number of lines.
+    /// Samples per line, and number of lines; columns and rows of a Cartesian frame.
     pub frame: [u32; 2],
     pub slices: u32,
     /// Columns, rows and slices of the volume, texels.
@@ -92,9 +94,9 @@ pub struct Acquisition {
 pub struct PassProfile {
     /// Name, unique among the passes or the host spans.
     pub name: String,
-    /// Stage of the pass; `host` for a host span.
+    /// Stage of the pass; `copies` for uploads and readbacks, `host` for a host span.
     pub stage: String,
-    /// Number of dispatches in one repeat.
+    /// Number of dispatches in one repeat; of a host span, how often it occurs.
     pub runs_per_picture: u32,
     /// Time of all runs together, ns, for each repeat. Empty without time stamps.
     pub samples_ns: Vec<f64>,
@@ -103,7 +105,7 @@ pub struct PassProfile {
     pub cpu_ns: Vec<f64>,
     /// Least number of bytes that a repeat reads: every texel of every bound slot once.
     pub bytes_read: u64,
-    /// Number of bytes that a repeat writes.
+    /// Least number of bytes that a repeat writes, counted in the same way.
     pub bytes_written: u64,
     /// Number of texel fetches without a filter in a repeat. None if they cannot be counted.
     #[serde(default)]
@@ -111,10 +113,10 @@ pub struct PassProfile {
     /// Number of filtered texture samples in a repeat. None if they cannot be counted.
     #[serde(default)]
     pub filtered: Option<u64>,
-    /// Number of invocations that a repeat needs, without those that fill up workgroups. None if not known.
+    /// Number of invocations that a repeat needs, without those that fill up workgroups. None for a copy or a host span.
     #[serde(default)]
     pub dispatched: Option<u64>,
-    /// Number of compute shader invocations in a repeat by pipeline statistics. None if the device has none.
+    /// Number of compute shader invocations in the first repeat by pipeline statistics. None if the device does not count them.
     #[serde(default)]
     pub invocations: Option<u64>,
 }
@@ -154,7 +156,7 @@ pub struct Roof {
 }
 
 impl PassProfile {
-    /// The times as a sample. None without times.
+    /// The times of all repeats, ns, as a sample. None without times.
     pub fn sample(&self) -> Option<Sample> {
         Sample::new(&self.samples_ns).ok()
     }
@@ -170,13 +172,13 @@ impl PassProfile {
         (median > 0.0 && count > 0).then(|| count as f64 / median * 1e9)
     }
 
-    /// Least memory traffic, bytes per second, by the median time. None without times.
+    /// Least memory traffic, bytes per second, by the median time. None without times or traffic.
     pub fn bytes_per_second(&self) -> Option<f64> {
         self.rate(self.bytes())
     }
 
     /// The ceiling that the pass comes closest to (S. Williams, A. Waterman and D. Patterson, Roofline, 2009, with measured ceilings). None without
-    /// times.
+    /// times, or if no traffic of the pass is counted.
     pub fn roof(&self, ceilings: &Ceilings) -> Option<Roof> {
         let rates = [
             ("copy", self.bytes(), ceilings.copy),

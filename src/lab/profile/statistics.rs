@@ -66,7 +66,7 @@ impl Sample {
         self.0[self.0.len() - 1]
     }
 
-    /// The quantile at `share` (0..1), as [`statistics::quantile`], but never None, because a sample has values.
+    /// The quantile at `share`, which is clamped to 0..1: 0 is the minimum, 1 the maximum. It is linear between neighbouring values.
     pub fn quantile(&self, share: f64) -> f64 {
         statistics::quantile(&self.0, share).unwrap_or(f64::NAN)
     }
@@ -105,11 +105,11 @@ impl Sample {
     }
 }
 
-/// Drift of a series: the median of its second half divided by that of the first; 1 is steady. None if a half is empty or its median is not positive.
-/// The middle value of an odd number belongs to neither half.
+/// Drift of a series: the median of its second half divided by that of the first; 1 is steady. None if there is only one value, or the median of a
+/// half is not positive. The middle value of an odd number belongs to neither half.
 ///
 /// # Errors
-/// The series is no sample.
+/// The series is empty, or a value is not finite.
 pub fn drift(series: &[f64]) -> Result<Option<f64>, SampleError> {
     let half = series.len() / 2;
     if half == 0 {
@@ -121,7 +121,7 @@ pub fn drift(series: &[f64]) -> Result<Option<f64>, SampleError> {
 }
 
 /// Medians of `count` consecutive blocks of a series, of nearly equal lengths. Neighbouring times are correlated; block medians are far less so, and
-/// robust against outliers. None if there are fewer values than blocks.
+/// robust against outliers. None if there are fewer values than blocks, or `count` is 0.
 ///
 /// # Errors
 /// A value is not finite.
@@ -155,7 +155,7 @@ pub struct Shift {
     pub estimate: f64,
     pub low: f64,
     pub high: f64,
-    /// Probability that the interval covers the true shift, if the distributions differ by a shift only.
+    /// Probability, 0..1, that the interval covers the true shift, if the distributions differ by a shift only.
     pub coverage: f64,
 }
 
@@ -164,7 +164,7 @@ pub struct Shift {
 /// the normal approximation with the variance corrected for ties and a continuity correction.
 ///
 /// # Errors
-/// `a` or `b` is no sample.
+/// `a` or `b` is empty, or a value is not finite.
 pub fn mann_whitney(a: &[f64], b: &[f64]) -> Result<MannWhitney, SampleError> {
     let (first, second) = (Sample::new(a)?, Sample::new(b)?);
     let (n, m) = (first.count(), second.count());
@@ -219,11 +219,11 @@ pub fn min_p(n: usize) -> f64 {
 }
 
 /// Estimates the shift between two samples: the median of all differences b - a (J. L. Hodges and E. L. Lehmann, Estimates of location based on rank
-/// tests, 1963). The interval holds every shift that the Mann-Whitney test would not reject; `coverage` is below `level` if there are too few
-/// samples. Memory: n * m values.
+/// tests, 1963). The interval holds every shift that the Mann-Whitney test would not reject at a coverage of `level` (0..1); `coverage` is below
+/// `level` if there are too few samples. Memory: n * m values.
 ///
 /// # Errors
-/// `a` or `b` is no sample.
+/// `a` or `b` is empty, or a value is not finite.
 pub fn hodges_lehmann(a: &[f64], b: &[f64], level: f64) -> Result<Shift, SampleError> {
     let (first, second) = (Sample::new(a)?, Sample::new(b)?);
     let (n, m) = (first.count(), second.count());
@@ -279,7 +279,7 @@ fn all_rank_sums(ranks: &[usize]) -> Vec<f64> {
 /// extreme if the differences of pairs lie symmetrically about 0. It uses the exact distribution of the midranks. Differences of 0 are left out.
 ///
 /// # Errors
-/// `differences` is no sample.
+/// `differences` is empty, or a value is not finite.
 pub fn signed_rank(differences: &[f64]) -> Result<f64, SampleError> {
     Sample::new(differences)?;
     let moved: Vec<f64> = differences.iter().copied().filter(|d| *d != 0.0).collect();
@@ -300,11 +300,11 @@ pub fn min_signed_p(n: usize) -> f64 {
 }
 
 /// Estimates the shift of paired samples from the differences of the pairs: the median of the means of every two differences, each also with itself
-/// (Hodges and Lehmann, 1963). The interval holds every shift that [`signed_rank`] would not reject; `coverage` is below `level` if there are too few
-/// pairs.
+/// (Hodges and Lehmann, 1963). The interval holds every shift that [`signed_rank`] would not reject at a coverage of `level` (0..1); `coverage` is
+/// below `level` if there are too few pairs.
 ///
 /// # Errors
-/// `differences` is no sample.
+/// `differences` is empty, or a value is not finite.
 pub fn paired_shift(differences: &[f64], level: f64) -> Result<Shift, SampleError> {
     let sorted = Sample::new(differences)?;
     let each = sorted.sorted();
@@ -325,7 +325,7 @@ pub fn paired_shift(differences: &[f64], level: f64) -> Result<Shift, SampleErro
     Ok(Shift { estimate: means.median(), low, high, coverage: (1.0 - 2.0 * tail).max(0.0) })
 }
 
-/// Adjusted p values by Holm's correction (S. Holm, A simple sequentially rejective multiple test procedure, 1979), in the given order. Rejecting
+/// Adjusted p values by Holm's correction (S. Holm, A simple sequentially rejective multiple test procedure, 1979), in the order of `p`. Rejecting
 /// those up to alpha gives a family-wise error rate of at most alpha, whatever the dependence of the tests.
 pub fn holm(p: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..p.len()).collect();

@@ -21,13 +21,14 @@ pub struct ProfileOptions {
     pub repeats: usize,
     /// Number of repeats that are run first and not measured.
     pub warm_up: usize,
-    /// True: the frames go through stage 1 only once, so that only the later stages are measured.
+    /// True: the frames go through stage 1 in the first repeat only, warm-up included, and again only where a turned view needs them. So only the
+    /// later stages are measured if there is a warm-up.
     pub still: bool,
     /// Growth of the view's azimuth from each repeat to the next, also in the warm-up, deg.
     pub angle_step: f64,
     /// Description of the input, for the profile.
     pub input: String,
-    /// True: the roofline ceilings of the device are measured as well.
+    /// True: the roofline ceilings of the device are measured as well, before the repeats.
     pub ceilings: bool,
 }
 
@@ -45,7 +46,7 @@ pub struct ProfileRun {
     ceilings: Option<Ceilings>,
 }
 
-/// Profiles a scene. Returns the profile, and the spans of host and device of all repeats, in ns since the run began.
+/// Profiles a scene. `frames`: those of one volume. Returns the profile, and the spans of host and device of all measured repeats.
 ///
 /// # Errors
 /// The device cannot hold the scene, or fails.
@@ -63,7 +64,7 @@ pub fn run(
 }
 
 impl ProfileRun {
-    /// Makes the renderer; no repeat has run yet.
+    /// Measures the ceilings if the options ask for them, and makes the renderer. No repeat has run yet.
     ///
     /// # Errors
     /// The device cannot hold the scene, or fails.
@@ -71,10 +72,11 @@ impl ProfileRun {
         ProfileRun::with_shaders(context, scene, options, &RendererOptions::default().shaders)
     }
 
-    /// As [`ProfileRun::new`], with these shaders instead of the embedded ones.
+    /// Measures the ceilings if the options ask for them, and makes the renderer with these shaders instead of the embedded ones. No repeat has run
+    /// yet.
     ///
     /// # Errors
-    /// As of [`ProfileRun::new`], or a shader does not compile.
+    /// The device cannot hold the scene, or fails, or a shader does not compile.
     pub fn with_shaders(
         context: &Arc<Context>,
         scene: &Scene,
@@ -106,7 +108,7 @@ impl ProfileRun {
         self.done < self.options.warm_up + self.options.repeats
     }
 
-    /// Runs the scene once, and records its times unless it is part of the warm-up.
+    /// Runs the scene once, and records its times unless it is part of the warm-up. `frames`: those of one volume, the same in every call.
     ///
     /// # Errors
     /// The device fails.

@@ -10,7 +10,7 @@ use crate::scene::Estimator;
 use crate::text::{csv_quoted, markdown_table, markdown_text};
 use std::fmt::Write as _;
 
-/// Tables 3-6 as CSV, one line for each row. A missing time is an empty field.
+/// Tables 3-6 and the comparison of pipelines as CSV: a header, and one line for each row. Times are in ms; a missing one is an empty field.
 pub fn tables_csv(report: &Report) -> String {
     let mut text = String::from(
         "table,varied,value,usual,picture_ms,picture_least_ms,picture_most_ms,ratio,thesis_ms,thesis_ratio,stage_1_ms,\
@@ -45,7 +45,8 @@ fn csv_row(report: &Report, table: &Table, row: &Row, usual: bool) -> String {
     fields.join(",") + "\n"
 }
 
-/// Tables 7-9 as CSV, one line for each picture, sigma, starting window and number of pixels that the window's edge grew. Shares are 0..1.
+/// Tables 7-9 as CSV: a header, and one line for each picture, centre, sigma, pair of starting and largest window, and number of pixels by which the
+/// window's edge grew. Shares are 0..1.
 pub fn growth_csv(grown: &[Grown]) -> String {
     let mut text = String::from("picture,centre,sigma,window,largest,grew,share\n");
     for picture in grown {

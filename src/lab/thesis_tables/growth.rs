@@ -34,12 +34,13 @@ pub struct Growth {
     pub sigma: f64,
     /// Starting and largest window, pixels.
     pub windows: [u32; 2],
-    /// Number of pixels whose window grew by n rings, at index n.
+    /// Number of pixels whose window grew by n rings, at index n. A ring is one pixel wide, so that it makes the window's edge 2 pixels longer.
     pub counts: Vec<u64>,
 }
 
 impl Growth {
-    /// Counts the pixels. `rings`: for each pixel the number of rings by which its window grew.
+    /// Counts the pixels. `windows`: starting and largest window, pixels. `rings`: for each pixel the number of rings, each one pixel wide, by which
+    /// its window grew.
     pub fn new(centre: Estimator, sigma: f64, windows: [u32; 2], rings: &[f64]) -> Growth {
         let max_rings = (windows[1] - windows[0]) / 2;
         let mut counts = vec![0; max_rings as usize + 1];
@@ -80,7 +81,8 @@ pub fn table(rows: &[Growth]) -> String {
     text
 }
 
-/// The same shares as in [`table`] as CSV, in 0..1. A window that cannot grow that far has an empty field.
+/// Shares (0..1) of the pixels whose window's edge grew by 0, 2, 4 ... pixels as CSV: a header, and one line per row. A window that cannot grow that
+/// far has an empty field.
 pub fn csv(rows: &[Growth]) -> String {
     let mut text = "centre,sigma,window,largest".to_string();
     (0..columns(rows)).for_each(|n| text.push_str(&format!(",grew {}", 2 * n)));
@@ -118,7 +120,7 @@ pub enum GrowthError {
 /// The scene of a grey picture, as a Cartesian volume of one slice.
 ///
 /// # Errors
-/// The settings are invalid.
+/// A setting is out of range, or does not suit such a volume.
 pub fn scene_of(grey: &Grey, settings: Settings) -> Result<Scene, SceneError> {
     let grid = Grid { size: [grey.width as usize, grey.height as usize, 1], spacing: [1.0; 3], origin: [0.0; 3] };
     let stored = if grey.sixteen { StoredType::U16 } else { StoredType::U8 };

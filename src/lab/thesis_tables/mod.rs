@@ -69,8 +69,8 @@ pub struct Conditions {
 }
 
 impl Conditions {
-    /// The conditions of the thesis: 37 frames of 128 lines, a volume of 512^3, a picture of 512 x 512, the 3D filter of 3 samples, and
-    /// a plain sigma filter of 9 pixels. With `quick`, the edges of the volume and the picture are a quarter, and the number of lines is a half of these.
+    /// The conditions of the thesis: 37 frames of 128 lines, a volume of 512^3, a picture of 512 x 512, the 3D filter of 3 samples, and a plain sigma
+    /// filter of 9 pixels. With `quick`, the edges of the volume and the picture are a quarter, and the number of lines is a half of these.
     pub fn usual(quick: bool) -> Conditions {
         let (lines, volume) = if quick { (64, 128) } else { (128, 512) };
         let filter_3d = Filter3d::Sliding(3);
@@ -123,7 +123,7 @@ pub struct Row {
     pub thesis: Thesis,
     /// The measured times. Empty before the measurement, and on a device without time stamps.
     pub times: Times,
-    /// Where rays hit a surface. None before the measurement.
+    /// Which rays hit a surface, and at what depth. None before the measurement.
     pub reached: Option<Reached>,
 }
 
@@ -140,7 +140,7 @@ pub struct Table {
 }
 
 impl Table {
-    /// Ratio of the row's median time of stages 2-4 to that of the usual row. None if either was not measured.
+    /// Ratio of the row's median time of stages 2-4 to that of the row with the usual conditions. None if either was not measured.
     pub fn ratio(&self, row: &Row) -> Option<f64> {
         let usual = Spread::new(&self.rows.get(self.usual)?.times.picture)?;
         let own = Spread::new(&row.times.picture)?;
@@ -226,11 +226,13 @@ pub struct Report {
     pub program: String,
     /// When it was measured, RFC 3339.
     pub date: String,
+    /// True for smaller volumes and pictures, see [`Conditions::usual`].
     pub quick: bool,
+    /// Number of measured volumes for each row.
     pub repeats: usize,
     /// Number of volumes that are rendered first and not measured.
     pub warm_up: usize,
-    /// The rate of copying on this device, bytes/s. None without time stamps.
+    /// The rate of copying on this device: bytes read plus bytes written, per second. None without time stamps.
     pub copy: Option<Ceiling>,
     pub tables: Vec<Table>,
     pub grown: Vec<Grown>,

@@ -49,7 +49,7 @@ impl TableOptions {
     }
 }
 
-/// Measures every row of all tables. `after_each` is called after every rendered volume.
+/// Measures every row of all tables. `after_each` is called after every rendered volume, warm-up included. `grown` of the report is left empty.
 ///
 /// # Errors
 /// The device cannot hold a scene, or fails.
@@ -248,7 +248,7 @@ fn grain(number: u64) -> f64 {
 }
 
 /// The frames of one volume of the tables' test object: a ball in fluid in front of a wall, with a fine grain. Each frame has `lines` scan lines of
-/// [`SAMPLES`] samples, line by line, as u8 for 0..1. `frames` and `lines` must be at least 2.
+/// [`SAMPLES`] samples, line by line, as u8: 255 is the value 1. `frames` and `lines` must be at least 2.
 pub fn sweep_frames(frames: usize, lines: usize) -> Vec<Frame> {
     let probe = sweep_probe(frames, lines);
     let sample = |slice: usize, line: usize, sample: usize| {

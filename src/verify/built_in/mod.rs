@@ -42,7 +42,8 @@ impl SceneSpec {
     }
 }
 
-/// Scenes by name that together need every pass, in every variant of the geometry. `shared_memory`: shared memory of the device, bytes.
+/// Scenes by name that together need every pass, in every variant of the geometry. `shared_memory`: shared memory of a workgroup on the device,
+/// bytes.
 ///
 /// # Errors
 /// One line: a scene is invalid.
@@ -194,7 +195,8 @@ pub const SHARED_MEMORY: u32 = 32 << 10;
 /// Edge of a brick where a scene states none, texels.
 const BRICK: u32 = 8;
 
-/// A scene with settings from TOML. If they state something of labels, there are some.
+/// A scene with settings from TOML. Where they state none, bricks have an edge of 8 texels, and the volume is stored as `r16f`. If they contain the
+/// word `labels`, the scene gets the labels of [`labelled`].
 ///
 /// # Errors
 /// One line: the settings are invalid.
@@ -353,7 +355,7 @@ const MODES: [(&str, &str); 17] = [
     ("pair", "mode = 'sr'\nlayout = 'pair'"),
 ];
 
-/// Scenes of a small sweep: every mode once, each with filters of every stage.
+/// Scenes of a small sweep: every mode at least once, each with filters of every stage.
 pub fn modes() -> Vec<SceneSpec> {
     let sweep = Geometry::Sweep(wobbler());
     MODES.iter().map(|(name, toml)| SceneSpec::new(name, &sweep, BYTES, format!("{toml}\n{ALL_FILTERS}"))).collect()

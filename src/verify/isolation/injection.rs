@@ -25,8 +25,9 @@ enum Kind {
     Unsynchronized,
 }
 
-/// A crash to inject into a worker process, as text: `segv:GROUP / NAME` for the check that crashes, or `abort`, `hang`, `exit`, `flake` or
-/// `unsynchronized` instead of `segv`. With `start` instead of a check the process crashes before it opens the device.
+/// A crash to inject into a worker process, as text: `segv:GROUP / NAME` for the check that crashes, or instead of `segv` `abort`, `hang`, `exit`
+/// (the process ends), `flake` (the check fails once) or `unsynchronized` (it fails unless the host waits for each submission). With `start` instead
+/// of a check the process crashes before it opens the device.
 #[derive(Clone, Debug)]
 pub struct InjectedCrash {
     kind: Kind,

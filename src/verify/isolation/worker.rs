@@ -139,13 +139,13 @@ impl Message {
     }
 }
 
-/// From now on sends a message before each Vulkan call in which this process may crash.
+/// From now on sends a message on standard output before each Vulkan call in which this process may crash.
 pub fn tell_calls() {
     // Nobody listens any more if this fails, and the next answer says so.
     calls::tell(|call, of| drop(Message::Calls(call.into(), of.into()).send()));
 }
 
-/// Sends the message that there is no device to run checks on.
+/// Sends the message on standard output that there is no device to run checks on. `failure`: why.
 ///
 /// # Errors
 /// One line: standard output is closed.
@@ -154,7 +154,8 @@ pub fn refuse(failure: Failure) -> Result<(), String> {
     Message::Refused { code, message: failure.message() }.send()
 }
 
-/// Runs the checks that the lines of standard input request, until standard input ends.
+/// Sends `ready`, then runs the checks whose indices in `checks` the lines of standard input state, until standard input ends. Each outcome is sent
+/// on standard output.
 ///
 /// # Errors
 /// One line: standard output is closed, or there is no such check.

@@ -12,7 +12,8 @@ use std::fmt::{Display, Formatter};
 /// How bad a change is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Class {
-    /// It fails the run: a check fails that did not before, an error now exceeds its tolerance, or a time has grown beyond the threshold.
+    /// It fails the run: a check fails that did not before, an error now exceeds its tolerance, a time has grown beyond the threshold, or one that
+    /// was measured once beyond three times its value.
     Worse,
     /// It is reported, and does not fail the run.
     Changed,

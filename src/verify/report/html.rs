@@ -17,11 +17,11 @@ use maud::{Markup, html};
 /// Maximum number of checks of a group that is expanded by default.
 const MAX_OPEN: usize = 40;
 
-/// The report as a complete HTML page. Pictures are embedded up to the limits `MAX_SETS` and [`MAX_BYTES`], those of failures first. The page states
-/// how many are omitted. `compared`: the comparison with a baseline, if there is one.
+/// The report as a complete HTML page. Pictures are embedded up to the limits of 300 sets of three and [`MAX_BYTES`], those of failures first. The
+/// page states how many are omitted. `compared`: the comparison with a baseline, if there is one.
 ///
 /// # Errors
-/// One line: [`Run::check`] refuses the run.
+/// One line: the run contradicts itself, for example with two outcomes of one check ([`Run::check`]).
 pub fn html(run: &Run, compared: Option<&BaselineComparison>) -> Result<String, String> {
     run.check()?;
     let mut embedded = EmbeddedPictures::default();

@@ -42,7 +42,7 @@ pub struct Run {
     pub date: String,
     pub device: Device,
     pub level: Level,
-    /// True if the validation layer with synchronization validation was active.
+    /// True if the validation layer with synchronization validation was active and, if that was tried, detected a missing barrier.
     pub validation: bool,
     /// Duration of the run, s.
     pub seconds: f64,
@@ -95,7 +95,7 @@ pub struct Outcome {
     /// Name of the check, unique in its group and the same in every run of this version.
     pub name: String,
     pub verdict: Verdict,
-    /// Duration by the clock of the host, s; it includes the reference.
+    /// Duration by the clock of the host, s; it includes the computation of the reference.
     pub seconds: f64,
     /// Measured errors and times.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -140,14 +140,16 @@ pub enum Verdict {
 pub struct Figure {
     /// Name of the number, unique in its check.
     pub what: String,
-    /// The measured number: the largest error, or the median of `samples`. NaN if the output was NaN.
+    /// The measured number: an error (the largest), a count, a time (the median of `samples`, if there are any) or a share. NaN if the output was
+    /// NaN.
     #[serde(with = "any_number")]
     pub value: f64,
     /// The largest value that passes. None if every value passes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub allowed: Option<f64>,
     pub unit: Unit,
-    /// The single times of which `value` is the median, in the order of measurement. Empty for errors.
+    /// The single measurements in their order: times of which `value` is the median, or shares of which it is the largest. Empty for errors and
+    /// counts.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub samples: Vec<f64>,
     /// True if the figure depends on circumstances of the run and not on the device. It is reported, but not compared with a baseline.
@@ -203,9 +205,9 @@ pub struct Worst {
     pub expected: f64,
     #[serde(with = "any_number")]
     pub got: f64,
-    /// Number of texels of the output that are beyond tolerance.
+    /// Number of values of the output that are beyond tolerance; a texel has one for each channel.
     pub beyond: usize,
-    /// Number of texels of the output.
+    /// Number of all values of the output.
     pub texels: usize,
 }
 
@@ -216,7 +218,7 @@ pub struct PictureComparison {
     pub what: String,
     pub actual: Picture,
     pub expected: Picture,
-    /// The absolute difference of each channel, multiplied by `gain`.
+    /// The absolute difference of each channel, multiplied by `gain`; alpha is 255.
     pub difference: Picture,
     pub gain: u32,
     /// Index in [`Outcome::faults`] of the fault that the pictures show; None if they show none.

@@ -97,16 +97,18 @@ impl Array {
 
 /// What [`reproduce`] has written.
 pub struct Reproduction {
+    /// One line: pass, scene, iteration and kind of input.
     pub title: String,
     /// True if the dispatch that was written differs from its reference on this device.
     pub fails: bool,
     /// Why there is no script for Amber. None if there is one.
     pub without_script: Option<String>,
+    /// Names of the files in the folder.
     pub files: Vec<String>,
 }
 
-/// Writes a dispatch of a pass with its data into a folder, which is made if needed: the smallest dispatch that fails, otherwise the smallest with at
-/// least `MIN_TEXELS` texels. `check`: name of the pass's check.
+/// Writes a dispatch of a pass with its data into a folder, which is made if needed: the smallest dispatch that fails, otherwise the smallest that
+/// writes at least 64 texels. `check`: name of the pass's check, with or without its group (`passes / NAME`).
 ///
 /// # Errors
 /// No pass has this name, the device fails, or a file cannot be written.

@@ -35,7 +35,7 @@ pub struct Detection {
     pub by: Option<String>,
     /// Message of the check, or the reason why nothing detected the fault.
     pub message: String,
-    /// True if the fault was not tested on this device.
+    /// True if the fault was not tested: nothing that a check runs on this device meets it, or the validation layer that it needs is not active.
     pub left_out: bool,
     /// Duration of the test by the clock of the host, s.
     pub seconds: f64,
@@ -93,11 +93,12 @@ pub fn faults() -> impl Iterator<Item = InjectedFault> {
     injected_faults::FAULTS.iter().copied().chain(injected_faults::of_instructions())
 }
 
-/// Injects every fault, and drops every barrier, one at a time; calls `tell` with the detection of each. The last detection tells whether the checks
-/// that detected faults pass without one.
+/// Drops every barrier, then injects every fault, one at a time. Calls `tell` with each detection: two for the dropped barriers (by an independent
+/// check of barriers, and by the validation layer), one for each fault, and a last one that tells whether the checks that detected faults pass
+/// without one.
 ///
 /// # Errors
-/// The device fails without a fault.
+/// The device cannot be opened, or fails without a fault.
 pub fn run(options: &ContextOptions, mut tell: impl FnMut(&Detection)) -> Result<Vec<Detection>, GpuError> {
     let mut all = Vec::new();
     for detection in dropped_barriers(options)? {
@@ -108,10 +109,11 @@ pub fn run(options: &ContextOptions, mut tell: impl FnMut(&Detection)) -> Result
     Ok(all)
 }
 
-/// Like [`run`] for the given faults, without dropping barriers.
+/// Injects each of the given faults, one at a time, without the validation layer, and calls `tell` with the detection of each. The last detection
+/// tells whether the checks that detected faults pass without one.
 ///
 /// # Errors
-/// As of [`run`].
+/// The device cannot be opened, or fails without a fault.
 pub fn run_faults(
     options: &ContextOptions,
     faults: impl Iterator<Item = InjectedFault>,

@@ -11,6 +11,7 @@ const GROWTH: f64 = 1.05;
 /// A pipeline whose value in a column differs between two profiles.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Change {
+    /// Shader, constants and formats in one line.
     pub pipeline: String,
     /// Name of the column: "waves", "subgroup", "spills", "registers" or "instructions".
     pub column: &'static str,
@@ -24,7 +25,7 @@ pub struct Change {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PipelineComparison {
     pub format: &'static str,
-    /// Number of pipelines that both sets have.
+    /// Number of pipelines, by shader, constants and formats, that both sets have.
     pub compared: usize,
     /// Number of pipelines that only the new set has.
     pub added: usize,
@@ -55,7 +56,7 @@ pub enum CompareError {
 }
 
 impl PipelineComparison {
-    /// The pipelines with a change that fails the comparison, each once.
+    /// Titles of the pipelines that fail the comparison, each once: those with a change for the worse, and new ones whose registers spill.
     pub fn worse(&self) -> Vec<&str> {
         let changed = self.changes.iter().filter(|change| change.is_worse).map(|change| &change.pipeline);
         let mut titles: Vec<&str> = changed.chain(&self.new_spills).map(String::as_str).collect();

@@ -9,7 +9,8 @@ use std::fmt::Write as _;
 /// Pipelines that the table of a long list shows: those with the fewest waves.
 const SHOWN: usize = 40;
 
-/// The pipelines as a table of text, those with the lowest occupancy first, and sums.
+/// The pipelines as a table of text, and sums over all of them. The table has at most 40 rows: those with the lowest occupancy first or, where the
+/// device reports no statistics, those that take longest to compile.
 pub fn table(profile: &PipelineProfile) -> String {
     let mut order: Vec<&Pipeline> = profile.pipelines.iter().collect();
     // Without statistics the slowest to compile are of interest.
