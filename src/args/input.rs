@@ -66,20 +66,30 @@ impl InputArgs {
         self.open_with(&[])
     }
 
-    /// As [`InputArgs::open`]. `chosen`: assignments of settings over which the flags and `--set` take precedence.
+    /// Opens the recording and builds the scene as [`InputArgs::open`] does. `chosen`: assignments of settings, each with the flag that messages
+    /// name, over which the other flags and `--set` take precedence.
+    ///
+    /// # Errors
+    /// The recording or a setting is wrong, or there is no such volume.
     pub fn open_with(&self, chosen: &[Assigned]) -> Result<(Box<dyn Source>, Scene), Failure> {
         let opened = self.open_recorded(chosen, None)?;
         Ok((opened.source, opened.scene))
     }
 
-    /// As [`InputArgs::open`], with the scene of the volume with index `first`, the first that `--volumes` selects.
+    /// Opens the recording and builds the scene of the volume with index `first`, the first that `--volumes` selects.
+    ///
+    /// # Errors
+    /// The recording or a setting is wrong, or there is no such volume.
     pub fn open_volumes(&self, first: usize) -> Result<(Box<dyn Source>, Scene), Failure> {
         let opened = self.open_recorded(&[], Some(first))?;
         Ok((opened.source, opened.scene))
     }
 
-    /// As [`InputArgs::open_with`]; the result can also be used for other scenes of the same volume. `asked`: index of the volume, used in place
-    /// of that of the arguments.
+    /// Opens the recording and builds the scene as [`InputArgs::open_with`] does. The result can also be used for other scenes of the same volume.
+    /// `asked`: index of the volume, from 0, used in place of that of the arguments.
+    ///
+    /// # Errors
+    /// The recording or a setting is wrong, or there is no such volume.
     pub fn open_recorded(&self, chosen: &[Assigned], asked: Option<usize>) -> Result<Opened, Failure> {
         let mut source = self.source()?;
         let volume = asked.map_or_else(|| self.volume(), Ok)?;
@@ -117,6 +127,9 @@ impl InputArgs {
     }
 
     /// Opens another recording with the flags that give the geometry of this one.
+    ///
+    /// # Errors
+    /// The file cannot be opened as a recording with these flags.
     pub fn open_another(&self, file: &Path) -> Result<Box<dyn Source>, Failure> {
         open_recording(file, self.geometry.options())
     }
@@ -129,7 +142,7 @@ impl InputArgs {
         }
     }
 
-    /// Index of the volume to use, from 0: `--volume`, else that of the workspace, else 0.
+    /// Index of the volume to use, from 0: `--volume`, else that of the workspace, else 0. An error if the workspace cannot be read.
     pub fn volume(&self) -> Result<usize, Failure> {
         match self.volume {
             Some(volume) => Ok(volume),
@@ -158,7 +171,7 @@ impl InputArgs {
         self.input.as_deref().is_some_and(|file| file.as_os_str() == STANDARD)
     }
 
-    /// The recording as the user typed it, or `phantom`.
+    /// The recording as the user typed it, `standard input` for `-`, or `phantom` if none was given.
     pub fn name(&self) -> String {
         match self.stored.as_ref().map(|(file, _)| file).or(self.input.as_ref()) {
             None => "phantom".into(),
@@ -167,7 +180,8 @@ impl InputArgs {
         }
     }
 
-    /// Checks the output files, which must not replace an input: a file of the source or of the settings. See [`check_outputs`].
+    /// Checks that the output files can be written, that none is named twice, and that none replaces an input: a file of the source or of the
+    /// settings.
     pub fn check_outputs(&self, outputs: &[Output], source: &dyn Source) -> Result<(), Failure> {
         check_outputs(outputs, self.read_files(source).iter().map(PathBuf::as_path))
     }
@@ -211,7 +225,8 @@ impl InputArgs {
         Some(file.file_name()?.to_string_lossy().into_owned())
     }
 
-    /// The recording with its geometry and the volume to use, as a workspace stores them. Paths are absolute.
+    /// The recording with its geometry and the volume to use, as a workspace stores them. Paths are absolute. An error if the workspace that was
+    /// given cannot be read or names no recording.
     pub fn origin(&self) -> Result<Origin, Failure> {
         let (recording, geometry) = match (self.workspace()?, &self.input) {
             (Some((file, workspace)), _) => {
@@ -228,7 +243,8 @@ impl InputArgs {
         Ok(origin)
     }
 
-    /// Calls `each` with every frame of the volume, in the order of the recording, and shows a progress bar.
+    /// Calls `each` with every frame of the volume, in the order of the recording, and shows a progress bar. Ends with the first error of the
+    /// recording or of `each`.
     #[cfg(feature = "lab")]
     pub fn for_each_frame(
         &self,
@@ -434,7 +450,7 @@ impl SceneArgs {
         self.device.is_some() || self.device_timeout.is_some()
     }
 
-    /// The time after which a device that does not finish counts as lost.
+    /// The time after which a device that does not finish counts as lost. An error if `--device-timeout` is no time above 0 and not `none`.
     pub fn deadline(&self) -> Result<Deadline, Failure> {
         match self.device_timeout.as_deref() {
             None => Ok(Deadline::ByDevice),
@@ -460,7 +476,8 @@ impl SceneArgs {
     }
 }
 
-/// Calls `each` with every frame of the volume with this index, in the order of the recording.
+/// Calls `each` with every frame of the volume with this index, from 0, in the order of the recording. Ends with the first error of the recording or
+/// of `each`.
 pub fn frames_of(
     source: &mut dyn Source,
     volume: usize,
@@ -573,7 +590,8 @@ pub fn open_device_until(
     })
 }
 
-/// As [`open_device`], for statistics of compiled pipelines: no pipeline is taken from the cache of an earlier run or stored in it.
+/// Opens the chosen device, or the best one, and prints its name on one line. The driver reports statistics of compiled pipelines; none is taken from
+/// the cache of an earlier run or stored in it.
 #[cfg(feature = "lab")]
 pub fn open_device_for_statistics(choice: Option<DeviceChoice>) -> Result<Arc<Context>, Failure> {
     let device = choice.unwrap_or_default();

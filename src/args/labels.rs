@@ -8,7 +8,10 @@ use crate::source::OpenOptions;
 use crate::terminal::{Failure, input};
 use std::path::Path;
 
-/// Adds the labels of a file to the settings for a volume. `world`: where the volume is.
+/// Adds the labels of a file to the settings for a volume. `world`: where the volume is; None if that is not known.
+///
+/// # Errors
+/// The file is no segmentation, or its labels lie beside the volume.
 pub fn show_labels(layers: &mut Layers, file: &Path, geometry: &Geometry, world: Option<World>) -> Result<(), Failure> {
     let (labels, segments) = files::read(file, OpenOptions::default()).map_err(input)?;
     let fault = |why: String| input(InputError::new(file, "labels", why));

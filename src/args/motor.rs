@@ -58,8 +58,11 @@ impl MotorArgs {
         }
     }
 
-    /// The requested sweep; None without `--motor`. `recording`: path of the recording that is played, whose probe file is used if `probe` is
-    /// None. `fan`: angle between the first and the last frame, degrees, for a probe file that does not state it.
+    /// The requested sweep; None without `--motor`. `recording`: path of the recording that is played, whose probe file is used if `probe` is None.
+    /// `fan`: angle between the first and the last frame, degrees, for which a sweep is planned; None: that of the probe file.
+    ///
+    /// # Errors
+    /// There is no probe file with a motor, or the sweep exceeds the limits of the motor.
     pub fn plan(
         &self,
         probe: Option<&Path>,
@@ -151,7 +154,7 @@ pub fn motor_failure(error: MotorError) -> Failure {
     }
 }
 
-/// The `[motor]` table of a probe file; None if no file is given.
+/// The `[motor]` table of a probe file; None if no file is given. An error if the file cannot be read or has no such table.
 pub fn motor_table(file: Option<&PathBuf>) -> Result<Option<MotorTable>, Failure> {
     let Some(file) = file else { return Ok(None) };
     required_motor_table(&ProbeFile::read(file).map_err(input)?).map(Some)

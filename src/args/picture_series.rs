@@ -69,7 +69,7 @@ impl SeriesTarget {
         Ok(SeriesTarget::Files { before, digits, after: after.into(), format, folder: None })
     }
 
-    /// Path of the file of the picture with this number.
+    /// Path of the file of the picture with this number; of a film that of the film.
     pub fn file(&self, number: usize) -> PathBuf {
         match self {
             SeriesTarget::Files { before, digits, after, .. } => {
@@ -81,7 +81,8 @@ impl SeriesTarget {
         }
     }
 
-    /// Checks that the files of these numbers can be written and would not replace an input (`read`), and creates the folder that was named.
+    /// Checks that none of the files of these numbers would replace an input (`read`), creates the folder that was named, and checks that the first
+    /// file can be written.
     pub fn check(&self, numbers: impl Iterator<Item = usize>, read: &[PathBuf]) -> Result<(), Failure> {
         let files: Vec<PathBuf> = match self {
             SeriesTarget::Files { .. } => numbers.map(|n| self.file(n)).collect(),

@@ -42,7 +42,7 @@ fn three(text: &str) -> Result<[f64; 3], String> {
 }
 
 impl GeometryArgs {
-    /// Name of the first of these flags that was given; they apply only to recorded files. None if none was given.
+    /// Name of the first of these flags, `--probe` excepted, that was given; they apply only to recorded files. None if none was given.
     pub fn for_files(&self) -> Option<&'static str> {
         let given = [
             ("--depth-axis", self.depth_axis.is_some()),
@@ -54,7 +54,8 @@ impl GeometryArgs {
         given.iter().find(|(_, is_given)| *is_given).map(|(flag, _)| *flag)
     }
 
-    /// The description of a recording with this geometry that a workspace stores.
+    /// The description of a recording with this geometry that a workspace stores. Paths become absolute. The flags of tracked recordings are not
+    /// stored.
     pub fn origin(&self, recording: Option<PathBuf>) -> Origin {
         let absolute = |path: &PathBuf| std::path::absolute(path).unwrap_or_else(|_| path.clone());
         let mut origin = Origin::of(recording.as_ref().map(absolute));
@@ -94,6 +95,9 @@ impl GeometryArgs {
 }
 
 /// Opens a recording, and prints the path of the probe file that its geometry comes from, if there is one.
+///
+/// # Errors
+/// The file cannot be read as a recording with these options.
 pub fn open_recording(path: &Path, options: OpenOptions) -> Result<Box<dyn Source>, Failure> {
     let source = source::open_with(path, options).map_err(input)?;
     say_probe_file(source.probe_file());

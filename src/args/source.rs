@@ -138,7 +138,7 @@ impl SourceArgs {
     /// The same arguments for the recording that a workspace names. `file`: path of the workspace.
     ///
     /// # Errors
-    /// The workspace names no recording.
+    /// The workspace names no recording, or its depth axis is not valid.
     #[cfg(feature = "view")]
     pub fn of_workspace(&self, file: &Path, workspace: &Workspace) -> Result<SourceArgs, Failure> {
         let source = workspace.recording(file).map_err(input)?.to_string_lossy().into_owned();
@@ -209,6 +209,9 @@ impl SourceArgs {
     }
 
     /// Opens the source. If a motor was requested, also opens its port and starts its sweep.
+    ///
+    /// # Errors
+    /// A flag does not fit the source, or the source or the motor cannot be opened.
     pub fn open(&self) -> Result<Box<dyn Live>, Failure> {
         let network = self.source.strip_prefix(SCHEME);
         let is_file = !self.is_phantom() && self.source != "-" && network.is_none();

@@ -2,7 +2,7 @@
 
 use crate::terminal::{Failure, input};
 
-/// Parses a time such as 16ms, 0.25s or 250us; the result is in ns. `flag`: name of the flag for messages.
+/// Parses a time above 0 such as 16ms, 0.25s or 250us, always with a unit; the result is in ns. `flag`: name of the flag for messages.
 pub fn parse_nanoseconds(flag: &str, text: &str) -> Result<f64, Failure> {
     let units = [("ms", 1e6), ("us", 1e3), ("ns", 1.0), ("s", 1e9)];
     let parsed =

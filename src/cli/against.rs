@@ -173,9 +173,9 @@ pub fn end_turn() {
     say!("{DONE}");
 }
 
-/// Measures this program with its own arguments and `other` alternately, in the order A B B A, and compares the times. `repeats`: number of
-/// measured volumes of each side, divided into blocks. Each block is a pair of processes, which first draw `warm_up` volumes that are not
-/// measured.
+/// Measures this program with its own arguments and `other` alternately, in the order A B B A, and compares the times. `repeats`: number of measured
+/// volumes of each side, divided into blocks. Each block is a pair of processes, which first draw `warm_up` volumes that are not measured. An error
+/// if a process fails or ends early.
 pub fn compared(other: &Other, repeats: u32, warm_up: u32, options: &CompareOptions) -> Result<Comparison, Failure> {
     let mut sides = sides(other)?;
     let folder = WorkFolder::new(&std::env::temp_dir(), "echolume-profile-").map_err(failed)?;

@@ -9,8 +9,11 @@ use crate::scene::Scene;
 use crate::terminal::{Failure, failed, input, say};
 use std::path::Path;
 
-/// The settings with the smallest error whose time is within the budget, according to the error report in `file`, as assignments. `scene`: opens
-/// the scene to which they are added.
+/// The settings with the smallest error whose time is within the budget, according to the error report in `file`, as assignments. `scene`: opens the
+/// scene to which they are added.
+///
+/// # Errors
+/// The budget is no time, the report cannot be read or is for a volume of another size, or no settings are within the budget.
 pub(super) fn chosen(
     budget: &str,
     file: &Path,
@@ -34,7 +37,7 @@ pub(super) fn chosen(
     Ok(choice.set.clone())
 }
 
-/// Prints whether the times of a picture's passes are within the budget.
+/// Prints whether the times of a picture's passes are within the budget. An error only if the budget is no time.
 pub(super) fn judge(budget: &str, times: &[PassTime]) -> Result<(), Failure> {
     let (time, taken) = (parse_nanoseconds("--budget", budget)?, times.iter().map(|t| t.total).sum::<f64>());
     let kept = if taken <= time { "within" } else { "over" };

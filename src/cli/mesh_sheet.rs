@@ -12,8 +12,11 @@ use crate::terminal::{Failure, failed, input, say};
 use glam::DVec3;
 use std::path::Path;
 
-/// Writes the surface in the distance map that a renderer drew last as an open mesh (sheet), in the colours of its picture. `world`: map from
-/// the voxels of a Cartesian volume to the world; None for a sweep.
+/// Writes the surface in the distance map that a renderer drew last as an open mesh (sheet), in the colours of its picture. `world`: map from the
+/// voxels of a Cartesian volume to the world; None for a sweep.
+///
+/// # Errors
+/// The plan has no distance map, no rays next to each other hit a surface, or the file cannot be written.
 pub(super) fn write(
     renderer: &mut Renderer,
     picture: &Picture,

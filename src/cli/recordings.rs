@@ -20,8 +20,8 @@ use std::path::{Path, PathBuf};
 /// Name of the output file in messages.
 pub(super) const OUTPUT: &str = "output";
 
-/// Reads the volume with the index `number`. Returns its geometry, its samples and the number of frames that were there. `each` is called with
-/// every frame. `file`: path of the recording, for messages.
+/// Reads the volume with the index `number`. Returns its geometry, its samples and the number of frames that were there. `each` is called with every
+/// frame. `file`: path of the recording, for messages. An error if there is no such volume or it cannot be read.
 pub(super) fn read_volume(
     recording: &mut dyn Source,
     file: &Path,
@@ -42,8 +42,9 @@ fn check_number(recording: &dyn Source, file: &Path, number: usize) -> Result<()
     }
 }
 
-/// As [`read_volume`], and also finds the levels of the echoes, among them the threshold between the darker and the brighter class; None if
-/// there are no two classes.
+/// Reads the volume with the index `number`. Returns its geometry, its samples, and the levels of the echoes, among them the threshold between the
+/// darker and the brighter class; None if there are no two classes. `file`: path of the recording, for messages. `samples`: type and range of the
+/// stored samples. An error if there is no such volume or it cannot be read.
 pub(super) fn read_with_threshold(
     recording: &mut dyn Source,
     file: &Path,
@@ -68,8 +69,8 @@ pub(super) fn share_of(asked: Option<f64>, found: Option<&EchoLevels>, file: &Pa
     asked.or(found.map(|levels| levels.threshold)).ok_or_else(none)
 }
 
-/// The grid of a converted volume: with the requested voxel spacing, mm, otherwise that of a Cartesian volume itself, or for a sweep one with
-/// the distance of its samples.
+/// The grid of a converted volume: with the requested voxel spacing, mm, otherwise that of a Cartesian volume itself, or for a sweep one with the
+/// distance of its samples. An error if the spacing is not allowed or gives too many voxels.
 pub(super) fn target_grid(geometry: &Geometry, spacing: Option<f64>) -> Result<Grid, Failure> {
     match (geometry, spacing) {
         // Every voxel stays what and where it is.

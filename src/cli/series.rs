@@ -123,7 +123,8 @@ impl SeriesArgs {
         }
     }
 
-    /// Draws and writes the pictures. A signal ends the command after the file that is being written is complete.
+    /// Draws and writes the pictures. A signal ends the command after the file that is being written is complete. What was written before an error
+    /// stays, but no film.
     pub fn run(&self, job: &Job) -> Result<(), Failure> {
         let name = if self.volumes.is_some() { "volume" } else { "picture" };
         let target = SeriesTarget::of(job.output, name)?;

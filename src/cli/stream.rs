@@ -278,7 +278,8 @@ fn explain_one_colour(stream: &mut Live, shown: &FinishedPicture, file: &Path) -
     Ok(true)
 }
 
-/// Checks that a recording to be written (`file`) replaces neither an existing file nor the recording that is played.
+/// Checks that a recording to be written (`file`) has the ending .frames, can be written, and replaces neither an existing file nor the recording
+/// that is played.
 pub fn check_record(file: &Path, played: &Path) -> Result<(), Failure> {
     let refuse = |why: &str| Err(input(format!("--record {}: {why}", file.display())));
     if file.extension().is_none_or(|e| e != "frames") {

@@ -57,7 +57,7 @@ impl WindowConfig {
     /// Opens the window and runs the console (the viewer's user interface) that `make` creates, until the user leaves it.
     ///
     /// # Errors
-    /// Those of [`window::run`].
+    /// There is no window system or no such monitor, no device can present there, or the device or the monitor is lost repeatedly.
     pub fn run(self, make: Box<MakeConsole>) -> Result<(Console, Arc<Context>), GpuError> {
         match self.direct {
             None => window::run(&self.device, self.shape, make),
@@ -122,6 +122,9 @@ impl ConsoleConfig {
     }
 
     /// The console that a configuration asks for. The flags in `scene` take precedence over the settings of the configuration.
+    ///
+    /// # Errors
+    /// A preset, a setting or a key of the source is wrong, or the report for the quality ladder cannot be read.
     pub fn configured(config: &Config, scene: &SceneArgs) -> Result<ConsoleConfig, Failure> {
         let layers = config.layers().map_err(|e| input(config.flag_error(&e.to_string())))?;
         let (live, display, files) = (&config.live, &config.display, &config.files);
@@ -197,7 +200,7 @@ fn stamp() -> String {
 }
 
 /// The quality ladder: changes of settings, from full quality to the fastest, of which a moving view chooses one to meet the frame budget. `report`:
-/// file of the error report that states them; None: the built-in ladder.
+/// file of the error report that states them; None: the built-in ladder. An error if the report cannot be read or gives no ladder.
 pub fn rungs(report: Option<&Path>) -> Result<Vec<Rung>, Failure> {
     match report {
         None => Ok(built_in_ladder()),

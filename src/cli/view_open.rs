@@ -17,14 +17,15 @@ use std::sync::{Arc, Mutex, MutexGuard};
 pub struct Shown {
     pub source: SourceArgs,
     pub workspace: Option<Layers>,
-    /// The segmentation that it names.
+    /// Path of the segmentation that the workspace names; None if there is none.
     pub labels: Option<PathBuf>,
     /// True if the source was given on the command line, so that its flags apply.
     pub is_given: bool,
 }
 
 impl Shown {
-    /// The source that the command line selects. `file`: a recording or a workspace that takes its place.
+    /// The source that the command line selects. `file`: a recording or a workspace that takes its place. An error if a workspace cannot be read or
+    /// names no recording.
     pub fn of(source: &SourceArgs, file: Option<&Path>) -> Result<Shown, Failure> {
         let named = file.unwrap_or(source.path());
         if workspace::is_named(named) {
@@ -37,7 +38,8 @@ impl Shown {
         Ok(Shown { source, workspace: None, labels: None, is_given: true })
     }
 
-    /// The source for a recording or a workspace that was opened in the window. The geometry flags of the command line do not apply to it.
+    /// The source for a recording or a workspace that was opened in the window. The geometry flags of the command line do not apply to it. An error
+    /// if a workspace cannot be read or names no recording.
     pub fn opened(flags: &SourceArgs, file: &Path) -> Result<Shown, Failure> {
         Ok(Shown { is_given: false, ..Shown::of(&flags.of_file(file), None)? })
     }

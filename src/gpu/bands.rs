@@ -29,9 +29,10 @@ const DECAY: f64 = 0.75;
 /// By which rule dispatches are divided into bands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Bands {
-    /// By measured time. `losses`: how often the device was lost so far; each loss halves the time that a submission may take.
+    /// By measured time. `losses`: how often the device was lost so far; each loss halves the time that a submission may take. With 0, dispatches on
+    /// a software device stay whole.
     Measured { losses: u32 },
-    /// Into bands of at most this many invocations, but at least one row of workgroups: for tests.
+    /// Into bands of about this many invocations, rounded up to complete rows of workgroups: for tests.
     Fixed(u64),
 }
 
@@ -93,7 +94,8 @@ impl BandLimit {
         }
     }
 
-    /// As [`BandLimit::new`], for a device whose queue also draws a window's panels, between the bands.
+    /// The limit for a device whose queue also draws a window's panels, between the bands. Unlike with [`BandLimit::new`], a software device gets
+    /// bands also before a loss, and shorter ones. None if no dispatch is divided.
     pub fn paced(bands: Bands, is_software: bool) -> Option<BandLimit> {
         match bands {
             Bands::Measured { losses } if is_software => Some(BandLimit::Time {

@@ -43,9 +43,9 @@ impl MemoryBudget {
         }
     }
 
-    /// Refuses an allocation that fits into the budget of no heap that it could use. `what`: name of the allocation for the message; `needed`: its
-    /// bytes; `types`: bits of the allowed memory types; `required`: properties that the type must have; `reserve`: bytes that this process has
-    /// allocated but does not use.
+    /// Refuses an allocation that fits into the budget of no heap that it could use. Heaps without a stated budget do not count; if no heap is left,
+    /// nothing is refused. `what`: name of the allocation for the message; `needed`: its bytes; `types`: bits of the allowed memory types;
+    /// `required`: properties that the type must have; `reserve`: bytes that this process has allocated but does not use.
     ///
     /// # Errors
     /// One line with the needed size, the budget, and the used part of it.

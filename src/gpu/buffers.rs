@@ -131,12 +131,12 @@ impl Buffer {
         Ok(buffer)
     }
 
-    /// The view of a lookup table with texels of 1, 2 or 4 floats.
+    /// The view of a lookup table with texels of 1, 2 or 4 floats; null if the buffer is no lookup table or its size does not suit texel buffers.
     pub fn texels(&self, components: u32) -> vk::BufferView {
         self.texels[components.ilog2().min(2) as usize]
     }
 
-    /// The mapped bytes, for writing only.
+    /// The mapped bytes, for writing only; empty if the memory is not mapped ([`Purpose::Groups`]).
     pub fn space(&mut self) -> &mut [MaybeUninit<u8>] {
         let size = self.size as usize;
         let bytes = self.allocation.as_mut().and_then(|a| a.mapped_slice_mut()).unwrap_or(&mut []);
@@ -273,7 +273,8 @@ impl Readback {
         self.pieces.iter().map(|(piece, buffer)| (piece, buffer))
     }
 
-    /// The texels of the image that the device wrote. The device must have finished the copy.
+    /// The texels of the image that the device wrote: row by row, and one slice or layer after the other, without gaps. The device must have finished
+    /// the copy.
     ///
     /// # Errors
     /// The device fails.

@@ -61,7 +61,8 @@ pub(crate) struct BufferLayout {
     pub descending: Option<u64>,
 }
 
-/// Records and submits command buffers again and again on one queue. A recording needs one of them, and several only for work in bands.
+/// Records and submits command buffers again and again on one queue. A recording needs one of them, and several only for work in bands. Every method
+/// that returns a [`GpuError`] does so if the device fails or has no memory.
 pub(crate) struct CommandRecorder {
     context: Arc<Context>,
     pool: vk::CommandPool,

@@ -92,9 +92,9 @@ pub struct Context {
     names: Option<ash::ext::debug_utils::Device>,
     /// Statistics on the compilation of pipelines; `None` without [`ContextOptions::compile_statistics`] or if the device has none.
     pub(super) executables: Option<ash::khr::pipeline_executable_properties::Device>,
-    /// See [`ContextOptions::specialize`].
+    /// True if shader modules have the values of their constants before the driver gets them ([`ContextOptions::specialize`]).
     pub(super) specializes: bool,
-    /// See [`ContextOptions::max_unused_pipelines`].
+    /// Number of compiled pipelines that are kept although no plan uses them.
     pub(super) max_unused_pipelines: usize,
     pub(super) pipeline_cache: PipelineCache,
     /// The pipelines that the renderers of the device share, as long as one of them holds them. Their type is [`super::pipelines::Pipelines`], whose
@@ -151,7 +151,7 @@ pub struct Counts {
     pub waits_idle: AtomicU64,
 }
 
-/// Loads Vulkan and lists the devices, for `echolume devices`.
+/// Loads Vulkan and lists the devices, for `echolume devices`, also those that lack a required feature.
 ///
 /// # Errors
 /// No Vulkan loader or no driver.
@@ -186,7 +186,8 @@ impl Context {
     /// Opens a device that can present on `target`.
     ///
     /// # Errors
-    /// As for [`Context::new`]; no device that can present there.
+    /// No Vulkan loader, no device that can present there, a device that lacks a required feature, or no validation layer although validation is
+    /// requested.
     #[cfg(feature = "view")]
     pub fn for_presentation(options: &ContextOptions, target: &Target) -> Result<Arc<Context>, GpuError> {
         Context::create(options, Some(target))
@@ -302,7 +303,7 @@ impl Context {
         Ok(context)
     }
 
-    /// All messages of the validation layer so far. A correct program has none.
+    /// All messages of the validation layer so far; empty without validation. A correct program has none.
     pub fn messages(&self) -> Vec<String> {
         self.messenger.as_ref().map(Messenger::messages).unwrap_or_default()
     }
@@ -510,8 +511,9 @@ impl Context {
         if is_due { self.wait_queue(0) } else { Ok(()) }
     }
 
-    /// As [`Context::show_layer_an_idle_queue`], but each time, and with any number of queues. Call it before another timeline uses what the first
-    /// queue wrote: an older layer would report a hazard.
+    /// Waits until the first queue is idle, if the validation layer does not see waits for timelines: each time, and with any number of queues,
+    /// unlike [`Context::show_layer_an_idle_queue`]. Call it before another timeline uses what the first queue wrote: an older layer would report a
+    /// hazard.
     ///
     /// # Errors
     /// The device fails or is given up.

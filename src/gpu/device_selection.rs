@@ -14,9 +14,9 @@ pub enum DeviceChoice {
     /// The best device that lacks no required feature.
     #[default]
     Best,
-    /// By its number in the list of `echolume devices`.
+    /// By its number, from 0, in the list of `echolume devices`.
     Number(usize),
-    /// By a part of its name, ignoring case.
+    /// The first device whose name contains this text, ignoring case. An empty text selects none.
     Name(String),
 }
 
@@ -35,6 +35,7 @@ pub struct Candidate {
     pub name: String,
     pub kind: vk::PhysicalDeviceType,
     pub driver: String,
+    /// The Vulkan version that the device supports, packed as by VK_MAKE_API_VERSION.
     pub version: u32,
     /// Required features that the device lacks.
     pub missing: Vec<Cow<'static, str>>,
@@ -132,7 +133,10 @@ impl Candidate {
     }
 }
 
-/// Lists every device of an instance, in the driver's order.
+/// Lists every device of an instance, also those that lack a required feature, in the driver's order.
+///
+/// # Errors
+/// The driver cannot list its devices.
 pub fn candidates(entry: &ash::Entry, instance: &ash::Instance) -> Result<Vec<Candidate>, GpuError> {
     calls::begins("vkEnumeratePhysicalDevices", "");
     // SAFETY: the instance is alive; the call only reads.
@@ -326,7 +330,7 @@ fn queues(families: &[vk::QueueFamilyProperties]) -> Vec<QueueInfo> {
     queues
 }
 
-/// The index of the chosen device.
+/// The index in `candidates` of the chosen device.
 ///
 /// # Errors
 /// There is no such device, or it lacks a required feature.

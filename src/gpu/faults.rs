@@ -172,7 +172,8 @@ impl Faults {
         self.loss.lock().unwrap_or_else(|e| e.into_inner()).clone()
     }
 
-    /// From now on the device reports a memory budget with room for `bytes` bytes of further allocations.
+    /// From now on the device reports a memory budget of `bytes` bytes, of which none are used: only a single allocation larger than that is refused,
+    /// however many were made before.
     pub fn limit_memory(&self, bytes: u64) {
         let heap = HeapBudget { size: bytes, budget: bytes, used: 0, is_device_local: true };
         let types = vec![(0, vk::MemoryPropertyFlags::from_raw(u32::MAX)); 32];

@@ -25,7 +25,7 @@ impl TexelAccess {
         if candidate.is_software() { TexelAccess::Storage } else { TexelAccess::Textures }
     }
 
-    /// The sampling that `ray.sampling = "auto"` selects with this access.
+    /// The fastest sampling with this access. `ray.sampling = "auto"` selects it, or [`Sampling::Exact`] where it cannot be used or does not pay.
     pub fn sampling(self) -> Sampling {
         if self == TexelAccess::Storage { Sampling::PackedNeighbours } else { Sampling::Hardware }
     }
@@ -93,10 +93,10 @@ fn features(context: &Context, slot: Slot, scene: &Scene) -> vk::FormatFeatureFl
 /// Frames whose slots of stage 1 stay in the caches of a CPU.
 const FRAMES_IN_CACHE: u32 = 4;
 
-/// Sets the fields of a scene that depend on the device. Sampling becomes the fastest one: it reads eight texels if texels are loaded or if the
-/// device cannot filter the volume's format. Packed neighbours are left out if the device cannot hold them. The volume gets the format that the
-/// device stores best, the picture that of the window, and passes use shared memory on a GPU. On a CPU few frames go through stage 1 at once, so that
-/// their slots stay in its caches.
+/// Sets the fields of a scene that depend on the device. `ray.sampling = "auto"` becomes the filter of the device, or packed neighbours with
+/// [`TexelAccess::Storage`]. It becomes eight single texels if the device cannot filter the volume's format, or if packed neighbours do not pay or do
+/// not fit. The volume gets the format that the device stores best, the picture that of the window, and passes use shared memory on a GPU. On a CPU
+/// few frames go through stage 1 at once, so that their slots stay in its caches.
 pub fn adapt_scene(context: &Context, texel_access: TexelAccess, mut scene: Scene) -> Scene {
     scene.truncates_halves = context.candidate.truncates_halves();
     let filters = filters(context, Slot::Volume.format(&scene));

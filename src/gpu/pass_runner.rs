@@ -32,7 +32,7 @@ impl PassRunner {
         PassRunner::with_texel_access(context, TexelAccess::for_device(&context.candidate))
     }
 
-    /// As [`PassRunner::new`], with texels read by `texel_access`.
+    /// Makes a runner whose shaders read single texels by `texel_access`.
     ///
     /// # Errors
     /// The device fails.
@@ -79,10 +79,11 @@ impl PassRunner {
         self.run_within(scene, pass, args, inputs, poison, u64::MAX)
     }
 
-    /// As [`PassRunner::run`], in bands of at most `most` invocations, but at least one row of workgroups. An indirect dispatch is not divided.
+    /// Does what [`PassRunner::run`] does, which explains the other arguments, in bands of about `most` invocations, rounded up to complete rows of
+    /// workgroups. An indirect dispatch is not divided.
     ///
     /// # Errors
-    /// As of [`PassRunner::run`].
+    /// The device cannot hold a slot, a shader does not compile, or the device fails.
     pub fn run_within(
         &mut self,
         scene: &Scene,
@@ -185,10 +186,10 @@ impl PassTimer {
         PassTimer::with_texel_access(context, scene, pass, contents, TexelAccess::for_device(&context.candidate))
     }
 
-    /// As [`PassTimer::new`], with texels read by `texel_access`.
+    /// Does what [`PassTimer::new`] does, which explains `contents`, with shaders that read single texels by `texel_access`.
     ///
     /// # Errors
-    /// As for [`PassTimer::new`].
+    /// The device cannot hold a slot, or a shader does not compile; the error names it.
     pub fn with_texel_access(
         context: &Arc<Context>,
         scene: &Scene,
@@ -300,7 +301,7 @@ impl Drop for PassTimer {
 /// device has no time stamps. An additional first run, in which drivers compile, is not counted.
 ///
 /// # Errors
-/// As for [`PassTimer::new`].
+/// The device cannot hold a slot, a shader does not compile, or the device fails.
 pub fn time_pass(context: &Arc<Context>, scene: &Scene, pass: &'static Pass, count: u32) -> Result<Vec<f64>, GpuError> {
     let mut timed = PassTimer::new(context, scene, pass, &[])?;
     let mut times = Vec::new();

@@ -29,7 +29,7 @@ pub struct MeasuredPipeline {
     /// The executables that the driver compiled for it. Empty without
     /// [`ContextOptions::compile_statistics`](super::ContextOptions::compile_statistics).
     pub executables: Vec<Executable>,
-    /// Compile time without any cache, the driver's own included.
+    /// Compile time if neither a pipeline cache nor the driver's own cache holds the pipeline.
     pub cold: Duration,
     /// Compile time with a pipeline cache that holds the pipeline.
     pub warm: Duration,

@@ -192,10 +192,12 @@ impl Pipelines {
     }
 
     /// The pipelines of a plan, one for each step. Missing ones are compiled in parallel. Before the first and after each of them `goes_on` is called
-    /// with the number of compiled pipelines and the total; if it returns false, the rest is not compiled.
+    /// with the number of compiled pipelines and the total; if it returns false, the rest is not compiled, and the result lacks the steps whose
+    /// pipelines are missing.
     ///
     /// # Errors
-    /// As of [`Pipelines::get`], for the first step that fails. Pipelines that were compiled are kept.
+    /// A shader does not exist, or disagrees with the declaration of its pass: the fault of the first step that has one. Pipelines that were compiled
+    /// are kept.
     pub(super) fn of_plan_while(
         &self,
         plan: &Plan,
@@ -211,7 +213,7 @@ impl Pipelines {
     /// one for each step. The device must have finished with the previous pipelines, and no other thread may compile any.
     ///
     /// # Errors
-    /// As of [`Pipelines::of_plan_while`]; the previous pipelines stay.
+    /// A shader does not exist, or disagrees with the declaration of its pass; the previous pipelines stay.
     pub(super) fn recompile(
         &self,
         shaders: &HashSet<String>,

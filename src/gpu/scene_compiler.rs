@@ -50,7 +50,8 @@ impl SceneCompiler {
         (scene, plan)
     }
 
-    /// The pipelines of a plan, one for each step. `goes_on` as for [`Pipelines::of_plan_while`].
+    /// The pipelines of a plan, one for each step. Before the first and after each that is compiled, `goes_on` is called with the number of compiled
+    /// pipelines and the total; if it returns false, the rest is not compiled and missing in the result.
     ///
     /// # Errors
     /// The device cannot hold a slot, or a shader does not compile.
@@ -105,18 +106,22 @@ impl SceneCompiler {
         Ok(self.background.insert(background))
     }
 
-    /// See [`AsyncPipelineCompiler::warm`].
+    /// Compiles the pipelines of these scenes in the background whenever no requested pipeline is missing. They replace the scenes of an earlier
+    /// call.
+    ///
+    /// # Errors
+    /// The thread cannot be started.
     pub fn warm(&mut self, scenes: Vec<SceneMaker>) -> Result<(), GpuError> {
         self.background()?.warm(scenes);
         Ok(())
     }
 
-    /// See [`AsyncPipelineCompiler::stop_warming`].
+    /// Drops the scenes of [`SceneCompiler::warm`] whose pipelines are not compiled yet.
     pub fn stop_warming(&self) {
         self.background.iter().for_each(AsyncPipelineCompiler::stop_warming);
     }
 
-    /// See [`AsyncPipelineCompiler::is_warming`].
+    /// True while pipelines of [`SceneCompiler::warm`] are left to compile.
     pub fn is_warming(&self) -> bool {
         self.background.as_ref().is_some_and(AsyncPipelineCompiler::is_warming)
     }

@@ -48,10 +48,10 @@ impl ShaderFolder {
         ShaderFolder::open_with(glsl, Compiler::find()?)
     }
 
-    /// As [`ShaderFolder::open`], with a given compiler.
+    /// Reads the folder, whose shaders `compiler` will compile, but compiles nothing yet.
     ///
     /// # Errors
-    /// As of [`ShaderFolder::open`].
+    /// The folder cannot be read or holds no shader, or an include does not exist.
     pub fn open_with(glsl: &Path, compiler: Compiler) -> Result<Arc<ShaderFolder>, String> {
         let sources = read(glsl)?;
         tracing::info!("shaders: {} from {}, compiled by {}", sources.len(), glsl.display(), compiler.name());

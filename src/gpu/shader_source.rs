@@ -27,7 +27,7 @@ struct Origin {
     line: usize,
 }
 
-/// Every variant of every `.comp` file below `root`, in order of name.
+/// Every variant of every `.comp` file in the folders directly below `root`, in order of path.
 ///
 /// # Errors
 /// A file cannot be read, or an include does not exist or includes itself.

@@ -39,7 +39,7 @@ impl Compiler {
         in_path("glslc").map(Compiler::Glslc)
     }
 
-    /// `glslangValidator`, if it is in PATH.
+    /// `glslangValidator`, if it is in PATH and the system is a Unix.
     pub fn glslang() -> Option<Compiler> {
         // It writes to files only, and is given the pipe by its name.
         let validator = in_path("glslangValidator").filter(|_| cfg!(unix))?;

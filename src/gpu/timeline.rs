@@ -256,7 +256,7 @@ impl Timelines {
         self.0.iter().map(Timeline::busy_for).max().unwrap_or_default()
     }
 
-    /// See [`Timeline::drain`].
+    /// Waits for all submissions to all queues, or, if that fails, for an idle device. Call it before resources in flight are destroyed.
     pub fn drain(&self) {
         self.0.iter().for_each(Timeline::drain);
     }

@@ -58,6 +58,7 @@ pub struct Stamp {
     pub name: &'static str,
     pub from: u64,
     pub to: u64,
+    /// Shader invocations of the work; None if they were not counted.
     pub invocations: Option<u64>,
     /// Number of runs that the work counts as: one for each frame of a batch, 0 if the work goes on in the next submission.
     pub runs: u32,

@@ -23,16 +23,16 @@ const BINS: usize = 512;
 pub struct Search {
     /// True if bodies are darker than what is around them, false if brighter.
     pub is_dark: bool,
-    /// Level of the echo at the surface of bodies, in the scale of `Scale::searched`. None: half of the step between the two classes of echoes
+    /// Level of the echo at the surface of bodies, 0..=1, in the scale of `Scale::searched`. None: half of the step between the two classes of echoes
     /// next to the surface.
     pub level: Option<f64>,
     /// Standard deviation, mm, of the Gaussian that smooths the echoes before the search.
     pub smoothing: f64,
-    /// Radius of the morphological opening, mm: necks thinner than twice the radius do not connect bodies, and belong to none.
+    /// Radius of the morphological opening, mm: necks thinner than twice the radius do not connect bodies, and belong to none. 0: no opening.
     pub opening: f64,
     /// A position within the only body that is searched for, mm in the coordinates of the grid. None: all bodies are searched for.
     pub seed: Option<DVec3>,
-    /// Smallest volume of a body, mm^3; smaller ones are ignored.
+    /// Smallest volume of a body, mm^3; smaller ones are ignored. Without effect if there is a seed.
     pub least: f64,
 }
 
@@ -61,8 +61,8 @@ pub struct Found {
     pub left_out: usize,
 }
 
-/// Finds, labels and measures bodies. If the level is not given, the surface of each measured body is moved to the level of the smoothed echoes
-/// that encloses its measured volume.
+/// Finds, labels and measures bodies. `world`: map from the voxels of the grid to the world, for the labels. If the level is not given, the surface
+/// of each measured body is moved to the level of the smoothed echoes that encloses its measured volume.
 ///
 /// # Errors
 /// One line: the echoes are not of two classes, there is no body, the seed is in none, or there is no memory for the labels.

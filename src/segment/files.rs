@@ -36,10 +36,11 @@ pub fn write(labels: &Labels, path: &Path, name: impl Fn(u8) -> String) -> Resul
     segmentation::write(path, labels.grid(), labels.world(), &segments, label, || ())
 }
 
-/// Reads a segmentation: its labels, on the grid on which a volume with the same lattice in the world is drawn, and its segments.
+/// Reads a segmentation: its labels and its segments. The axes of the grid are chosen by the orientation of the file and by `options`, as those of a
+/// recording are.
 ///
 /// # Errors
-/// The file is no volume of one layer of bytes, or cannot be read.
+/// The file is no segmentation, is no volume of one layer of bytes, or cannot be read.
 pub fn read(path: &Path, options: OpenOptions) -> Result<(Labels, Vec<Segment>), InputError> {
     let segments = segmentation::segments(path)?;
     let fault = |why: String| InputError::new(path, "labels", why);
@@ -65,8 +66,8 @@ pub fn read(path: &Path, options: OpenOptions) -> Result<(Labels, Vec<Segment>),
     Ok((Labels::of(grid, world, voxels).map_err(fault)?, segments))
 }
 
-/// The labels as a scene of a volume shows them, in the colours of their segments. `world`: where the volume is, if it says so; otherwise the labels are in
-/// its own coordinates.
+/// The labels as a scene of a volume shows them, in the colours of their segments. `world`: where the volume is, if it says so; otherwise world
+/// coordinates of the labels are taken as coordinates of the volume.
 ///
 /// # Errors
 /// One line: there are none, too many, or all of them are beside the volume.

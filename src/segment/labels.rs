@@ -44,10 +44,10 @@ impl Labels {
         Ok(Labels { grid, world, voxels: vec![0; voxels] })
     }
 
-    /// As [`Labels::new`], with a label for each voxel; x is the fastest axis.
+    /// A grid with these labels, one for each voxel; x is the fastest axis. `world`: map from its voxels to the world.
     ///
     /// # Errors
-    /// As [`Labels::new`], and a number of labels that is not that of the voxels.
+    /// One line: the grid is not valid, or the number of labels is not that of its voxels.
     pub fn of(grid: Grid, world: World, voxels: Vec<u8>) -> Result<Labels, String> {
         match lattice::voxels(&grid)? {
             count if count == voxels.len() => Ok(Labels { grid, world, voxels }),

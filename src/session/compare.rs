@@ -56,8 +56,8 @@ pub fn beside(mut tiles: Vec<(String, Picture)>, size: [u32; 2]) -> Result<Pictu
 #[derive(Clone, Debug, PartialEq)]
 pub struct Difference {
     pub picture: Picture,
-    /// The scale runs from -`end` to `end`, levels of 255: 16, 32, 64, 128 or 255. Of the pixels that are black in neither picture at most 0.2 % differ by
-    /// more.
+    /// The scale runs from -`end` to `end`, levels of 255: 16, 32, 64, 128 or 255. Of the pixels that are black in neither picture at most 1 % differ
+    /// by more.
     pub end: u16,
     /// Root mean square of the difference over all pixels, levels of 255.
     pub rms: f64,

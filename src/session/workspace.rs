@@ -33,14 +33,16 @@ pub struct Origin {
     /// Index of the volume that was shown, from 0.
     #[serde(default)]
     pub volume: usize,
-    /// The segmentation that is shown with it.
+    /// Path of the segmentation that is shown with it; None if none is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub labels: Option<PathBuf>,
     /// Path of the probe file that was given with `--probe`; None if it was not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub probe: Option<PathBuf>,
+    /// Value of `--depth-axis`, such as `-z`; None if it was not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depth_axis: Option<String>,
+    /// Value of `--voxel-spacing`: distance of columns, rows and pictures, mm; None if it was not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub voxel_spacing: Option<[f64; 3]>,
 }
@@ -86,10 +88,10 @@ impl Workspace {
         Workspace::of_text(path, &text)
     }
 
-    /// As [`Workspace::read`], of the text of a workspace that is a part of the file at `path`.
+    /// Reads a workspace from `text`, which may be a part of the file at `path`. Paths in it are relative to the folder of that file.
     ///
     /// # Errors
-    /// As for [`Workspace::read`].
+    /// One line that names the file: the text is no workspace, or has a setting that is not allowed.
     pub fn of_text(path: &Path, text: &str) -> Result<Workspace, String> {
         let fault = |fault: &str| format!("{}: {}", path.display(), printable(fault));
         let line = |e: &toml::de::Error| match e.span() {
@@ -147,7 +149,7 @@ fn belong_to(table: &mut Table, volume: usize) {
 /// The text of a workspace file with all settings.
 ///
 /// # Errors
-/// One line: the settings cannot be written as TOML.
+/// One line: the settings cannot be written as TOML, or the text would be longer than 4 MiB.
 pub fn text(settings: &Settings, origin: &Origin) -> Result<String, String> {
     let fault = |e: &dyn std::fmt::Display| format!("a workspace cannot be written: {e}");
     let head = Table::from_iter([(TABLE.to_string(), Value::try_from(origin).map_err(|e| fault(&e))?)]);

@@ -91,7 +91,7 @@ impl Exporter {
     /// Saves a text in a file with this file name ending. `holds`: what it contains that would be lost otherwise.
     ///
     /// # Errors
-    /// As for [`Exporter::picture`].
+    /// Too many files are being saved, or no thread can be started.
     pub(super) fn text(&mut self, ending: &'static str, text: String, holds: Holds) -> Result<(), String> {
         self.keep(|own| own.save(ending, holds, move |file| files::replace(file, text.as_bytes())))
     }
@@ -104,7 +104,7 @@ impl Exporter {
     /// Saves volumes as a `.frames` recording. `holds`: what it contains that would be lost otherwise.
     ///
     /// # Errors
-    /// As for [`Exporter::picture`].
+    /// Too many files are being saved, or no thread can be started.
     pub(super) fn volumes(&mut self, header: Header, volumes: Vec<CineVolume>, holds: Holds) -> Result<(), String> {
         self.keep(|own| own.save("frames", holds, move |file| write_frames(file, header, &volumes)))
     }
@@ -112,7 +112,7 @@ impl Exporter {
     /// Starts an export. Only one runs at a time.
     ///
     /// # Errors
-    /// Another export is running; and those of [`Exporter::picture`].
+    /// Another export is running, too many files are being saved, or no thread can be started.
     pub(super) fn export(&mut self, job: Job) -> Result<(), String> {
         if let Some(name) = self.exporting() {
             return Err(texts::still_exporting(name));

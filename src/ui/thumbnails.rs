@@ -95,7 +95,8 @@ impl Thumbnails {
         }
     }
 
-    /// Like [`Thumbnails::begin`], but the list is `kept` until its entries are replaced; one that the job does not draw stays.
+    /// Starts to draw the thumbnails of a job, in place of those that are being drawn. The list is `kept` until its entries are replaced; one that
+    /// the job does not draw stays.
     pub(super) fn begin_with(&mut self, job: Job, kept: Vec<Option<Arc<Picture>>>) {
         self.begin(job);
         self.pictures = kept;

@@ -32,7 +32,7 @@ const RECORDING: &str = "volume.frames";
 const BASE: &str = "3";
 
 impl Format {
-    /// True if all volumes of the cine loop are exported, false if only the shown one is.
+    /// True if all volumes between the marks of the cine loop are exported, false if only the shown one is.
     pub(super) fn takes_the_loop(&self) -> bool {
         self.work == Work::Loop
     }
@@ -237,7 +237,7 @@ pub(super) fn write_frames(file: &Path, header: Header, volumes: &[CineVolume]) 
 pub(super) struct Job {
     pub(super) format: Format,
     pub(super) header: Header,
-    /// The shown volume, or all volumes of the cine loop.
+    /// The shown volume, or all volumes between the marks of the cine loop ([`Format::takes_the_loop`]).
     pub(super) volumes: Vec<CineVolume>,
     /// Rate at which the cine loop is played, volumes a second.
     pub(super) rate: f64,

@@ -267,7 +267,7 @@ impl Renderer {
     /// Checks that a slice exists and that a frame has the right size.
     ///
     /// # Errors
-    /// It does not, or it has not.
+    /// The slice does not exist, or the frame has not [`Renderer::frame_bytes`] bytes.
     pub fn check_frame(&self, slice: usize, bytes: &[u8]) -> Result<(), GpuError> {
         let (slices, expected) = (self.program.scene.slices(), self.frame_bytes());
         match (slice < slices as usize, bytes.len() == expected) {
@@ -405,7 +405,8 @@ impl Renderer {
     /// [`Renderer::change`] does.
     ///
     /// # Errors
-    /// A shader does not exist, or disagrees with the declaration of its pass. The previous pipelines stay.
+    /// A shader does not exist, or disagrees with the declaration of its pass: the previous pipelines stay. The device fails, or the last change of
+    /// the scene failed.
     pub fn reload_shaders(&mut self, shaders: &HashSet<String>) -> Result<Rerun, GpuError> {
         if let Some(fault) = &self.broken {
             return Err(GpuError::Broken(fault.clone()));
@@ -473,6 +474,9 @@ impl Renderer {
 
     /// Waits for the device, and returns the times, ns, since the last call of the operations that [`RendererOptions::time_stamps`] selects. Empty if
     /// the device has no time stamps.
+    ///
+    /// # Errors
+    /// The device fails.
     pub fn take_times(&mut self) -> Result<Vec<PassTime>, GpuError> {
         self.collect()?;
         Ok(self.queues.timings.take_times())
@@ -483,12 +487,16 @@ impl Renderer {
         self.queues.timings.take_untimed()
     }
 
-    /// As [`Renderer::take_times`], without waiting for work in flight.
+    /// The times, ns, that were read since the last call of this or of [`Renderer::take_times`]. It does not wait: work in flight appears in a later
+    /// call.
     pub fn times_so_far(&mut self) -> Vec<PassTime> {
         self.queues.timings.take_times()
     }
 
     /// Waits for the device, and returns every span since the last call, ns on the host's clock. Empty without [`RendererOptions::spans`].
+    ///
+    /// # Errors
+    /// The device fails.
     pub fn take_spans(&mut self) -> Result<Vec<Span>, GpuError> {
         self.collect()?;
         Ok(self.queues.timings.take_spans())
@@ -506,7 +514,10 @@ impl Renderer {
         self.queues.timings.clock_deviation()
     }
 
-    /// Runs `work` and returns the names of the passes that it dispatches, in order.
+    /// Runs `work` and returns the names of the passes that it dispatches, in order, one entry for each dispatch.
+    ///
+    /// # Errors
+    /// `work` returns one, or the device fails.
     pub fn dispatched_passes<T>(
         &mut self,
         work: impl FnOnce(&mut Renderer) -> Result<T, GpuError>,
@@ -516,6 +527,9 @@ impl Renderer {
 
     /// Runs `work` and returns the names of the passes that it dispatches, also for frames that it leaves waiting, with their invocations along x, y
     /// and z. With bands there is an entry for each band.
+    ///
+    /// # Errors
+    /// `work` returns one, or the device fails.
     pub fn dispatch_extents<T>(
         &mut self,
         work: impl FnOnce(&mut Renderer) -> Result<T, GpuError>,
@@ -532,7 +546,7 @@ impl Renderer {
         self.skipped
     }
 
-    /// Number of barriers that were recorded so far.
+    /// Number of barriers that were needed so far. One that [`Renderer::drop_barrier`] leaves out counts too.
     pub fn barriers(&self) -> u32 {
         self.queues.count
     }

@@ -78,7 +78,7 @@ pub struct Screen {
 }
 
 impl Screen {
-    /// `size`: width and height of the window, pixels; ignored for a monitor.
+    /// Makes a screen on `target`. `size`: width and height of the window, pixels; ignored for a monitor.
     ///
     /// # Errors
     /// The device cannot present on the target.
@@ -121,7 +121,7 @@ impl Screen {
         Ok(screen)
     }
 
-    /// Size of the last presented image, pixels.
+    /// Width and height of the images that are presented, pixels; 0 before the first.
     pub fn size(&self) -> [u32; 2] {
         self.chain.size
     }
@@ -154,15 +154,16 @@ impl Screen {
     /// Presents a picture and panels over it. If the picture is in flight, the device waits for it.
     ///
     /// # Errors
-    /// As of [`Screen::show`].
+    /// The device fails, or a lost surface cannot be recreated.
     pub(crate) fn show_picture(&mut self, drawn: Drawn, panels: Option<Panels>) -> Result<PresentOutcome, GpuError> {
         self.show_with(Content::Picture(drawn), panels)
     }
 
-    /// Presents the picture of which a copy was kept, if there is one, with its upper left corner at pixel `at` of the window, and panels over it.
+    /// Presents the picture of which a copy was kept ([`Drawn::is_kept`]), with its upper left corner at pixel `at` of the window, and panels over
+    /// it; without a copy only the panels.
     ///
     /// # Errors
-    /// As of [`Screen::show`].
+    /// The device fails, or a lost surface cannot be recreated.
     pub fn show_kept(&mut self, at: [u32; 2], panels: Option<Panels>) -> Result<PresentOutcome, GpuError> {
         self.show_with(Content::Kept(at), panels)
     }

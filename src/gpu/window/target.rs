@@ -103,11 +103,11 @@ impl Target {
 /// Which monitor to present on, and in which display mode.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MonitorChoice {
-    /// A part of the monitor's name, ignoring case; `None` for the first monitor.
+    /// A part of the monitor's name, ignoring case; the first monitor that has it and any mode is used. `None` for the first monitor.
     pub monitor: Option<String>,
-    /// Resolution, pixels; `None` for the monitor's native one.
+    /// Width and height, pixels, which a mode must have. `None` for the monitor's native resolution, or the largest mode if none has that.
     pub size: Option<[u32; 2]>,
-    /// Refresh rate, Hz; `None` for the highest one at that resolution.
+    /// Refresh rate, Hz, to which the nearest at that resolution is used; `None` for the highest one.
     pub refresh: Option<f64>,
 }
 

@@ -78,7 +78,7 @@ impl Bundle {
         value_of(Some("files"), "log").map_or(config::DEFAULT_LOG.into(), |log| folder.join(log))
     }
 
-    /// Adds a file of this name with `text`, which is redacted and cut at 1 MiB. `description`: its line in the README.
+    /// Adds a file of this name with `text`, which is cut at 2^20 characters and redacted. `description`: its line in the README.
     pub fn add(&mut self, name: &str, description: &str, text: &str) {
         let end = text.char_indices().nth(MAX_ENTRY).map_or(text.len(), |(end, _)| end);
         self.add_entry(name, description, &text[..end]);

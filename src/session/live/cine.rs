@@ -75,7 +75,7 @@ impl Cine {
         self.filling = None;
     }
 
-    /// Adds a frame. Returns true if it completes a volume.
+    /// Adds a frame. Returns true if it completes a volume. A frame with another volume number discards the volume that is incomplete.
     pub fn frame(&mut self, frame: Frame) -> bool {
         if self.limits.volumes == 0 || frame.slice >= self.slices {
             return false;

@@ -176,7 +176,8 @@ impl Feed {
         Feed { shared: Arc::default(), can_wait: true, is_recording: false, thread: None }
     }
 
-    /// As [`Feed::new`]. `wake` is called after each event.
+    /// Reads a source and records it as [`Feed::new`] does. `wake` is called after each event, and when the connection to the source is lost or
+    /// found.
     ///
     /// # Errors
     /// The thread cannot be started.
@@ -184,7 +185,7 @@ impl Feed {
         Feed::observed(source, record, wake, None)
     }
 
-    /// As [`Feed::waking`]. `observer` sees every event before it is queued, on the thread of the source.
+    /// Reads a source as [`Feed::waking`] does. `observer` is called with every event before it is queued, on the thread of the source.
     ///
     /// # Errors
     /// The thread cannot be started.
@@ -237,7 +238,8 @@ impl Feed {
         self.shared.lock().disconnected.clone()
     }
 
-    /// True if a complete volume newer than `volume` has arrived and the source cannot wait. Then `volume` need not be drawn.
+    /// True if the source cannot wait and the volume after `volume` is over too, because a frame of a still newer one has arrived. Then `volume` need
+    /// not be drawn.
     pub fn is_behind(&self, volume: u32) -> bool {
         !self.can_wait && self.shared.lock().newest.is_some_and(|newest| newest > volume.saturating_add(1))
     }

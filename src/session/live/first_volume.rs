@@ -39,7 +39,8 @@ impl FirstVolume {
         Some(self.defaults(header, None))
     }
 
-    /// The value that [`FirstVolume::begin`] would return for this header.
+    /// What the default settings for this header are derived from before any frame has arrived. None if the header is the previous one. Unlike
+    /// [`FirstVolume::begin`] it notes nothing.
     pub(crate) fn at_begin(&self, header: &Header) -> Option<Defaults> {
         (self.header.as_ref() != Some(header)).then(|| self.defaults(header, None))
     }

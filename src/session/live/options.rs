@@ -25,13 +25,14 @@ pub struct StreamOptions {
     pub wake: Option<Wake>,
     /// Which operations are timed on the device. With [`TimeStamps::EachPass`] passes do not overlap, so that pictures take longer.
     pub time_stamps: TimeStamps,
-    /// Folder of shaders that are used in place of the embedded ones. Changed shaders are loaded again between two pictures.
+    /// Folder of shaders that are used in place of the embedded ones. Changed shaders are loaded again between two pictures. None: the embedded ones
+    /// are used.
     pub shaders: Option<Arc<ShaderFolder>>,
     /// The settings that the user chose. All others are derived from the geometry and the first complete volume. None: the settings given to the
     /// stream are complete, and nothing is derived.
     pub chosen: Option<Layers>,
-    /// A function that gives settings of lower quality for a scene at full quality. One result of stage 1 serves all of them, so that no frame
-    /// is sent again when the quality changes.
+    /// A function that gives settings of lower quality for a scene at full quality. One result of stage 1 serves all of them, so that no frame is
+    /// sent again when the quality changes. None: a change of quality may need the frames again.
     pub lowered: Option<Lowered>,
     /// Compile the pipelines of the first geometry in the background, if `wake` is given. Meanwhile [`Stream::step`](super::Stream::step)
     /// returns at once.

@@ -15,7 +15,7 @@ pub(super) enum Phase {
     /// Take this number of queued events before the next picture begins. Used with rolling volumes and sources that do not wait: a picture after
     /// the first event would show a state that the others already replace.
     Draining { events: usize, replay: Option<Replay> },
-    /// As `Idle`, but a volume of the cine loop is being sent to the device. Events wait until that is done.
+    /// Begin a picture if anything changed, otherwise send frames of a volume of the cine loop to the device. Events wait until all are sent.
     Replaying(Replay),
 }
 

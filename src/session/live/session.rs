@@ -24,7 +24,8 @@ pub struct FinishedPicture {
     pub volume: u32,
     /// The pixels. None if pictures stay on the device ([`StreamOptions::readback`](super::StreamOptions::readback)).
     pub picture: Option<Picture>,
-    /// Time from the arrival of the newest frame that no earlier picture shows to the completion of the picture.
+    /// Time from the arrival of the newest frame that no earlier picture shows to the completion of the picture; 0 if earlier pictures show all
+    /// frames.
     pub latency: Duration,
     /// Time from the start of the drawing to the completion of the picture.
     pub took: Duration,
@@ -265,12 +266,12 @@ impl Session {
         }
     }
 
-    /// Number of the volume on display, or of the one that will be displayed next.
+    /// Number of the volume that will be displayed next, or else of the one on display; None if there is neither.
     pub(crate) fn current_volume(&self) -> Option<u32> {
         self.pool.waiting().or(self.display.volume()).or(self.to_restore)
     }
 
-    /// Number of the volume of the last picture, even if that is still being drawn.
+    /// Number of the volume of the last picture, even if that is still being drawn; None before the first.
     pub(crate) fn drawn_volume(&self) -> Option<u32> {
         self.drawn
     }

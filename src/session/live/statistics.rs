@@ -86,7 +86,7 @@ impl Statistics {
         self.latencies.reset();
     }
 
-    /// Quantile of the latencies at `share` (0..=1), ms.
+    /// Quantile of the latencies at `share` (0..=1), ms; 0 if there is none.
     pub fn latency_ms(&self, share: f64) -> f64 {
         self.latency.value_at_quantile(share) as f64 / 1e3
     }

@@ -19,7 +19,7 @@ pub enum Update {
 pub struct VolumeCounts {
     /// Number of volumes that were shown; of rolling ones those that were complete.
     pub shown: u64,
-    /// Number of complete volumes that were not shown, because a newer one replaced them or no volume image was free.
+    /// Number of volumes that were not shown, because a newer one replaced them, no volume image was free, or newer ones had arrived already.
     pub dropped: u64,
     /// Number of volumes that ended with frames missing.
     pub incomplete: u64,

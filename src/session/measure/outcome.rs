@@ -90,7 +90,8 @@ pub fn quantities(measured: &Measurement) -> Result<Vec<Quantity>, &'static str>
     })
 }
 
-/// The label of a measurement on the picture: its number, its text and its first quantity. Texts and arrows have only their text.
+/// The label of a measurement on the picture: its number (in the list, from 1), its text and its first quantity, or `-` without a result. Texts and
+/// arrows have only their text.
 pub fn label(number: usize, measured: &Measurement) -> String {
     if matches!(measured.kind, MeasureKind::Text | MeasureKind::Arrow) {
         return measured.text.clone();
@@ -114,7 +115,8 @@ pub fn csv(all: &[Measurement], recording: &str) -> String {
     csv_with(all, recording, "", |_| String::new())
 }
 
-/// As [`csv`], with further columns: their names, and their values for the measurement of a number, each behind a comma.
+/// The results as CSV as [`csv`] writes them, with further columns: their names, and their values for the measurement with a number (from 1), each
+/// behind a comma.
 pub(crate) fn csv_with(all: &[Measurement], recording: &str, names: &str, more: impl Fn(usize) -> String) -> String {
     const COLUMNS: &str = "number,measurement,text,quantity,value,unit,recording,volume,time,plane,settings";
     let mut text = format!("{COLUMNS}{names}\n");

@@ -20,9 +20,10 @@ pub struct Drawn {
     pub index: usize,
     /// The tile on which it is drawn: upper left corner, and width and height.
     pub tile: [[f64; 2]; 2],
-    /// The lines to draw, each as a list of points; none is closed.
+    /// The lines to draw, each as a list of points. A closed line repeats its first point at the end.
     pub lines: Vec<Vec<[f64; 2]>>,
-    /// The points that the user set: the index of each in the measurement, and its position, where a cross is drawn and it can be dragged.
+    /// The points that the user set: the index of each in the measurement, and its position, where a cross is drawn and it can be dragged. Of a path
+    /// along a surface both ends, with the indices 0 and 1; they cannot be dragged.
     pub points: Vec<(usize, [f64; 2])>,
     /// The tip of an arrow's head, and a point on its shaft, from which the direction follows; None if it is no arrow.
     pub head: Option<[[f64; 2]; 2]>,
@@ -117,7 +118,8 @@ pub fn spacing_label(tiling: &Tiling) -> String {
     }
 }
 
-/// The two lines of an arrow's head, each `length` pixels long. The first argument is the tip and a point on the shaft.
+/// The two lines of an arrow's head; `length`: its extent along the shaft, pixels. The first argument is the tip and a point on the shaft. Empty if
+/// both are the same.
 pub fn arrow_head([tip, tail]: [[f64; 2]; 2], length: f64) -> Vec<[[f64; 2]; 2]> {
     let (x, y) = (tail[0] - tip[0], tail[1] - tip[1]);
     let shaft = x.hypot(y);

@@ -11,7 +11,7 @@ use std::rc::Rc;
 
 const STYLE: &str = include_str!("style.css");
 
-/// The page. `pictures`: one of each measurement, in their order.
+/// The text of the page. `pictures`: one of each measurement, in their order.
 ///
 /// # Errors
 /// One line: a picture cannot be encoded.

@@ -30,7 +30,7 @@ pub struct Sheet {
     pub echolume_worksheet: u32,
     /// Version of the program that wrote it.
     pub program: String,
-    /// When the pictures were drawn first.
+    /// When the pictures were drawn first, such as `2026-11-23 20:00:00 UTC`.
     pub date: String,
     /// Name and driver of the device that drew them.
     pub device: String,
@@ -68,15 +68,15 @@ pub struct Entry {
     /// They are written for others: what is read is computed again.
     #[serde(skip_deserializing)]
     pub quantities: Vec<Quantity>,
-    /// How a volume follows from its contours or voxels.
+    /// How a volume follows from its contours or voxels, or why the measurement has no result; None for others.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub method: Option<String>,
-    /// The interval of a volume.
+    /// What is stated of the confidence interval of a volume; None for other measurements.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub interval: Option<String>,
     /// Number of its volume, from 0.
     pub volume: u32,
-    /// Time stamp of that volume, s.
+    /// Time stamp of that volume, s; None if it has none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time: Option<f64>,
     /// The plane or the view that it was made on; empty if that is not known.
@@ -116,7 +116,8 @@ impl Block {
         !matches!(measured.kind, MeasureKind::Text | MeasureKind::Arrow)
     }
 
-    /// The block of the measurement with this index. `scene`: that of the workspace for this volume. `set`: how its view differs, if that is known.
+    /// The block of the measurement with this index. `scene`: that of the workspace for this volume. `set`: how its view differs, as in
+    /// [`Shown::set`]; None: a view that shows the measurement is searched for.
     ///
     /// # Errors
     /// One line: a view that is not allowed.
@@ -268,7 +269,8 @@ impl Sheet {
         serde_json::to_string_pretty(self).map(|text| text + "\n").map_err(|e| e.to_string())
     }
 
-    /// A line for each quantity, as the viewer saves results, with digests, the program's version and the device.
+    /// The results as CSV, a line for each quantity: the columns that the viewer saves, and digests, the program's version and the device.
+    /// `settings`: those of the workspace, with the measurements.
     pub fn csv(&self, settings: &Settings) -> String {
         let mut all = settings.measure.clone();
         for entry in &self.measurements {

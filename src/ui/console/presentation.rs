@@ -93,7 +93,7 @@ impl Presentation {
         self.redraw();
     }
 
-    /// Sets the size of the window, pixels; 0 while it is minimised. Returns false if it did not change.
+    /// Sets the size of the window, pixels; 0 while it is minimised. Returns false if it is minimised; the size before that is then kept.
     pub(super) fn resize(&mut self, size: [u32; 2]) -> bool {
         if let Some(screen) = &mut self.screen {
             screen.resize(size);

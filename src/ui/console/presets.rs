@@ -346,7 +346,7 @@ impl Presets {
         self.thumbnails.begin(job);
     }
 
-    /// Time at which thumbnails have to be checked again; None if no list is on display and none are being drawn.
+    /// Time at which thumbnails have to be checked again, because they are being drawn or the user will then have paused; None if none is due.
     pub(super) fn due(&self, acted: Instant, now: Instant) -> Option<Instant> {
         let at = if self.thumbnails.is_working() { Duration::from_millis(50) } else { REST };
         let is_waiting = self.thumbnails.is_working() || (self.is_shown && self.made_of.is_none());

@@ -81,7 +81,7 @@ fn kind_button(
     }
 }
 
-/// Shows the list of results, `width` points wide; nothing if there are none.
+/// Shows the list of results, `width` points wide, or a line that says that there are none.
 pub(super) fn show_results(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
     let measures = state.controls.measures();
     let is_measuring = matches!(state.controls.tool(), Tool::Measure(_));

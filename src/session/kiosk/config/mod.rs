@@ -264,7 +264,8 @@ impl Config {
         Config::parse(&text, path)
     }
 
-    /// Parses the text of a configuration, and checks everything that needs no source and no device. `path`: that of its file, for messages.
+    /// Parses the text of a configuration, and checks everything that needs no source and no device. `path`: that of its file, for messages and for
+    /// the paths in it, which are relative to its folder.
     ///
     /// # Errors
     /// One line that names the file, the line, the key and the allowed values.
@@ -289,7 +290,7 @@ impl Config {
     /// the settings in `scene`.
     ///
     /// # Errors
-    /// As for a scene file.
+    /// A preset is not known, or a setting or a file that `scene` names is wrong.
     pub fn layers(&self) -> Result<Layers, LoadError> {
         let mut layers = Layers::default();
         if self.source == PHANTOM {
@@ -469,7 +470,7 @@ fn flag(key: &str) -> String {
 }
 
 impl Config {
-    /// The arguments of `echolume stream` that select the source of this configuration, each as one word `--flag=value`.
+    /// The arguments of `echolume stream` that select the source of this configuration, each as one word: `--flag=value`, or `--flag` for a switch.
     pub fn source_arguments(&self) -> Vec<String> {
         let path = |path: &Path| path.to_string_lossy().into_owned();
         let clip = self.clip.map(|clip| clip.map(|n| n.to_string()).join(","));

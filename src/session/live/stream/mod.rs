@@ -529,10 +529,10 @@ impl Stream {
         self.change_to(settings, None)
     }
 
-    /// As [`Stream::change`], for settings of lower quality that temporarily replace `full`.
+    /// Changes the settings as [`Stream::change`] does, to ones of lower quality that temporarily replace `full`, those at full quality.
     ///
     /// # Errors
-    /// As for [`Stream::change`].
+    /// The geometry cannot be drawn with the settings; the previous ones remain.
     pub fn lower(&mut self, settings: Settings, full: Settings) -> Result<(), StreamError> {
         self.change_to(settings, Some(full))
     }

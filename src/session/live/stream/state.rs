@@ -59,17 +59,18 @@ impl Stream {
         self.context.counts.dispatches.load(Ordering::Relaxed)
     }
 
-    /// Time for which the device has been busy without finishing anything; 0 if it is idle. None before the first frame.
+    /// Time for which the device has been busy without finishing anything; 0 if it is idle. None before the first geometry has begun.
     pub fn device_busy_for(&self) -> Option<Duration> {
         self.session.as_ref().map(|session| session.renderer.busy_for())
     }
 
-    /// Time at which the last picture was begun; None before the first frame.
+    /// Time at which the last picture was begun, or the geometry if it has no picture yet. None before the first geometry has begun.
     pub fn last_begun(&self) -> Option<Instant> {
         self.session.as_ref().map(|session| session.begun)
     }
 
-    /// Statistics since the stream was created. Latencies and times of passes are those since statistics were last taken.
+    /// Statistics since the stream was created. But latencies are those since the last [`Stream::take_statistics`], and times of passes and the
+    /// number of untimed ones those since the last call of either.
     pub fn statistics(&mut self) -> Result<Statistics, StreamError> {
         self.statistics.time = self.began.elapsed();
         let FeedCounts { lost, unrecorded, disconnected, .. } = self.feed_counts();
@@ -90,7 +91,8 @@ impl Stream {
         Ok(since)
     }
 
-    /// As [`Stream::take_statistics`], after waiting for all work of the device: every pass of every frame is timed or counted as not timed.
+    /// Waits for all work of the device, and returns the statistics since the last [`Stream::take_statistics`] or call of this: every pass of every
+    /// frame is timed or counted as not timed.
     ///
     /// # Errors
     /// The device fails.
@@ -137,12 +139,12 @@ impl Stream {
         self.earlier_feeds.plus(self.feed.counts())
     }
 
-    /// Time that sound needs for a volume, s. None before the first frame, and for Cartesian volumes.
+    /// Time that sound needs for a volume, s. None before the first geometry has begun, and for Cartesian volumes.
     pub fn acquisition_time(&self) -> Option<f64> {
         self.session.as_ref()?.views.first().probe().map(|probe| probe.acquisition_time())
     }
 
-    /// The scene that is drawn; None before the first frame.
+    /// The scene that is drawn; None before the first geometry has begun.
     pub fn scene(&self) -> Option<&Scene> {
         self.session.as_ref().map(|session| session.renderer.scene())
     }
@@ -152,7 +154,7 @@ impl Stream {
         self.session.as_ref().and_then(Session::drawn_volume)
     }
 
-    /// The renderer, for reading pictures and volumes back; None before the first frame.
+    /// The renderer, for reading pictures and volumes back; None before the first geometry has begun.
     pub fn renderer(&mut self) -> Option<&mut Renderer> {
         self.session.as_mut().map(|session| &mut session.renderer)
     }

@@ -33,7 +33,7 @@ const INK: Colour = [0.10, 0.12, 0.14];
 const DIM: Colour = [0.36, 0.41, 0.43];
 const RULE: Colour = [0.84, 0.86, 0.87];
 
-/// The file. `pictures`: one of each measurement, in their order.
+/// The bytes of the file. `pictures`: one of each measurement, in their order.
 ///
 /// # Errors
 /// One line: the typeface that is built in cannot be read.
