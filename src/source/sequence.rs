@@ -59,7 +59,7 @@ impl Sequence {
         if header.len() > MAX_HEADER_BYTES {
             return Err(fault(
                 "time stamps",
-                format!("make a header of {} bytes, at most 1 MiB is read", header.len()),
+                format!("make a header of {} bytes, at most {MAX_HEADER_BYTES} are written", header.len()),
             ));
         }
         Ok(Sequence { kept, left_out, frames, header, probe: text })

@@ -218,7 +218,7 @@ impl PassSummary {
             return;
         }
         let what = match &of.worst {
-            Some(worst) => format!("{} texels of {} beyond tolerance", worst.beyond, worst.texels),
+            Some(worst) => format!("{} of {} values beyond tolerance", worst.beyond, worst.texels),
             None => format!("errors go one way: their mean is {:.2} of what is allowed of each", of.bias),
         };
         if let Some(worst) = &of.worst {

@@ -93,7 +93,7 @@ fn slot_difference(slot: Slot, zeros: &Texels, poisoned: [&Texels; 2], scene: &S
             expected: *zero,
             got: other,
             beyond: 0,
-            texels: zeros.values.len() / zeros.channels,
+            texels: zeros.values.len(),
         });
     }
     apart

@@ -78,10 +78,12 @@ impl Bundle {
         value_of(Some("files"), "log").map_or(config::DEFAULT_LOG.into(), |log| folder.join(log))
     }
 
-    /// Adds a file of this name with `text`, which is cut at 2^20 characters and redacted. `description`: its line in the README.
+    /// Adds a file of this name with `text`, which is redacted and then cut at 2^20 characters: a private name at the cut is recognised. `description`:
+    /// its line in the README.
     pub fn add(&mut self, name: &str, description: &str, text: &str) {
-        let end = text.char_indices().nth(MAX_ENTRY).map_or(text.len(), |(end, _)| end);
-        self.add_entry(name, description, &text[..end]);
+        let mut text = self.redactor.redact(text);
+        text.truncate(text.char_indices().nth(MAX_ENTRY).map_or(text.len(), |(end, _)| end));
+        self.entries.push(Entry { name: name.into(), description: description.into(), text });
     }
 
     fn add_entry(&mut self, name: &str, description: &str, text: &str) {
@@ -266,6 +268,16 @@ mod tests {
         assert_eq!(tail(&path, 8).expect("read"), (b"three\n".to_vec(), true));
         assert_eq!(tail(&path, 3).expect("read"), (Vec::new(), true));
         std::fs::remove_file(&path).expect("remove");
+    }
+
+    #[test]
+    fn a_private_name_where_a_text_is_cut_is_redacted() {
+        let mut bundle = Bundle { redactor: Redactor::new(), entries: Vec::new(), notes: Vec::new() };
+        bundle.redactor.add_recording(Path::new("/data/Eleonora.mha"));
+        let text = format!("{}Eleonora\n", "0\n".repeat(MAX_ENTRY / 2 - 2));
+        bundle.add("long.txt", "a text", &text);
+        let kept = &bundle.entries[0].text;
+        assert!(kept.len() <= MAX_ENTRY && !kept.contains("El"), "{}", &kept[kept.len() - 20..]);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! A connection on a thread of its own, which reconnects, and the queue that the thread fills.
 
-use super::begun::Begun;
+use super::begun::{Begun, longest};
 use super::codec::{BODY_LIMIT, DecodeError, Decoded, decode_with};
 use super::message::Message;
 use crate::files::escaped;
@@ -25,8 +25,6 @@ const STOP: Duration = Duration::from_secs(1);
 const MAX_KEPT_BYTES: usize = 16 << 20;
 /// Most addresses of one name that are tried.
 const MAX_ADDRESSES: usize = 8;
-/// The least rate of a message that is longer than its time-out allows at this rate, bytes a second.
-const LEAST_RATE: f64 = 1e6;
 /// Longest description of an error, characters.
 const MAX_ERROR_CHARACTERS: usize = 600;
 
@@ -319,7 +317,7 @@ impl Shared {
             if state.stop {
                 return ConnectionEnd { why: "stopped".into(), useful };
             }
-            let most = options.message_timeout + Duration::from_secs_f64(length as f64 / LEAST_RATE);
+            let most = longest(options.message_timeout, length);
             let is_late = begun.is_late(!bytes.is_empty(), Instant::now(), most);
             let why = match read {
                 _ if came > 0 && came == missing => None,

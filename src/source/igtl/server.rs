@@ -1,7 +1,7 @@
 //! A server on threads of its own. It sends each message to all connected clients. If a client is slow, the oldest messages of its own
 //! queue are dropped.
 
-use super::begun::Begun;
+use super::begun::{Begun, longest};
 use super::codec::{self, BODY_LIMIT, DecodeError, Decoded, MessageError, Version, decode, encode};
 use super::message::{Message, Status, Text};
 use std::collections::{BTreeMap, VecDeque};
@@ -34,7 +34,8 @@ pub struct ServerOptions {
     pub queue_bytes: usize,
     /// Longest time in which a client reads nothing of a message that is being sent to it; after it the client is disconnected.
     pub stall_timeout: Duration,
-    /// Longest time from the first byte of a message of a client, such as a query, to its last; after it the client is disconnected.
+    /// Longest time from the first byte of a message of a client, such as a query, to its last; after it the client is disconnected. A message to a
+    /// client may take a second more for each megabyte.
     pub message_timeout: Duration,
     /// Longest time that dropping the server waits until its last messages are sent.
     pub last: Duration,
@@ -333,7 +334,8 @@ impl Shared {
                 }
             };
             drop(state);
-            let (mut rest, mut moved) = (&packet.bytes[..], Instant::now());
+            let (begun, most) = (Instant::now(), longest(self.options.message_timeout, packet.bytes.len()));
+            let (mut rest, mut moved) = (&packet.bytes[..], begun);
             while !rest.is_empty() {
                 match stream.write(rest) {
                     Ok(0) => return "it is closed".into(),
@@ -349,6 +351,10 @@ impl Shared {
                 if moved.elapsed() > self.options.stall_timeout {
                     state.statistics.disconnected += 1;
                     return format!("it read nothing for {} ms", self.options.stall_timeout.as_millis());
+                }
+                if !rest.is_empty() && begun.elapsed() > most {
+                    state.statistics.disconnected += 1;
+                    return format!("it did not read a message within {} ms", most.as_millis());
                 }
             }
             self.lock().statistics.sent += 1;

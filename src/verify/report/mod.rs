@@ -411,7 +411,7 @@ fn outcome_fault(outcome: &Outcome) -> Option<String> {
     };
     let worst = |worst: &Worst| {
         let Worst { beyond, texels, .. } = worst;
-        (beyond > texels).then(|| format!("{beyond} texels beyond their tolerance, of {texels}"))
+        (beyond > texels).then(|| format!("{beyond} values beyond their tolerance, of {texels}"))
     };
     seconds
         .or_else(|| outcome.figures.iter().find_map(figure))
@@ -563,7 +563,7 @@ fn place(worst: &Worst) -> String {
 
 fn beyond(worst: &Worst) -> String {
     let share = 100.0 * worst.beyond as f64 / worst.texels.max(1) as f64;
-    format!("{} of {} texels ({} %)", worst.beyond, worst.texels, number(share))
+    format!("{} of {} values ({} %)", worst.beyond, worst.texels, number(share))
 }
 
 /// The last line of a run, without line break.

@@ -95,6 +95,21 @@ fn a_dead_client_stalls_nobody() {
     drop(dead);
 }
 
+/// A client that reads a little again and again does not keep its place for ever: each message to it has a time, too.
+#[test]
+fn a_message_that_is_not_read_to_its_end_costs_the_client_its_place() {
+    let (long, short) = (Duration::from_secs(600), Duration::from_millis(200));
+    let server = server(ServerOptions { stall_timeout: long, message_timeout: short, ..ServerOptions::default() });
+    let mut slow = by_hand(&server);
+    // More than the buffers of a connection hold.
+    server.send(&Message::Image(image(1.0, [256, 256, 100]))).expect("an image");
+    until("it is given up", || {
+        let _ = slow.read(&mut [0; 16]);
+        (server.statistics().clients == 0).then_some(())
+    });
+    assert_eq!(server.statistics().disconnected, 1);
+}
+
 /// A client that sends a byte again and again, and never a whole message, does not keep its place; one that sends nothing does.
 #[test]
 fn a_message_without_an_end_costs_the_client_its_place() {

@@ -21,7 +21,7 @@ fn a_failure_is_reported_in_full() {
     worst pixel: at (12, 34, 0) of picture, channel 2
     expected: 0.5
     got: NaN
-    beyond tolerance: 17 of 4096 texels (0.415 %)
+    beyond tolerance: 17 of 4096 values (0.415 %)
     files: fail/actual.png, fail/expected.png, fail/difference.png
   largest error: 2.0004 of 2 levels
   without validation
