@@ -173,6 +173,13 @@ impl SourceArgs {
         show_labels(layers, file, &source.geometry(0), source.world_of(0))
     }
 
+    /// Where the first volume of a recording is, if its file says so.
+    #[cfg(feature = "view")]
+    pub fn world(&self) -> Option<crate::probe::World> {
+        let recording = (self.kind() == SourceKind::Recording).then_some(self.path())?;
+        open_recording(recording, self.geometry.options()).ok()?.world_of(0)
+    }
+
     /// True if the recording is played only once, so that volume numbers are those of the recording.
     #[cfg(feature = "view")]
     pub fn plays_once(&self) -> bool {

@@ -6,8 +6,8 @@ use crate::files::replace;
 use crate::mesh::files::{Colours, MeshFile};
 use crate::probe::{Geometry, Grid, World};
 use crate::scene::depth_offset;
-use crate::segment::bodies::{Body, Found, Search, find};
-use crate::segment::{Field, Scale, files};
+use crate::segment::bodies::{Body, Found, OPENING, SMOOTHING, Search, find};
+use crate::segment::{Field, Scale, files, usual_grid};
 use crate::source::segmentation;
 use crate::terminal::{Failure, failed, input, progress_bar, remark, say};
 use glam::DVec3;
@@ -39,7 +39,7 @@ pub struct Segment {
     #[arg(long, value_name = "L,D,E", value_parser = place, allow_hyphen_values = true)]
     seed: Option<DVec3>,
     /// Standard deviation of the Gaussian that smooths the echoes first, mm
-    #[arg(long, value_name = "MM", default_value_t = 1.2, allow_negative_numbers = true)]
+    #[arg(long, value_name = "MM", default_value_t = SMOOTHING, allow_negative_numbers = true)]
     smooth: f64,
     /// Cut necks that a ball of this radius does not pass, mm [default: 0, with --seed 1]
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
@@ -69,10 +69,6 @@ pub struct Segment {
     geometry: GeometryArgs,
 }
 
-/// Voxel spacing of a sweep, mm: finer than its beam.
-const SPACING: f64 = 0.5;
-/// Opening with a seed, mm: what speckle leaves open in a wall is thinner.
-const OPENING: f64 = 1.0;
 /// Widest smoothing, voxels: its slices are kept in memory.
 const MAX_DEVIATION: f64 = 32.0;
 /// Colour of a mesh.
@@ -168,8 +164,10 @@ impl Segment {
 
     /// The lattice: that of the volume, or of the spacing, within the box.
     fn grid(&self, geometry: &Geometry) -> Result<Grid, Failure> {
-        let usual = matches!(geometry, Geometry::Sweep(_)).then_some(SPACING);
-        let mut grid = target_grid(geometry, self.spacing.or(usual))?;
+        let mut grid = match self.spacing {
+            None => usual_grid(geometry).map_err(input)?,
+            spacing => target_grid(geometry, spacing)?,
+        };
         let Some(text) = &self.within else { return Ok(grid) };
         let fault = |why: &str| input(format!("--box {text}: {why}"));
         let face = [0.0, depth_offset(geometry), 0.0];

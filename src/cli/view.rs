@@ -305,7 +305,7 @@ impl View {
         if let Some(file) = &labels {
             source.show_labels(&mut layers, file)?;
         }
-        let mut origin = source.origin();
+        let (mut origin, placed) = (source.origin(), source.clone());
         origin.labels = labels.map(|file| std::path::absolute(&file).unwrap_or(file));
         let options = ConsoleOptions {
             settings: layers.clone().finish().map_err(input)?,
@@ -318,7 +318,11 @@ impl View {
             },
             origin: Some(origin),
             plays_once: source.plays_once(),
-            opening: OpeningOptions { recent: recent_list().filter(|_| !self.kiosk), ..OpeningOptions::default() },
+            opening: OpeningOptions {
+                recent: recent_list().filter(|_| !self.kiosk),
+                world: Some(Arc::new(move || placed.world())),
+                ..OpeningOptions::default()
+            },
             first_steps: first_steps().filter(|_| !self.kiosk && !self.no_ui && !self.no_panels),
             presets: presets_file().filter(|_| !self.kiosk),
             budget: self.budget()?,

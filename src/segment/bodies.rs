@@ -18,6 +18,10 @@ const MAX_SAMPLES: usize = 1 << 21;
 /// Bins of the histogram of the first threshold.
 const BINS: usize = 512;
 
+/// The usual smoothing, and the opening with a seed, mm: what speckle leaves open in a wall is thinner.
+pub const SMOOTHING: f64 = 1.2;
+pub const OPENING: f64 = 1.0;
+
 /// How connected bodies, such as cysts or follicles, are searched for in the echoes of a volume.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Search {

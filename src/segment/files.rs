@@ -28,12 +28,23 @@ const BINS: usize = 1024;
 /// The file cannot be written. A file that exists is complete.
 pub fn write(labels: &Labels, path: &Path, name: impl Fn(u8) -> String) -> Result<(), InputError> {
     let there: BTreeSet<u8> = labels.voxels().iter().copied().filter(|label| *label > 0).collect();
-    let colour = |label: u8| COLOURS[(usize::from(label) - 1) % COLOURS.len()];
-    let segment = |label: &u8| Segment { label: *label, name: name(*label).into(), colour: colour(*label) };
-    let segments: Vec<Segment> = there.iter().map(segment).collect();
+    let segments: Vec<Segment> = there.into_iter().map(|label| segment(label, name(label))).collect();
+    write_segments(labels, path, &segments)
+}
+
+/// A segment with this name and the colour that its label has in [`write`].
+pub fn segment(label: u8, name: String) -> Segment {
+    Segment { label, name: name.into(), colour: COLOURS[(usize::from(label) + COLOURS.len() - 1) % COLOURS.len()] }
+}
+
+/// As [`write`], with these segments.
+///
+/// # Errors
+/// As for [`write`].
+pub fn write_segments(labels: &Labels, path: &Path, segments: &[Segment]) -> Result<(), InputError> {
     let [width, height, _] = labels.grid().size;
     let label = |[x, y, z]: [usize; 3]| labels.voxels()[(z * height + y) * width + x];
-    segmentation::write(path, labels.grid(), labels.world(), &segments, label, || ())
+    segmentation::write(path, labels.grid(), labels.world(), segments, label, || ())
 }
 
 /// Reads a segmentation: its labels and its segments. The axes of the grid are chosen by the orientation of the file and by `options`, as those of a
@@ -77,17 +88,24 @@ pub fn shown(
     geometry: &Geometry,
     world: Option<World>,
 ) -> Result<LabelVolume, String> {
-    let own = labels.world();
-    let to_world = DAffine3::from_cols(own.axis(0), own.axis(1), own.axis(2), own.origin());
-    let to_space = match (geometry, world) {
-        (Geometry::Cartesian(grid), Some(world)) => world.pose(grid).inverse() * to_world,
-        _ => to_world,
-    };
-    let colour = |label: u8| segments.iter().find(|segment| segment.label == label).map(|segment| segment.colour);
+    let (colour, to_space) = (
+        |label: u8| segments.iter().find(|segment| segment.label == label).map(|segment| segment.colour),
+        to_space(labels, geometry, world),
+    );
     let volume = LabelVolume::new(labels.grid().size, labels.voxels(), to_space, colour)?;
     match volume.overlaps(geometry) {
         true => Ok(volume),
         false => Err("are beside the volume: they belong to another recording, or to other coordinates".into()),
+    }
+}
+
+/// The map from the index of a voxel of the labels to its place in a volume, mm. `world`: as for [`shown`].
+pub fn to_space(labels: &Labels, geometry: &Geometry, world: Option<World>) -> DAffine3 {
+    let own = labels.world();
+    let to_world = DAffine3::from_cols(own.axis(0), own.axis(1), own.axis(2), own.origin());
+    match (geometry, world) {
+        (Geometry::Cartesian(grid), Some(world)) => world.pose(grid).inverse() * to_world,
+        _ => to_world,
     }
 }
 

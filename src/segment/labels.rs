@@ -1,9 +1,9 @@
 //! A label for each voxel of a lattice, and the brush that edits it.
 
-use crate::lattice::{self, Region};
+use crate::lattice::{self, Region, voxel};
 use crate::memory;
 use crate::probe::{Grid, World};
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 
 /// The label of each voxel of a grid; 0 is none. A voxel counts as inside a shape if its centre is.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,6 +31,20 @@ pub struct Brush {
     /// Radius of the ball or disc, mm.
     pub radius: f64,
     pub shape: Shape,
+}
+
+/// The labels of a box of voxels as they were before a change.
+#[derive(Clone, Debug)]
+pub struct Patch {
+    region: Region,
+    voxels: Vec<u8>,
+}
+
+impl Patch {
+    /// Number of its voxels, a byte each.
+    pub fn bytes(&self) -> usize {
+        self.voxels.len()
+    }
 }
 
 impl Labels {
@@ -87,6 +101,47 @@ impl Labels {
             }
         }
         changed
+    }
+
+    /// Sets the label of the voxels with these numbers.
+    pub fn set(&mut self, voxels: &[u32], label: u8) {
+        voxels.iter().for_each(|n| self.voxels[*n as usize] = label);
+    }
+
+    /// The numbers of the voxels of another lattice, of `size` voxels, whose centres lie in a labelled voxel of this one. `to_place`: from the
+    /// index of a voxel of the other to its place in the coordinates of this grid, mm.
+    pub fn sampled(&self, size: [usize; 3], to_place: DAffine3) -> Vec<u32> {
+        let Grid { size: own, spacing, origin } = self.grid;
+        let to_index =
+            DAffine3::from_scale(DVec3::from(spacing).recip()) * DAffine3::from_translation(-DVec3::from(origin));
+        let to_own = to_index * to_place;
+        let is_labelled = |n: &usize| {
+            let at = to_own.transform_point3(DVec3::from(voxel(*n, size).map(|i| i as f64))).round();
+            let is_there = (0..3).all(|a| at[a] >= 0.0 && at[a] < own[a] as f64);
+            let [x, y, z] = at.to_array().map(|n| n as usize);
+            is_there && self.voxels[(z * own[1] + y) * own[0] + x] > 0
+        };
+        (0..size.iter().product()).filter(is_labelled).map(|n| n as u32).collect()
+    }
+
+    /// These labels in the smallest box of all voxels that have another one in `after`, which lies on the same grid; None if none has.
+    pub fn before(&self, after: &Labels) -> Option<Patch> {
+        let width = self.grid.size[0];
+        let rows = self.voxels.chunks_exact(width).zip(after.voxels.chunks_exact(width)).enumerate();
+        let mut ends = Vec::new();
+        for (n, (old, new)) in rows.filter(|(_, (old, new))| old != new) {
+            let differs = |x: &usize| old[*x] != new[*x];
+            let both = [(0..width).find(differs), (0..width).rfind(differs)];
+            ends.extend(both.into_iter().flatten().map(|x| (n * width + x) as u32));
+        }
+        let region = (!ends.is_empty()).then(|| Region::around(&ends, &self.grid, 0.0))?;
+        Some(Patch { region, voxels: region.indices(self.grid.size).map(|n| self.voxels[n]).collect() })
+    }
+
+    /// Exchanges the labels of a box with those of a patch, so that the next exchange brings them back.
+    pub fn exchange(&mut self, patch: &mut Patch) {
+        let there = patch.region.indices(self.grid.size);
+        there.zip(&mut patch.voxels).for_each(|(n, voxel)| std::mem::swap(&mut self.voxels[n], voxel));
     }
 }
 

@@ -1,10 +1,25 @@
 //! Voxels of a lattice: their number, their places, and boxes of them.
 
-use crate::probe::Grid;
+use crate::probe::{Geometry, Grid};
+use crate::source::convert;
 use glam::DVec3;
 
 /// Most voxels of a lattice: their numbers fit into 32 bits.
 const MAX_VOXELS: usize = 1 << 30;
+
+/// Voxel spacing for a sweep, mm: finer than its beam.
+const SPACING: f64 = 0.5;
+
+/// The lattice on which a volume is segmented: its own, or that of a box around a sweep with voxels of 0.5 mm.
+///
+/// # Errors
+/// One line: there would be too many voxels.
+pub fn usual_grid(geometry: &Geometry) -> Result<Grid, String> {
+    match geometry {
+        Geometry::Cartesian(grid) => Ok(*grid),
+        Geometry::Sweep(_) => convert::lattice(geometry, SPACING),
+    }
+}
 
 /// The number of voxels of a grid.
 ///

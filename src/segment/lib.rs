@@ -26,4 +26,5 @@ use echolume_core::{mesh, scene};
 use {echolume_probe as probe, echolume_source as source};
 
 pub use field::{Field, Scale};
-pub use labels::{Brush, Labels, Shape};
+pub use labels::{Brush, Labels, Patch, Shape};
+pub use lattice::usual_grid;

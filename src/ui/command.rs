@@ -1,6 +1,7 @@
 //! The commands of a user, given by gestures on the picture, keys and panels; and the key bindings with their descriptions in the help.
 
 pub use super::comparison::{CompareView, Link};
+pub use super::labelling::{Effect, LabelCommand};
 pub use super::view::{Face, Viewpoint};
 
 use super::input::{Input, Key, Modifiers};
@@ -112,6 +113,9 @@ pub enum Command {
     KeepSide(KeptSide),
     /// Sets the radius of the brush, mm.
     BrushRadius(f64),
+    /// Multiplies the radius of the brush.
+    ScaleBrush(f64),
+    Labels(LabelCommand),
     /// Removes all cuts.
     ClearCuts,
     /// Sets a point of the line of a curved plane: the plane that it is drawn on, and the coordinates there, mm.
@@ -268,6 +272,8 @@ pub enum Tool {
     BodyMark,
     /// Sets the points of a measurement.
     Measure(MeasureKind),
+    /// Edits labels.
+    Labels,
 }
 
 /// The tabs of the inspector.
@@ -441,6 +447,7 @@ pub const KEY_BINDINGS: &[Binding] = &[
     on(Char('k'), keys::VOLUME_BY_THRESHOLD, Command::CountVoxels),
     on(Char('i'), keys::TEXT, Command::Tool(Tool::Measure(MeasureKind::Text))),
     on(Char('y'), keys::ARROW, Command::Tool(Tool::Measure(MeasureKind::Arrow))),
+    shift(Char('l'), keys::LABELS, Command::Tool(Tool::Labels)),
     shift(Char('b'), keys::BODY_MARK, Command::Tool(Tool::BodyMark)),
     on(Key::Delete, keys::DELETE_LAST_MEASUREMENT, Command::DeleteMeasure(usize::MAX)),
     control(Char('c'), keys::COPY_RESULTS, Command::CopyMeasures),
@@ -611,6 +618,7 @@ mod tests {
             Tool::Plane,
             Tool::Curve,
             Tool::BodyMark,
+            Tool::Labels,
         ]
         .map(Command::Tool);
         let layouts = [Layout::Single, Layout::Four, Layout::Beside, Layout::Pair].map(Command::Layout);

@@ -7,8 +7,12 @@ use crate::gpu::Wake;
 use crate::live::cine::CineVolume;
 use crate::picture::Picture;
 use crate::progress_lines::Progress;
+use crate::scene::Settings;
+use crate::segment::{Labels, files::write_segments};
 use crate::source::recorder::Header;
+use crate::source::segmentation::Segment;
 use crate::texts;
+use crate::workspace::{self, Origin};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -18,13 +22,16 @@ use std::time::{SystemTime, UNIX_EPOCH};
 /// Largest number of files that are being saved: a key that is held must not fill the disk.
 const MAX_PENDING: usize = 4;
 
+/// Ending of the name of a file of labels.
+const LABELS_ENDING: &str = "seg.nrrd";
+
 /// What a saved file contains that would be lost otherwise.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Holds {
     Nothing,
     /// The complete cine loop, up to the volume of this number.
     Loop(u32),
-    /// Measurements, annotations, body marks and cuts of a recording.
+    /// Measurements, annotations, body marks, cuts and labels of a recording.
     Work {
         kept: Option<PathBuf>,
         work: Handiwork,
@@ -88,12 +95,44 @@ impl Exporter {
         self.keep(|own| own.save("png", Holds::Nothing, move |file| make()?.save(file)))
     }
 
-    /// Saves a text in a file with this file name ending. `holds`: what it contains that would be lost otherwise.
+    /// Saves a file with this file name ending by `write`, which is called on a thread. `holds`: what it contains that would be lost otherwise.
     ///
     /// # Errors
     /// Too many files are being saved, or no thread can be started.
-    pub(super) fn text(&mut self, ending: &'static str, text: String, holds: Holds) -> Result<(), String> {
-        self.keep(|own| own.save(ending, holds, move |file| files::replace(file, text.as_bytes())))
+    pub(super) fn written(
+        &mut self,
+        ending: &'static str,
+        holds: Holds,
+        write: impl FnOnce(&Path) -> Result<(), String> + Send + 'static,
+    ) -> Result<(), String> {
+        self.keep(|own| own.save(ending, holds, write))
+    }
+
+    /// Saves a workspace. `labels`: those that are written beside it instead of the file that `origin` names, if any voxel has one; None: they
+    /// are as in that file.
+    ///
+    /// # Errors
+    /// Too many files are being saved, no thread can be started, or the settings cannot be written.
+    pub(super) fn workspace(
+        &mut self,
+        settings: Settings,
+        mut origin: Origin,
+        labels: Option<Option<(Arc<Labels>, Vec<Segment>)>>,
+        holds: Holds,
+    ) -> Result<(), String> {
+        workspace::text(&settings, &origin)?;
+        let write = move |file: &Path| {
+            if let Some(labels) = labels {
+                origin.labels = None;
+                if let Some((labels, segments)) = labels {
+                    let beside = file.with_extension(LABELS_ENDING);
+                    write_segments(&labels, &beside, &segments).map_err(|e| e.to_string())?;
+                    origin.labels = beside.file_name().map(PathBuf::from);
+                }
+            }
+            files::replace(file, workspace::text(&settings, &origin)?.as_bytes())
+        };
+        self.written("toml", holds, write)
     }
 
     /// Path of the folder of saved files.
@@ -213,14 +252,15 @@ pub fn timestamp(now: SystemTime) -> String {
 /// A file name that does not exist yet: no saved file is overwritten.
 fn unused_name(folder: &Path, stamp: &str, number: u32, extension: &str) -> PathBuf {
     let name = |n: u32| folder.join(format!("echolume-{stamp}-{n}.{extension}"));
-    (number..u32::MAX).map(name).find(|file| !file.exists()).unwrap_or_else(|| name(u32::MAX))
+    // Nor that of the labels beside a workspace.
+    let is_unused = |file: &PathBuf| !file.exists() && !file.with_extension(LABELS_ENDING).exists();
+    (number..u32::MAX).map(name).find(is_unused).unwrap_or_else(|| name(u32::MAX))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::probe::{Geometry, Grid};
-    use crate::scene::Settings;
     use crate::source::StoredType;
     use crate::volume_export::FORMATS;
     use std::time::Duration;

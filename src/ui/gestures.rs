@@ -1,7 +1,7 @@
 //! Gestures on the picture, by a mouse with three buttons and a wheel or by fingers. Inputs go in, commands come out; the only state is what is
 //! pressed and the last click.
 
-use super::command::{Command, Face, Tool};
+use super::command::{Command, Face, LabelCommand, Tool};
 use super::input::{Button, Input, Modifiers, Phase};
 use super::picking::{Pane, Picker, Viewport, closest_along};
 use super::region_box::{self, Part, StartPart};
@@ -147,6 +147,9 @@ impl Gestures {
         }
         let Some(pane) = viewport.pane_at(at) else { return Vec::new() };
         let factor = NOTCH_ZOOM.powf(notches);
+        if modifiers.shift && matches!(tool, Tool::Brush | Tool::Labels) {
+            return vec![Command::ScaleBrush(factor)];
+        }
         match pane {
             Pane::Rendering if tool != Tool::Plane || modifiers.control || !scene.cuts_planes() => {
                 vec![Command::Zoom(factor)]
@@ -206,7 +209,7 @@ impl Gestures {
         if self.had_several {
             self.last_click = None;
             // The finger that is left of two moved the view: it draws no contour.
-            self.finger_press.take_if(|press| matches!(press.drag, Drag::Cut));
+            self.finger_press.take_if(|press| matches!(press.drag, Drag::Cut | Drag::Labels { .. }));
         }
     }
 
@@ -232,7 +235,7 @@ impl Gestures {
                 && viewport.now.saturating_sub(first.time) <= DOUBLE_CLICK
         });
         // A brush goes over the same place again.
-        if is_second && (pane, tool) != (Pane::Rendering, Tool::Brush) {
+        if is_second && (pane, tool) != (Pane::Rendering, Tool::Brush) && tool != Tool::Labels {
             match (tool, viewport.scene) {
                 (Tool::Measure(_), _) => return vec![Command::EndMeasure],
                 (Tool::Curve, _) => return vec![Command::EndCurve],
@@ -250,6 +253,9 @@ impl Gestures {
             return self.double_click(pane, viewport);
         }
         self.last_click = Some(Click { at, time: viewport.now });
+        if matches!(press.drag, Drag::Labels { .. }) {
+            return press.end(viewport);
+        }
         if (pane, tool) == (Pane::Rendering, Tool::Brush) {
             let pixel = viewport.pixel_at(at).map(|(_, pixel)| press.to_surface(pixel));
             return pixel.map_or(Vec::new(), |pixel| vec![Command::BeginCut(pixel), Command::EndCut]);
@@ -349,6 +355,11 @@ enum Drag {
     },
     /// The contour of a cut along the drag, on the rendering.
     Cut,
+    /// The brush of labels, on a tile or on the rendering.
+    Labels {
+        tile: Option<usize>,
+        erases: bool,
+    },
     /// A body mark or the probe on it. `way`: offset from the pointer, pixels of the picture.
     BodyMark {
         index: usize,
@@ -394,10 +405,14 @@ impl Press {
         let columns_to_surface = viewport.columns_to_surface(at);
         pixel[0] += columns_to_surface;
         // Only a plain press can be a click: any other one drags at once.
-        let is_plain = button == Button::Left && !held.shift && !held.control;
+        let is_plain = button == Button::Left && !held.shift && (!held.control || tool == Tool::Labels);
         let drag = match (pane, tool) {
             _ if mark.is_some() => mark?,
             (Pane::Rendering, _) if button != Button::Left || held.shift => Drag::Pan,
+            (_, Tool::Labels) if is_plain => {
+                let tile = if let Pane::Plane(tile) = pane { Some(tile) } else { None };
+                Drag::Labels { tile, erases: held.control }
+            }
             (Pane::Rendering, _) if held.control => Drag::Light,
             (Pane::Rendering, Tool::Rotate | Tool::BodyMark) => Drag::Rotate,
             (Pane::Rendering, Tool::Light) => Drag::Light,
@@ -411,7 +426,7 @@ impl Press {
                     Drag::Rotate
                 }
             }
-            (Pane::Rendering, Tool::Measure(_) | Tool::Curve) => Drag::Rotate,
+            (Pane::Rendering, Tool::Measure(_) | Tool::Curve | Tool::Labels) => Drag::Rotate,
             // What the wheel does.
             (Pane::Plane(tile), _) if button != Button::Left => Drag::Step(tile),
             (Pane::Plane(_), _) if !is_plain => Drag::Nothing,
@@ -505,6 +520,10 @@ impl Press {
                     self.last = self.start;
                     return line_point(viewport, tile, self.start);
                 }
+                Drag::Labels { .. } => {
+                    self.last = self.start;
+                    return self.brushed(self.start, viewport);
+                }
                 Drag::Cut => {
                     self.last = self.start;
                     return viewport.pixel_at(self.start).map(|(_, pixel)| Command::BeginCut(self.to_surface(pixel)));
@@ -512,7 +531,7 @@ impl Press {
                 _ => {}
             }
         }
-        if let Drag::Trace(_) | Drag::Cut = self.drag
+        if let Drag::Trace(_) | Drag::Cut | Drag::Labels { .. } = self.drag
             && (to[0] - self.last[0]).hypot(to[1] - self.last[1]) < TRACE_STEP
         {
             return None;
@@ -535,8 +554,19 @@ impl Press {
             }
             Drag::Trace(_) => vec![Command::EndMeasure],
             Drag::Cut => vec![Command::EndCut],
+            Drag::Labels { .. } => {
+                let ends = Command::Labels(LabelCommand::EndStroke);
+                self.brushed(self.last, viewport).into_iter().chain([ends]).collect()
+            }
             _ => Vec::new(),
         }
+    }
+
+    /// The command that moves the brush of labels to a position in the window.
+    fn brushed(&self, to: [f64; 2], viewport: &Viewport) -> Option<Command> {
+        let Drag::Labels { tile, erases } = self.drag else { return None };
+        let pixel = self.to_surface(viewport.pixel_at(to)?.1);
+        Some(Command::Labels(LabelCommand::Stroke(pixel, tile, erases)))
     }
 
     /// How far a face moves that is dragged to a position along its axis, mm; none if it stays. It moves from where it was grabbed: beyond its range
@@ -623,6 +653,7 @@ impl Press {
             Drag::Caliper { .. } | Drag::OnCurve(_) | Drag::Line { .. } => return None,
             Drag::Handle { tile, index } => Command::MoveCurvePoint(index, viewport.coordinates(tile, to)?.1),
             Drag::Cut => Command::CutAlong(pixel),
+            Drag::Labels { .. } => return self.brushed(to, viewport),
             Drag::Trace(tile) => Command::Point(point_on(viewport, tile, to)?, false),
             Drag::Face(face) => {
                 let picker = Picker::of(scene);
@@ -696,6 +727,7 @@ fn is_caliper(kind: MeasureKind) -> bool {
 fn given_up(press: &Press) -> Option<Command> {
     match press.drag {
         Drag::Cut => Some(Command::CancelCut),
+        Drag::Labels { .. } if press.is_drag => Some(Command::Labels(LabelCommand::EndStroke)),
         Drag::Line { is_next: false, .. } if press.is_drag => Some(Command::CancelCurve),
         _ => None,
     }

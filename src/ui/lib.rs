@@ -26,6 +26,7 @@ pub mod frame_budget;
 mod gestures;
 pub mod input;
 mod keyboard_pointer;
+mod labelling;
 mod open_list;
 mod palette;
 pub mod panels;

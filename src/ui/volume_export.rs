@@ -41,6 +41,11 @@ impl Format {
     pub(super) fn is_report(&self) -> bool {
         self.work == Work::Report
     }
+
+    /// True if it has the labels instead of the echoes.
+    pub(super) fn is_of_labels(&self) -> bool {
+        self.work == Work::Labels
+    }
 }
 
 /// A format in the menu of exports.
@@ -64,6 +69,7 @@ enum Work {
     Picture(u32),
     /// The measurements of the recording, and the JSON that makes the report again.
     Report,
+    Labels,
 }
 
 const fn format(name: &'static str, ending: &'static str, work: Work, hint: &'static str) -> Format {
@@ -86,6 +92,7 @@ pub const FORMATS: &[Format] = &[
     format(texts::PICTURE_4000, "png", Work::Picture(4000), texts::PICTURE_HINT),
     format(texts::TURNTABLE_FILM, "mp4", Work::Turntable, texts::TURNTABLE_FILM_HINT),
     format(texts::LOOP_FILM, "mp4", Work::Loop, texts::LOOP_FILM_HINT),
+    format(texts::LABELS_NRRD, "seg.nrrd", Work::Labels, texts::LABELS_NRRD_HINT),
     format(texts::REPORT, "pdf", Work::Report, texts::REPORT_HINT),
 ];
 
@@ -270,6 +277,8 @@ impl Job {
                 let scene = self.workspace(recording)?;
                 command.arg("worksheet").arg(scene).args(["--device", &self.device, "-o"]).arg(made)
             }
+            // It is no work of a process.
+            Work::Labels => return Err(texts::WHY_NO_LABELS.into()),
             Work::Turntable => {
                 let scene = self.workspace(recording)?;
                 let series = ["--turntable", TURNTABLE].map(String::from);

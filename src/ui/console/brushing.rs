@@ -3,9 +3,7 @@
 use super::Console;
 use super::surface::SurfaceMap;
 use crate::controls::Change;
-use crate::passes::chain;
 use crate::scene::Scene;
-use crate::scene::picker::Picker;
 use crate::texts;
 use std::time::Instant;
 
@@ -39,15 +37,8 @@ impl Console {
     /// The strokes over the surface under these pixels: it begins anew behind a gap or a step of the surface.
     fn stroke_over(&mut self, pixels: &[[f64; 2]]) -> Result<(Strokes, Scene), String> {
         let radius = self.controls.brush_radius();
-        let no_surface = texts::BRUSH_NEEDS_SURFACE;
-        let renderer = self.stream.renderer().filter(|r| r.has_drawn()).ok_or(texts::NO_PICTURE_TO_USE)?;
-        let slot = match renderer.scene().has_distance() {
-            true => chain::distance_end(renderer.scene()),
-            false => return Err(no_surface.into()),
-        };
-        let distances = renderer.read(slot).map_err(|e| e.to_string())?.ok_or(no_surface)?;
-        let scene = renderer.scene().clone();
-        let map = SurfaceMap { picker: Picker::of(&scene), size: scene.ray_size(), distances };
+        let (scene, distances) = self.drawn_surface(texts::BRUSH_NEEDS_SURFACE)?;
+        let map = SurfaceMap::of(&scene, &distances);
         let mut strokes = Vec::new();
         let mut stroke: Vec<glam::DVec3> = Vec::new();
         for place in pixels.iter().map(|pixel| map.at(*pixel)) {

@@ -2,7 +2,7 @@
 
 use super::Console;
 use crate::cine_player::Loop;
-use crate::command::Command;
+use crate::command::{Command, LabelCommand, Tool};
 use crate::controls::{Change, Controls};
 use crate::live::Stream;
 use crate::plan::Work;
@@ -33,6 +33,9 @@ impl Console {
         let change = self.controls.apply(command, self.stream.scene());
         if self.controls.tool() != tool {
             self.visible.inspector.follow(self.controls.tool());
+            if self.controls.tool() == Tool::Labels {
+                self.begin_labels();
+            }
         }
         match change {
             Change::Nothing => return,
@@ -109,6 +112,8 @@ impl Console {
             Command::KeyboardPointer => self.toggle_keyboard_pointer(now),
             Command::ToggleFullScreen => self.request.toggle_full_screen |= !self.fixed.is_kiosk,
             Command::EndCut => self.end_stroke(now),
+            Command::Labels(LabelCommand::Stroke(pixel, tile, erases)) => self.brush_labels(pixel, tile, erases),
+            Command::Labels(LabelCommand::EndStroke) => self.end_stroke_of_labels(now),
             Command::PickSurface(at) => self.pick_surface(at),
             Command::CountVoxels => self.count_voxels(),
             Command::CopyMeasures => self.copy_measures(),

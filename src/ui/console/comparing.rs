@@ -59,7 +59,7 @@ impl Console {
     }
 
     /// The volume on display, or else the newest one in the cine loop, with its header.
-    fn shown_volume(&self) -> Option<(Header, Volume)> {
+    pub(super) fn shown_volume(&self) -> Option<(Header, Volume)> {
         let volumes = self.stream.cine().volumes();
         let shown = self.stream.cine_position().and_then(|at| volumes.get(at)).or(volumes.back())?;
         let header = self.stream.header()?.clone();

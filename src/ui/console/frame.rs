@@ -41,6 +41,7 @@ impl Console {
         self.poll_saved();
         self.poll_opening(now);
         self.poll_counting();
+        self.poll_labels(now);
         self.poll_thumbnails(now);
         let is_exported_further = self.exporter.look();
         self.presentation.redraw_if(is_exported_further);

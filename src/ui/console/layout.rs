@@ -13,7 +13,8 @@ impl Console {
     pub(super) fn lay_out_panels(&mut self, now: Instant, picture: Option<&ShownPicture>) -> gpu::window::Panels {
         let banner = self.banner(now);
         let shows_first_steps = self.shows_first_steps(picture.is_some() && banner.is_none());
-        let notes: Vec<_> = self.export_note().into_iter().chain(self.notes.shown()).collect();
+        let notes: Vec<_> =
+            self.export_note().into_iter().chain(self.label_work.note()).chain(self.notes.shown()).collect();
         let recordings = self.opening.named();
         let exit_key = self.fixed.exit.as_ref().filter(|_| self.fixed.is_kiosk).map(ToString::to_string);
         let loop_pictures = self.reel.pictures(self.stream.cine().volumes());

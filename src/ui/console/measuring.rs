@@ -5,16 +5,15 @@ use super::opening::ListKey;
 use super::surface::SurfaceMap;
 use crate::command::{Command, Tool};
 use crate::export::Holds;
+use crate::files;
 use crate::input::{Input, Key};
 use crate::measure::{outcome, voxels};
-use crate::passes::chain;
 use crate::recordings::Kept;
-use crate::scene::picker::Picker;
 use crate::scene::{MeasureKind, Measurement, Mode, Scene, insonified_box};
 use crate::source::Frame;
 use crate::source::convert::Volume;
 use crate::texts;
-use crate::workspace::{self, Origin};
+use crate::workspace::Origin;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
@@ -49,15 +48,8 @@ impl Console {
         // Undo may have taken the first end back.
         let is_begun = self.controls.work().is_some_and(|work| work.kind == MeasureKind::Surface);
         let from = self.survey.first_end().filter(|_| is_begun);
-        let no_surface = texts::POINT_NEEDS_SURFACE;
-        let renderer = self.stream.renderer().filter(|r| r.has_drawn()).ok_or(texts::NO_PICTURE_TO_USE)?;
-        let slot = match renderer.scene().has_distance() {
-            true => chain::distance_end(renderer.scene()),
-            false => return Err(no_surface.into()),
-        };
-        let distances = renderer.read(slot).map_err(|e| e.to_string())?.ok_or(no_surface)?;
-        let scene = renderer.scene();
-        let map = SurfaceMap { picker: Picker::of(scene), size: scene.ray_size(), distances };
+        let (scene, distances) = self.drawn_surface(texts::POINT_NEEDS_SURFACE)?;
+        let map = SurfaceMap::of(&scene, &distances);
         let place = map.at(pixel).ok_or(texts::NO_SURFACE_HERE)?;
         let point = scene.point_of(place);
         if kind != MeasureKind::Surface {
@@ -145,13 +137,10 @@ impl Console {
 
     /// Saves the results of measurements as a CSV file.
     pub(super) fn save_measures(&mut self) {
+        let csv = outcome::csv(self.controls.measures(), &self.recording_name());
         let saved = match self.controls.measures().is_empty() {
             true => Err(texts::WHY_NO_MEASUREMENTS.into()),
-            false => self.exporter.text(
-                "csv",
-                outcome::csv(self.controls.measures(), &self.recording_name()),
-                Holds::Nothing,
-            ),
+            false => self.exporter.written("csv", Holds::Nothing, move |file| files::replace(file, csv.as_bytes())),
         };
         if let Err(fault) = saved {
             self.notify(&texts::results_not_saved(fault), true);
@@ -171,9 +160,9 @@ impl Console {
             if !self.fixed.plays_once {
                 (settings.cine.first, settings.cine.last) = (None, None);
             }
-            let text = workspace::text(&settings, &origin)?;
             let holds = Holds::Work { kept: None, work: self.controls.handiwork() };
-            self.exporter.text("toml", text, holds).map(|()| is_live)
+            let labels = self.controls.edited_labels();
+            self.exporter.workspace(settings, origin, labels, holds).map(|()| is_live)
         });
         let is_saved = saved.is_ok();
         match saved {
@@ -191,8 +180,8 @@ impl Console {
         let mut origin = self.fixed.origin.clone().unwrap_or_else(|| Origin::of(None));
         (origin.recording, origin.volume) = (Some(path.clone()), kept.frozen.unwrap_or(0) as usize);
         origin.labels = None;
-        let text = workspace::text(kept.controls.settings(), &origin);
-        let saved = text.and_then(|text| self.exporter.text("toml", text, Holds::Work { kept: Some(path), work }));
+        let (settings, labels) = (kept.controls.settings().clone(), kept.controls.edited_labels());
+        let saved = self.exporter.workspace(settings, origin, labels, Holds::Work { kept: Some(path), work });
         if let Err(fault) = &saved {
             self.notify(&texts::workspace_not_saved(fault), true);
         }
@@ -211,7 +200,8 @@ impl Console {
             self.execute(&Command::CancelCurve, Instant::now());
             return true;
         }
-        let is_measuring = matches!(self.controls.tool(), Tool::Measure(_) | Tool::Curve | Tool::BodyMark);
+        let is_measuring =
+            matches!(self.controls.tool(), Tool::Measure(_) | Tool::Curve | Tool::BodyMark | Tool::Labels);
         if is_measuring {
             self.execute(&Command::Tool(Tool::default()), Instant::now());
         }

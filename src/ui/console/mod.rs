@@ -11,6 +11,7 @@ mod first_steps;
 mod frame;
 mod hands;
 mod input;
+mod labelling;
 mod layout;
 mod leaving;
 mod looks;
@@ -38,11 +39,12 @@ use self::connection::Connection;
 use self::faults::Faults;
 use self::first_steps::FirstSteps;
 use self::hands::Hands;
+use self::labelling::LabelWork;
 use self::leaving::Leaving;
 use self::measured::Measured;
 use self::notes::Notes;
 use self::opening::Opening;
-pub use self::options::{ConsoleOptions, OpenFile, Opened, OpeningOptions, StartupFault};
+pub use self::options::{ConsoleOptions, OpenFile, Opened, OpeningOptions, StartupFault, WorldOf};
 use self::presentation::Presentation;
 use self::presets::Presets;
 use self::quality::PictureQuality;
@@ -116,6 +118,7 @@ pub struct Console {
     reel: Reel,
     replay: Replay,
     survey: Survey,
+    label_work: LabelWork,
     turntable: Turntable,
     render_start: RenderStart,
     start: Start,
@@ -134,6 +137,7 @@ struct Fixed {
     is_kiosk: bool,
     /// What a workspace stores of the source.
     origin: Option<Origin>,
+    world: Option<WorldOf>,
     plays_once: bool,
     /// Whether the panels have thumbnails of looks and volumes.
     small_pictures: bool,
@@ -168,7 +172,7 @@ impl Console {
         };
         let mut controls = kept.unwrap_or_else(|| Controls::new(settings));
         controls.resize(Room::of(size, options.scale, visible.panels).picture.1);
-        let (wake, is_recorded) = (options.wake, options.record.is_some());
+        let (wake, is_recorded, world) = (options.wake, options.record.is_some(), options.opening.world.clone());
         let first = frame_budget::first_rung(context.candidate.has_unified_memory());
         let quality = PictureQuality::new(options.budget, options.rungs, first, options.warms);
         let stream_options = StreamOptions {
@@ -212,6 +216,7 @@ impl Console {
             reel: Reel::new(wake.clone()),
             replay: Replay::new(frozen),
             survey: Survey::new(wake.clone()),
+            label_work: LabelWork::new(wake.clone()),
             turntable: Turntable::default(),
             render_start: RenderStart::default(),
             start: Start::new(now),
@@ -224,6 +229,7 @@ impl Console {
                 exit: options.exit,
                 is_kiosk: options.is_kiosk,
                 origin: options.origin,
+                world,
                 plays_once: options.plays_once,
                 small_pictures,
                 cine_volumes,

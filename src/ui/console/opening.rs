@@ -94,7 +94,7 @@ pub(super) enum ListKey {
 
 impl Opening {
     pub(super) fn new(options: OpeningOptions, wake: Wake) -> Opening {
-        let OpeningOptions { open_file: open, recent, recordings, progress: source } = options;
+        let OpeningOptions { open_file: open, recent, recordings, progress: source, .. } = options;
         let (file, dropped, list, told) = (None, Vec::new(), None, None);
         Opening { open, recent, wake, recordings, file, dropped, list, source, told }
     }

@@ -5,6 +5,7 @@ use crate::frame_budget::{Rung, built_in_ladder};
 use crate::gpu::Wake;
 use crate::kiosk::chord::Chord;
 use crate::live::StreamOptions;
+use crate::probe::World;
 use crate::recordings::OpenRecordings;
 use crate::scene::Settings;
 use crate::source::live::SourceKind;
@@ -106,7 +107,12 @@ pub struct OpeningOptions {
     pub progress: Progress,
     /// Path of the file with the list of recent files; `None`: the list is not stored.
     pub recent: Option<PathBuf>,
+    /// Where the volume of the console's own source is; `None`: in coordinates of its own.
+    pub world: Option<WorldOf>,
 }
+
+/// A function that reads where a volume is in the world, which may take long; None if its file does not say so.
+pub type WorldOf = Arc<dyn Fn() -> Option<World> + Send + Sync>;
 
 /// A function that opens a recording or a workspace, or returns in one line why it cannot. It may take long; [`Progress`] reports how far it is
 /// and can cancel it.

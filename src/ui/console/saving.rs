@@ -6,6 +6,7 @@ use crate::live::cine::CineVolume;
 use crate::marked;
 use crate::panels::Note;
 use crate::progress_lines::Progress;
+use crate::segment::files::write_segments;
 use crate::source::live::SourceKind;
 use crate::texts;
 use crate::volume_export::{FORMATS, Job, renumbered};
@@ -75,6 +76,15 @@ impl Console {
     pub(super) fn export_volume(&mut self, n: usize) {
         let Some(format) = FORMATS.get(n).copied() else { return };
         self.visible.close_exports();
+        if format.is_of_labels() {
+            let labels = self.controls.labels_to_export().ok_or_else(|| texts::WHY_NO_LABELS.to_string());
+            let begun = labels.and_then(|(labels, segments)| {
+                self.exporter.written(format.ending, Holds::Nothing, move |file| {
+                    write_segments(&labels, file, &segments).map_err(|e| e.to_string())
+                })
+            });
+            return begun.unwrap_or_else(|fault| self.notify(&texts::not_exported(fault), true));
+        }
         let cine = self.stream.cine().volumes();
         let shown = || self.stream.cine_position().and_then(|at| cine.get(at)).or(cine.back()).cloned();
         let volumes = if format.takes_the_loop() { self.marked_volumes() } else { shown().into_iter().collect() };

@@ -1,8 +1,11 @@
 //! The rendered surface, by its distance map.
 
+use super::Console;
 use crate::mesh::sheet::STEEPEST;
-use crate::passes::Texels;
+use crate::passes::{Texels, chain};
+use crate::scene::Scene;
 use crate::scene::picker::Picker;
+use crate::texts;
 use glam::DVec3;
 
 /// Distances along a ray from here on mean that it met no surface, mm.
@@ -14,8 +17,27 @@ const PATH_POINTS: usize = 256;
 /// The points of the rendered surface, from its distance map.
 pub(super) struct SurfaceMap<'a> {
     pub(super) picker: Picker<'a>,
-    pub(super) size: [u32; 2],
-    pub(super) distances: Texels,
+    size: [u32; 2],
+    distances: &'a Texels,
+}
+
+impl Console {
+    /// The scene of the picture, and the distances of its surface. `no_surface`: what is said where it has none.
+    ///
+    /// # Errors
+    /// One line: there is no picture, it has no surface, or the device fails.
+    pub(super) fn drawn_surface(&mut self, no_surface: &str) -> Result<(Scene, Texels), String> {
+        let renderer = self.stream.renderer().filter(|r| r.has_drawn()).ok_or(texts::NO_PICTURE_TO_USE)?;
+        let scene = renderer.scene().clone();
+        let slot = scene.has_distance().then(|| chain::distance_end(&scene)).ok_or(no_surface)?;
+        Ok((scene, renderer.read(slot).map_err(|e| e.to_string())?.ok_or(no_surface)?))
+    }
+}
+
+impl<'a> SurfaceMap<'a> {
+    pub(super) fn of(scene: &'a Scene, distances: &'a Texels) -> SurfaceMap<'a> {
+        SurfaceMap { picker: Picker::of(scene), size: scene.ray_size(), distances }
+    }
 }
 
 impl SurfaceMap<'_> {
@@ -72,7 +94,7 @@ mod tests {
     use super::*;
     use crate::measure::shapes;
     use crate::probe::{Geometry, Grid};
-    use crate::scene::{Input as Samples, Scene, load::Layers};
+    use crate::scene::{Input as Samples, load::Layers};
     use crate::source::StoredType;
 
     /// A ball of 15 mm, as a distance map shows it: the path along it is an arc of known length.
@@ -98,7 +120,7 @@ mod tests {
                 let off = (origin + direction * middle - centre).length_squared();
                 if off < radius * radius { middle - (radius * radius - off).sqrt() } else { f64::from(f32::MAX) }
             });
-            let map = SurfaceMap { picker: Picker::of(&scene), size, distances };
+            let map = SurfaceMap::of(&scene, &distances);
             let on_ball = |angle: f64| {
                 let place = centre + (scene.rays.right * angle.sin() - scene.rays.forward * angle.cos()) * radius;
                 let pixel = map.picker.project(place).expect("in front");

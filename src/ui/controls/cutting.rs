@@ -72,6 +72,7 @@ impl Controls {
                 self.brush_radius = radius.clamp(BRUSH_RADII[0], BRUSH_RADII[1]);
                 Change::Tool
             }
+            Command::ScaleBrush(factor) => return self.cut(&Command::BrushRadius(self.brush_radius * factor), scene),
             Command::EndCut => {
                 let outline = std::mem::take(&mut self.outline);
                 match scene.filter(|_| !outline.is_empty()) {

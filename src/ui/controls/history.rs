@@ -1,18 +1,45 @@
-//! Undo and redo: the settings before each change. A drag or a held key is one step.
+//! Undo and redo: the settings before each change, or the labels that it changed. A drag or a held key is one step.
 
 use crate::command::Command;
 use crate::scene::Settings;
+use crate::segment::Patch;
 
 /// Most steps that can be undone.
 const MAX_STEPS: usize = 100;
 /// Most steps of a recording that is not shown: settings with many cuts take up to 400 KiB each.
 const MAX_KEPT: usize = 20;
+/// Most bytes of all edits of labels that can be undone: a hundred dabs of the widest brush, 81 voxels of 0.5 mm along each edge of their boxes,
+/// take 53 MB.
+const MAX_BYTES: usize = 64 << 20;
 
-/// Undo and redo: the settings before each step, and those of steps that were undone.
+/// A step that can be undone.
+#[derive(Clone, Debug)]
+enum Step {
+    /// The settings before it, without labels.
+    Settings(Box<Settings>),
+    /// What of the labels was other before it.
+    Labels(Patch),
+}
+
+impl Step {
+    fn of(settings: &Settings) -> Step {
+        let mut settings = settings.clone();
+        // They are not undone by settings, and each would keep a volume.
+        settings.labels.volume = None;
+        Step::Settings(settings.into())
+    }
+
+    /// Bytes of labels.
+    fn bytes(&self) -> usize {
+        if let Step::Labels(patch) = self { patch.bytes() } else { 0 }
+    }
+}
+
+/// Undo and redo: what was before each step, and before those that were undone.
 #[derive(Clone, Debug, Default)]
 pub(super) struct History {
-    past: Vec<Settings>,
-    future: Vec<Settings>,
+    past: Vec<Step>,
+    future: Vec<Step>,
     /// The command of the last step, while further commands may continue it.
     last: Option<Command>,
 }
@@ -29,7 +56,20 @@ impl History {
         if self.past.len() == MAX_STEPS {
             self.past.remove(0);
         }
-        self.past.push(before);
+        self.past.push(Step::of(&before));
+    }
+
+    /// Stores what an edit of labels changed. Where edits take too many bytes, the oldest can no longer be undone.
+    pub(super) fn record_labels(&mut self, patch: Patch) {
+        (self.last, self.future) = (None, Vec::new());
+        self.past.push(Step::Labels(patch));
+        while self.past.len() > MAX_STEPS {
+            self.past.remove(0);
+        }
+        while self.past.iter().map(Step::bytes).sum::<usize>() > MAX_BYTES {
+            let oldest = self.past.iter().position(|step| step.bytes() > 0);
+            oldest.into_iter().for_each(|n| _ = self.past.remove(n));
+        }
     }
 
     /// Makes the next change a step of its own, even if it continues the last one.
@@ -37,20 +77,30 @@ impl History {
         self.last = None;
     }
 
-    /// Returns the settings before the last step; None if there is none. `now`: the present settings, which [`History::redo`] restores.
-    pub(super) fn undo(&mut self, now: &Settings) -> Option<Settings> {
+    /// Goes a step back, or forth again: returns the settings to go to, where the inner None means that `exchange` was called for the labels.
+    /// None if there is no step. `now`: the present settings, to which the opposite step returns.
+    pub(super) fn travel(
+        &mut self,
+        back: bool,
+        now: &Settings,
+        exchange: impl FnOnce(&mut Patch),
+    ) -> Option<Option<Settings>> {
         self.last = None;
-        let before = self.past.pop()?;
-        self.future.push(now.clone());
-        Some(before)
-    }
-
-    /// Returns the settings after the step that was undone last; None if there is none. `now`: the present settings, which undo restores.
-    pub(super) fn redo(&mut self, now: &Settings) -> Option<Settings> {
-        self.last = None;
-        let after = self.future.pop()?;
-        self.past.push(now.clone());
-        Some(after)
+        let [from, to] = match back {
+            true => [&mut self.past, &mut self.future],
+            false => [&mut self.future, &mut self.past],
+        };
+        match from.pop()? {
+            Step::Settings(settings) => {
+                to.push(Step::of(now));
+                Some(Some(*settings))
+            }
+            Step::Labels(mut patch) => {
+                exchange(&mut patch);
+                to.push(Step::Labels(patch));
+                Some(None)
+            }
+        }
     }
 
     /// True if there is a step to undo; true if there is one to redo.

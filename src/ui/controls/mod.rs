@@ -5,12 +5,14 @@ mod cine;
 mod curving;
 mod cutting;
 mod history;
+mod labelling;
 mod measuring;
 mod presets;
 mod sides;
 mod starting;
 
 use super::command::{Command, Tool};
+use super::labelling::Labelling;
 use super::sliders::{self, SLIDERS};
 use super::view;
 use crate::scene::default_look::Defaults;
@@ -18,8 +20,9 @@ use crate::scene::load;
 use crate::scene::planes::MAX_TILES;
 use crate::scene::{
     BodyMark, Camera, Cube, Curve, Cut, Inset, KeptSide, Layout, MAX_PICTURE, Made, Measurement, Mode, Planes, Scene,
-    Settings, Shadow, Tilt, Transfer,
+    Settings, Shadow, SharedLabels, Tilt, Transfer,
 };
+use crate::segment::Patch;
 pub(super) use cutting::BRUSH_RADII;
 use glam::DVec3;
 use history::History;
@@ -42,18 +45,19 @@ pub(super) enum Change {
     Caller(Command),
 }
 
-/// The user's work on a recording: measurements with annotations, body marks, and cuts.
+/// The user's work on a recording: measurements with annotations, body marks, cuts, and labels.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Handiwork {
     measure: Vec<Measurement>,
     body_marks: Vec<BodyMark>,
     cuts: Vec<Cut>,
+    labels: Option<SharedLabels>,
 }
 
 impl Handiwork {
     fn of(settings: &Settings) -> Handiwork {
-        let Settings { measure, body_marks, cuts, .. } = settings;
-        Handiwork { measure: measure.clone(), body_marks: body_marks.clone(), cuts: cuts.clone() }
+        let Settings { measure, body_marks, cuts, labels, .. } = settings.clone();
+        Handiwork { measure, body_marks, cuts, labels: labels.volume }
     }
 }
 
@@ -85,6 +89,7 @@ pub struct Controls {
     brush_radius: f64,
     /// The index of the selected body mark.
     body_mark: usize,
+    labelling: Option<Labelling>,
 }
 
 impl Controls {
@@ -107,6 +112,7 @@ impl Controls {
             kept_side: KeptSide::default(),
             brush_radius: cutting::BRUSH_RADIUS,
             body_mark: 0,
+            labelling: None,
         }
     }
 
@@ -123,13 +129,13 @@ impl Controls {
         Handiwork::of(&self.settings)
     }
 
-    /// True if measurements, annotations, body marks or cuts are in no file.
+    /// True if measurements, annotations, body marks, cuts or labels are in no file.
     pub(super) fn is_unsaved(&self) -> bool {
         let work = self.handiwork();
         work != self.saved && work != Handiwork::default()
     }
 
-    /// Notes that these measurements, annotations, body marks and cuts are in a file.
+    /// Notes that these measurements, annotations, body marks, cuts and labels are in a file.
     pub(super) fn saved(&mut self, work: Handiwork) {
         self.saved = work;
     }
@@ -144,7 +150,8 @@ impl Controls {
     /// Restores the settings of the start, except for the size of the picture and what is drawn over it.
     pub(super) fn reset(&mut self) {
         let again = Settings { picture: self.settings.picture.clone(), ..self.start.clone() };
-        let again = again.with_drawings_of(&self.settings);
+        let mut again = again.with_drawings_of(&self.settings);
+        again.labels.volume.clone_from(&self.settings.labels.volume);
         let before = std::mem::replace(&mut self.settings, again);
         if before != self.settings {
             self.history.record(before, &Command::Reset);
@@ -170,10 +177,16 @@ impl Controls {
         if back && (self.undo_point() || self.undo_line_point()) {
             return Change::Marks;
         }
+        self.end_edit_of_labels();
         loop {
-            let step = if back { self.history.undo(&self.settings) } else { self.history.redo(&self.settings) };
-            let Some(step) = step else { return Change::Nothing };
-            let settings = Settings { picture: self.settings.picture.clone(), ..step };
+            let exchange = |patch: &mut Patch| self.labelling.iter_mut().for_each(|labels| labels.exchange(patch));
+            let Some(step) = self.history.travel(back, &self.settings, exchange) else { return Change::Nothing };
+            let Some(step) = step else {
+                self.show_labels();
+                return Change::Settings;
+            };
+            let mut settings = Settings { picture: self.settings.picture.clone(), ..step };
+            settings.labels.volume.clone_from(&self.settings.labels.volume);
             if settings == self.settings || scene.is_some_and(|now| !can_draw(now, &settings)) {
                 continue;
             }
@@ -332,7 +345,12 @@ impl Controls {
             | Command::RestorePresets => return Change::Caller(*command),
             _ => {}
         }
-        if let Some(change) = self.measure(command).or_else(|| self.mark_body(command)).or_else(|| self.play(command)) {
+        if let Some(change) = self
+            .measure(command)
+            .or_else(|| self.label(command))
+            .or_else(|| self.mark_body(command))
+            .or_else(|| self.play(command))
+        {
             return change;
         }
         // The scene lags behind if several commands come between two pictures: each one builds on the settings of the one before.

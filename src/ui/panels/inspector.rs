@@ -3,8 +3,8 @@
 
 use super::colours::{ACCENT, EDGE, PANEL, TEXT, WEAK_TEXT};
 use super::names::{self, Tell};
-use super::{Edges, INSPECTOR_WIDTH, PanelState, Room, SMALL_TEXT, TEXT_SIZE, body_marks, look, measures, planes};
-use super::{presets, rail, recordings, sides, tools, top};
+use super::{Edges, INSPECTOR_WIDTH, PanelState, Room, SMALL_TEXT, TEXT_SIZE, body_marks, labels, look, measures};
+use super::{planes, presets, rail, recordings, sides, tools, top};
 use crate::command::{Command, InspectorTab, Tool};
 use crate::scene::{Group, MeasureKind};
 use crate::sliders::SLIDERS;
@@ -82,7 +82,7 @@ impl Inspector {
     pub(crate) fn follow(&mut self, tool: Tool) {
         self.tab = match tool {
             Tool::Rotate => return,
-            Tool::Light | Tool::Region | Tool::Clip | Tool::Cut | Tool::Brush => InspectorTab::Look,
+            Tool::Light | Tool::Region | Tool::Clip | Tool::Cut | Tool::Brush | Tool::Labels => InspectorTab::Look,
             Tool::Plane | Tool::Curve => InspectorTab::Planes,
             Tool::BodyMark => InspectorTab::Marks,
             Tool::Measure(MeasureKind::Text | MeasureKind::Arrow) => InspectorTab::Marks,
@@ -158,6 +158,7 @@ fn show(
                     tools::clip(ui, state, content, execute);
                     tools::cuts(ui, state, content, execute);
                     tools::start_line(ui, state, content, execute);
+                    labels::show(ui, state, content, execute);
                     match tab {
                         InspectorTab::Tools => {
                             if !state.room.has_top {

@@ -4,7 +4,7 @@ use super::colours::{ACCENT, BACKING, MEASURE, OUTLINE, TEXT, WARNING, WEAK_TEXT
 use super::names::{self, Tell};
 use super::overlays::first;
 use super::{PanelState, ROW_HEIGHT, SMALL_TEXT, ShownPicture, TEXT_SIZE, heading, icons, picture_rect, rail, shown};
-use crate::command::{Command, Tool};
+use crate::command::{Command, Effect, Tool};
 use crate::measure::outcome::{self, Quantity};
 use crate::measure::overlay::{self, Drawn};
 use crate::picking::Picker;
@@ -202,7 +202,12 @@ fn next_step(state: &PanelState, kind: MeasureKind) -> &'static str {
 pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
     let Some((ShownPicture { scene, volume, .. }, picture)) = shown(state, scale) else { return };
     let (measures, outline) = (state.controls.measures(), state.controls.outline());
-    let is_brush = state.controls.tool() == Tool::Brush && !scene.is_flat();
+    let effect = state.controls.labelling().map(|labels| labels.effect);
+    let is_brush = match state.controls.tool() {
+        Tool::Brush => !scene.is_flat(),
+        Tool::Labels => matches!(effect, Some(Effect::Paint | Effect::Erase)),
+        _ => false,
+    };
     let is_empty = measures.is_empty() && state.controls.work().is_none() && outline.is_empty() && !is_brush;
     if is_empty {
         return;
@@ -219,7 +224,15 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
     if is_brush {
         let hover = ui.ctx().pointer_hover_pos().filter(|at| in_sight.contains(*at));
         let place = outline.last().map(|at| canvas.at(*at)).or(hover);
-        let radius = (state.controls.brush_radius() / Picker::of(scene).mm_per_pixel()) as f32 / scale;
+        // On a plane in its scale.
+        let on_plane = place.and_then(|at| {
+            let pixel: [f32; 2] = ((at - picture.min) * scale).into();
+            let [x, y] = pixel.map(|n| n.max(0.0) as usize);
+            scene.cuts_planes().then(|| scene.tiling().tile_at(x, y).map(|tile| tile.pixel)).flatten()
+        });
+        let place = place.filter(|_| on_plane.is_some() == (state.controls.tool() == Tool::Labels) || !scene.is_flat());
+        let pixel = on_plane.unwrap_or_else(|| Picker::of(scene).mm_per_pixel());
+        let radius = (state.controls.brush_radius() / pixel) as f32 / scale;
         if let Some(place) = place.filter(|_| radius.is_finite()) {
             for stroke in [Stroke::new(3.5, OUTLINE), Stroke::new(1.5, MEASURE)] {
                 canvas.painter.circle_stroke(place, radius.min(1e4), stroke);

@@ -15,6 +15,7 @@ pub(super) mod drawn;
 pub(super) mod first_steps;
 mod icons;
 mod inspector;
+mod labels;
 mod lists;
 mod look;
 mod measures;

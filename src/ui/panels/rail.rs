@@ -45,13 +45,14 @@ const PLACES: [&[Place]; 2] = [
         place(texts::AREA, icons::AREA, &[Tool::Measure(MeasureKind::Ellipse), Tool::Measure(MeasureKind::Trace)]),
         place(texts::ANGLE, icons::ANGLE, &[Tool::Measure(MeasureKind::Angle)]),
         place(texts::MEASURED_VOLUME, icons::VOLUME, &[Tool::Measure(MeasureKind::Volume)]),
+        place(texts::LABELS, icons::LABELS, &[Tool::Labels]),
         place(texts::TEXT, icons::TEXT, &[Tool::Measure(MeasureKind::Text), Tool::Measure(MeasureKind::Arrow)]),
         place(texts::BODY, icons::BODY, &[Tool::BodyMark]),
     ],
 ];
 
 /// Height of a button: at most, the least with a word, and the least with the icon alone, points.
-const HEIGHTS: [f32; 3] = [52.0, 38.0, 28.0];
+const HEIGHTS: [f32; 3] = [52.0, 37.0, 28.0];
 /// Between the two parts, and above and below all, points.
 const GAPS: f32 = 16.0;
 

@@ -160,7 +160,7 @@ pub(super) fn start_line(ui: &mut Ui, state: &PanelState, width: f32, execute: &
     });
 }
 
-fn brush_radius(ui: &mut Ui, state: &PanelState, execute: &mut dyn FnMut(Command)) {
+pub(super) fn brush_radius(ui: &mut Ui, state: &PanelState, execute: &mut dyn FnMut(Command)) {
     let hint = texts::RADIUS_OF_BRUSH_HINT;
     if let Some(radius) = plain_slider(ui, texts::RADIUS_OF_BRUSH, state.controls.brush_radius(), BRUSH_RADII, hint) {
         execute(Command::BrushRadius(radius));

@@ -13,6 +13,7 @@ mod first_steps;
 mod gestures;
 mod kept_picture;
 mod keyboard_pointer;
+mod labelling;
 mod layout;
 mod measuring;
 mod region;

@@ -32,6 +32,8 @@ pub(crate) const LOOP_FILM: &str = "Loop, film";
 pub(crate) const LOOP_FILM_HINT: &str = "The same as MP4, back as well if the loop plays so, at the mean rate times its speed (0.1 to 240 pictures a second).";
 pub(crate) const REPORT: &str = "Report, PDF";
 pub(crate) const REPORT_HINT: &str = "Every measurement with its picture, plane, volume and settings, and what identifies the recording. A JSON file beside it makes the same report again.";
+pub(crate) const LABELS_NRRD: &str = "Labels, .seg.nrrd";
+pub(crate) const LABELS_NRRD_HINT: &str = "What the tool Labels shows, as a segmentation of 3D Slicer.";
 pub(crate) const WHY_NO_REPORT: &str =
     "a report names the file of its volumes, and these are live: save the loop (Ctrl+R), and open it";
 pub(crate) fn why_export_not_started(e: impl Display) -> String {

@@ -50,6 +50,9 @@ pub(crate) fn of_tool(tool: Tool) -> &'static str {
             "Body mark: a part of the body with the place of the probe. Drag it, or the probe on it; the wheel turns the probe. (Shift+B)"
         }
         Tool::Measure(kind) => of_measure(kind),
+        Tool::Labels => {
+            "Labels: paint the parts of an organ on planes or on the surface, or click a body to label all of it. Ctrl erases, Shift+wheel sets the brush. (Shift+L)"
+        }
     }
 }
 

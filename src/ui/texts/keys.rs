@@ -62,6 +62,7 @@ pub(crate) const VOLUME_BY_CONTOURS: &str = "measure: volume by contours";
 pub(crate) const VOLUME_BY_THRESHOLD: &str = "measure: volume by threshold, in the region";
 pub const TEXT: &str = "text";
 pub(crate) const ARROW: &str = "arrow";
+pub(crate) const LABELS: &str = "labels: paint, erase, grow from a click";
 pub(crate) const BODY_MARK: &str = "body mark";
 pub(crate) const DELETE_LAST_MEASUREMENT: &str = "delete the last measurement";
 pub(crate) const COPY_RESULTS: &str = "copy the results (CSV)";

@@ -38,10 +38,10 @@ pub(crate) fn files_as_series(count: usize) -> String {
 }
 pub(crate) const OPENS_NO_OTHER_FILES: &str = "This view opens no other files";
 pub(crate) const SAVE_THE_WORKSPACE_FIRST: &str =
-    "Measurements or cuts are not saved: save the workspace first (Ctrl+S)";
+    "Measurements, cuts or labels are not saved: save the workspace first (Ctrl+S)";
 pub(crate) fn loses_work(name: impl Display) -> String {
     format!(
-        "Measurements or cuts of {name} are not saved: save the workspace first (Ctrl+S), or close it again to lose them"
+        "Measurements, cuts or labels of {name} are not saved: save the workspace first (Ctrl+S), or close it again to lose them"
     )
 }
 pub(crate) const SAVE_THE_LOOP_FIRST: &str = "The loop is not saved: save it first (Ctrl+R)";

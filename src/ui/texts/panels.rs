@@ -430,16 +430,16 @@ pub(crate) static UNSAVED_LOOP: Unsaved = Unsaved {
     discard: "Ends the program; the volumes are lost.",
 };
 pub(crate) static UNSAVED_WORK: Unsaved = Unsaved {
-    title: "Measurements or cuts are not saved",
+    title: "Measurements, cuts or labels are not saved",
     about: "They are lost when the program ends.",
     save: "Saves a workspace of each recording that has any, then ends the program.",
-    discard: "Ends the program; measurements and cuts are lost.",
+    discard: "Ends the program; measurements, cuts and labels are lost.",
 };
 pub(crate) static UNSAVED_LOOP_AND_WORK: Unsaved = Unsaved {
     title: "The loop and measurements are not saved",
-    about: "Volumes, measurements and cuts are lost when the program ends.",
+    about: "Volumes, measurements, cuts and labels are lost when the program ends.",
     save: "Saves the loop as a recording and measurements as a workspace, then ends the program.",
-    discard: "Ends the program; volumes, measurements and cuts are lost.",
+    discard: "Ends the program; volumes, measurements, cuts and labels are lost.",
 };
 pub(crate) const CLOSE_HELP_HINT: &str = "Closes the help (H).";
 

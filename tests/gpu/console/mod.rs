@@ -7,6 +7,7 @@ mod gestures;
 mod idle;
 mod kept_picture;
 mod keyboard;
+mod labelling;
 mod metrics;
 mod monkey;
 mod presets;

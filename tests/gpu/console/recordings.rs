@@ -80,7 +80,7 @@ impl Window {
                     let (next, path) = (next.clone(), path.to_path_buf());
                     Ok(Box::new(move || *next.lock().expect("lock") = path))
                 })),
-                recent: None,
+                ..OpeningOptions::default()
             },
             ..options()
         };
@@ -252,7 +252,7 @@ fn what_was_measured_is_not_lost_without_a_question() {
     window.press(false, Key::Char('8'));
     measure(&mut window, 10.0);
     window.press(true, Key::Char('w'));
-    let warning = "Measurements or cuts of a.mha are not saved";
+    let warning = "Measurements, cuts or labels of a.mha are not saved";
     window.until("a warning", |window| window.find(Role::Alert, warning).map(|_| ()));
     assert_eq!(window.listed(), ["> a.mha", "b.mha"]);
     window.press(true, Key::PageDown);
@@ -264,7 +264,7 @@ fn what_was_measured_is_not_lost_without_a_question() {
     // All of it is saved before the program ends.
     window.press(false, Key::Char('q'));
     window.until("the question", |window| {
-        window.find(Role::AlertDialog, "Measurements or cuts are not saved").map(|_| ())
+        window.find(Role::AlertDialog, "Measurements, cuts or labels are not saved").map(|_| ())
     });
     assert!(!window.exits && window.console.asks_to_leave());
     window.press(false, Key::Enter);

@@ -91,6 +91,42 @@ pub(super) fn bright_tissue(user: &mut User) -> String {
     user.count()
 }
 
+/// The voxels of strokes on planes that are farther apart than the brush is wide: each is a cylinder between two halves of a ball.
+pub(super) fn hand_label(user: &mut User) -> String {
+    let [radius, half, step] = [4.0, 10.0, 9.0_f64];
+    let kept = user.at_another(ball_options(&user.folder).settings, narrow_ball);
+    user.letter('7');
+    user.shift('l');
+    user.until("labels", |user| user.labelled());
+    user.console.execute(&Command::BrushRadius(radius), Instant::now());
+    let planes = 3;
+    for _ in 0..planes {
+        let at = user.scene().tiling().tiles[0].plane;
+        let way: Vec<_> = (-8..=8).map(|n| user.on_tile(at.at + at.right * half * f64::from(n) / 8.0)).collect();
+        user.drag(&way);
+        user.wheel(step);
+    }
+    let truth = f64::from(planes) * PI * radius.powi(2) * (2.0 * half + 4.0 / 3.0 * radius) / 1000.0;
+    let found = user.labelled().expect("labels");
+    assert!((found / truth - 1.0).abs() < 0.01, "{found} of {truth}");
+    user.console = kept;
+    format!("{} + 2 a plane", user.actions - 2 * planes as usize)
+}
+
+pub(super) fn grown_label(user: &mut User) -> String {
+    let kept = user.at_another(ball_options(&user.folder).settings, narrow_ball);
+    user.console.describe(true);
+    user.letter('7');
+    user.shift('l');
+    user.click_on(Role::Button, "Grow bright");
+    user.click_plane(5.0, -3.0);
+    let found = user.until("body", |user| user.labelled().filter(|found| *found > 0.0));
+    let truth = 4.0 / 3.0 * PI * user.ball.1.powi(3) / 1000.0;
+    assert!((found / truth - 1.0).abs() < 0.02, "{found} of {truth}");
+    user.console = kept;
+    user.count()
+}
+
 pub(super) fn structure(user: &mut User) -> String {
     user.on_planes();
     user.letter('i');

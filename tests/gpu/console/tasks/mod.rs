@@ -49,6 +49,8 @@ const TASKS: &[(&str, Perform)] = &[
     ("the way along the cheek", cheek),
     ("the volume of the bladder", bladder),
     ("the volume of all bright tissue in the region", bright_tissue),
+    ("label a body by hand", hand_label),
+    ("label all of a body", grown_label),
     ("name a structure", structure),
     ("point at a structure", arrow),
     ("mark where the probe was", body_mark),
@@ -126,6 +128,11 @@ fn ball() -> Phantom {
         ..PhantomOptions::default()
     };
     Phantom::new(options).expect("a phantom")
+}
+
+/// The same in a narrower sweep, so that less has to be searched.
+fn narrow_ball() -> Phantom {
+    Phantom::new(PhantomOptions { fan_angle_deg: 40.0, ..ball().options().clone() }).expect("a phantom")
 }
 
 fn source(phantom: fn() -> Phantom) -> OpenSource {
@@ -349,6 +356,11 @@ impl User {
         let found = &outcome::quantities(last).expect("results")[n];
         let off = (found.value - truth).abs();
         assert!(off <= within, "{}: {} is {}, not {truth}", self.task, found.name, found.value);
+    }
+
+    /// The volume of the first label, cm3; None until labels can be edited.
+    fn labelled(&self) -> Option<f64> {
+        Some(self.console.controls().labelling()?.volumes().next()?.1)
     }
 
     fn texts(&self) -> Vec<String> {

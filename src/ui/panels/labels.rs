@@ -1,0 +1,56 @@
+//! The options of the tool for labels, and the list of labels with their volumes.
+
+use super::colours::{self, EDGE};
+use super::names::{self, Tell};
+use super::widgets::{row_of, switch};
+use super::{PanelState, ROW_HEIGHT, TEXT_SIZE, tools};
+use crate::command::{Command, Effect, LabelCommand, Tool};
+use crate::texts;
+use egui::{Align2, Button, FontId, Rect, RichText, Stroke, StrokeKind, Ui, vec2};
+
+/// Each effect with its hint and its name.
+const EFFECTS: [((Effect, &str), &str); 4] = [
+    ((Effect::Paint, texts::PAINT_HINT), texts::PAINT),
+    ((Effect::Erase, texts::ERASE_HINT), texts::ERASE),
+    ((Effect::GrowDark, texts::GROW_DARK_HINT), texts::GROW_DARK),
+    ((Effect::GrowBright, texts::GROW_BRIGHT_HINT), texts::GROW_BRIGHT),
+];
+
+/// Shows, while the tool for labels is selected, what it does, the brush, and the labels.
+pub(super) fn show(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+    let is_chosen = state.controls.tool() == Tool::Labels;
+    let Some(labels) = state.controls.labelling().filter(|_| is_chosen) else { return };
+    names::group(ui, texts::LABELS, |ui| {
+        ui.set_max_width(width);
+        let is_chosen = |(effect, _)| effect == labels.effect;
+        let choose = |(effect, _)| execute(Command::Labels(LabelCommand::Effect(effect)));
+        row_of(ui, texts::LABELS, &EFFECTS, (2, width), is_chosen, |(_, hint)| hint, choose);
+        if matches!(labels.effect, Effect::Paint | Effect::Erase) {
+            tools::brush_radius(ui, state, execute);
+            let mut is_ball = labels.is_ball;
+            if switch(ui, &mut is_ball, texts::SPHERE_BRUSH, texts::SPHERE_BRUSH_HINT) {
+                execute(Command::Labels(LabelCommand::Ball(is_ball)));
+            }
+        }
+        let size = vec2(width, ROW_HEIGHT);
+        for (segment, volume) in labels.volumes() {
+            // The name begins after the colour.
+            let name = RichText::new(format!("       {}", segment.name));
+            let button = Button::selectable(segment.label == labels.chosen, name).frame_when_inactive(true);
+            let row = ui.add_sized(size, button.right_text("").truncate().min_size(size));
+            let colour = Rect::from_center_size(row.rect.left_center() + vec2(18.0, 0.0), vec2(14.0, 14.0));
+            let (fill, edge) = (colours::of_scene(segment.colour), Stroke::new(1.0, EDGE));
+            ui.painter().rect(colour, 3.0, fill, edge, StrokeKind::Inside);
+            let (at, volume) = (row.rect.right_center() - vec2(10.0, 0.0), texts::volume_of_label(volume));
+            let text = ui.visuals().widgets.inactive.fg_stroke.color;
+            ui.painter().text(at, Align2::RIGHT_CENTER, &volume, FontId::proportional(TEXT_SIZE), text);
+            let name = format!("{} {volume}", segment.name);
+            if row.tell(texts::CHOOSE_LABEL_HINT).named(&name).clicked() {
+                execute(Command::Labels(LabelCommand::Choose(segment.label)));
+            }
+        }
+        if ui.add_sized(size, Button::new(texts::ADD_LABEL)).tell(texts::ADD_LABEL_HINT).clicked() {
+            execute(Command::Labels(LabelCommand::Add));
+        }
+    });
+}

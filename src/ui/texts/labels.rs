@@ -1,0 +1,59 @@
+//! Labels that the user edits.
+
+use crate::segment::bodies::Body;
+use crate::segment::volume::Measured;
+use std::fmt::Display;
+
+pub(crate) const LABELS: &str = "Labels";
+pub(crate) fn label(number: impl Display) -> String {
+    format!("Label {number}")
+}
+pub(crate) const PAINT: &str = "Paint";
+pub(crate) const PAINT_HINT: &str = "Drag over a plane or over the surface: the label is painted. Ctrl erases.";
+pub(crate) const ERASE: &str = "Erase";
+pub(crate) const ERASE_HINT: &str = "Drag over a plane or over the surface: the chosen label is erased, others stay.";
+pub(crate) const GROW_DARK: &str = "Grow dark";
+pub(crate) const GROW_DARK_HINT: &str =
+    "Click in a body that is darker than what is around it, such as a cyst: all of it gets the label.";
+pub(crate) const GROW_BRIGHT: &str = "Grow bright";
+pub(crate) const GROW_BRIGHT_HINT: &str =
+    "Click in a body that is brighter than what is around it: all of it gets the label.";
+pub(crate) const SPHERE_BRUSH: &str = "Sphere brush";
+pub(crate) const SPHERE_BRUSH_HINT: &str =
+    "On: a ball also on planes. Off: a disc that is one voxel thick, in the plane alone. On the surface it is a ball.";
+pub(crate) const CHOOSE_LABEL_HINT: &str =
+    "Click: this label is painted. Its volume is that of its voxels; growing also says what the echoes measure.";
+pub(crate) const ADD_LABEL: &str = "Add a label";
+pub(crate) const ADD_LABEL_HINT: &str = "The new label is then painted.";
+pub(crate) const NO_LABELS_YET: &str = "The labels are being prepared: wait a moment";
+pub(crate) const TOO_MANY_LABELS: &str = "There are 255 labels, which is as many as a voxel can tell apart.";
+pub(crate) const LABELS_NEED_SURFACE: &str =
+    "Labels need planes or a surface: choose planes, or the mode Surface or Mixed";
+pub(crate) const GROWING: &str = "Growing from the place of the click";
+pub(crate) const STILL_AT_WORK_ON_LABELS: &str = "Labels are still being prepared or grown: wait a moment";
+pub(crate) const WHY_NO_LABELS: &str = "nothing is labelled with the tool Labels (Shift+L)";
+pub(crate) const WHY_THREAD_ENDED: &str = "the search ended early";
+pub(crate) fn no_labels(why: impl Display) -> String {
+    format!("Labels cannot be edited: {why}")
+}
+pub(crate) fn too_many_voxels(most: impl Display) -> String {
+    format!("their lattice has more than {most} voxels")
+}
+pub(crate) fn not_grown(why: impl Display) -> String {
+    format!("Nothing is labelled: {why}")
+}
+pub(crate) fn volume_of_label(volume: f64) -> String {
+    format!("{volume:.2} cm\u{b3}")
+}
+pub(crate) fn grown(body: &Body) -> String {
+    let cm3 = |mm3: f64| mm3 / 1000.0;
+    let by_echoes = match body.measured {
+        Ok(Measured { volume, low, high }) => {
+            let volume = volume_of_label(cm3(volume));
+            format!("{volume} by the echoes (95 %: {:.2} to {:.2})", cm3(low), cm3(high))
+        }
+        Err(why) => format!("not measured by the echoes: {why}"),
+    };
+    let cut = if body.is_cut { "; it reaches the border, so that a part may be missing" } else { "" };
+    format!("Grown: {by_echoes}; {} in voxels{cut}", volume_of_label(cm3(body.labelled)))
+}
