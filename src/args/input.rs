@@ -243,22 +243,18 @@ impl InputArgs {
         Ok(origin)
     }
 
-    /// Calls `each` with every frame of the volume, in the order of the recording, and shows a progress bar. Ends with the first error of the
-    /// recording or of `each`.
+    /// Every frame of the volume, in the order of the recording; shows a progress bar.
     #[cfg(feature = "lab")]
-    pub fn for_each_frame(
-        &self,
-        source: &mut dyn Source,
-        mut each: impl FnMut(Frame) -> Result<(), Failure>,
-    ) -> Result<(), Failure> {
+    pub fn frames(&self, source: &mut dyn Source) -> Result<Vec<Frame>, Failure> {
         let bar = progress_bar(source.frames_per_volume() as u64).with_message("frames");
+        let mut frames = Vec::new();
         frames_of(source, self.volume()?, |frame| {
-            each(frame)?;
+            frames.push(frame);
             bar.inc(1);
             Ok(())
         })?;
         bar.finish_and_clear();
-        Ok(())
+        Ok(frames)
     }
 
     /// The scene with the volume format and the way of sampling that the chosen device will use. If there is no device, the scene stays
@@ -494,6 +490,16 @@ pub fn frames_of(
         each(frame)?;
     }
     Ok(())
+}
+
+/// Makes a folder that files are written to, unless it is there.
+pub fn make_folder(folder: &Path) -> Result<(), Failure> {
+    std::fs::create_dir_all(folder).map_err(|e| failed(format!("{}: cannot be written: {e}", folder.display())))
+}
+
+/// Fails if the validation layer has reported something.
+pub fn check_messages(context: &Context) -> Result<(), Failure> {
+    context.messages().first().map_or(Ok(()), |first| Err(failed(format!("validation: {first}"))))
 }
 
 /// Checks that the recording has a volume with this index. The message has the recording's `name` and the `flag` that selects the volume.

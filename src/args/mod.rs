@@ -14,7 +14,9 @@ mod user_files;
 #[cfg(feature = "verify")]
 pub use input::open_device_until;
 pub use input::recorded;
-pub use input::{InputArgs, Output, SceneArgs, check_outputs, check_volume, device_failure, frames_of};
+pub use input::{
+    InputArgs, Output, SceneArgs, check_messages, check_outputs, check_volume, device_failure, frames_of, make_folder,
+};
 #[cfg(feature = "lab")]
 pub use input::{Opened, open_device, open_device_for_statistics, write_report};
 pub use motor::{SerialArgs, motor_failure, motor_table};

@@ -1,6 +1,6 @@
 //! The output of several pictures: a folder, names with a number, or a film (.mp4).
 
-use super::input::check_inputs;
+use super::input::{check_inputs, make_folder};
 use super::picture_file::STANDARD;
 use crate::picture::film::{FilmWriter, encoder};
 use crate::picture::{Picture, PictureFormat, check_target, replace};
@@ -90,8 +90,7 @@ impl SeriesTarget {
         };
         check_inputs("-o", &files, read)?;
         if let SeriesTarget::Files { folder: Some(folder), .. } = self {
-            std::fs::create_dir_all(folder)
-                .map_err(|e| failed(format!("{}: cannot be written: {e}", folder.display())))?;
+            make_folder(folder)?;
         }
         files.first().map_or(Ok(()), |first| check_target(first).map_err(failed))
     }

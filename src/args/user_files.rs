@@ -77,8 +77,8 @@ mod tests {
     #[cfg(feature = "view")]
     #[test]
     fn only_the_first_start_of_a_user_has_hints() {
-        let folder = std::env::temp_dir().join(format!("echolume-first-start-{}", std::process::id()));
-        std::fs::create_dir_all(&folder).expect("a folder");
+        let work = crate::files::WorkFolder::new(&std::env::temp_dir(), "echolume-first-start-").expect("a folder");
+        let folder = work.path();
         let [recent, presets] = ["recent", "presets.toml"].map(|name| folder.join(name));
         let shown = folder.join("hints-shown");
         let hints = |presets: Option<&PathBuf>| first_steps_beside(recent.clone(), presets.cloned());
@@ -89,7 +89,6 @@ mod tests {
             assert_eq!(hints(Some(&presets)), None, "{}", file.display());
             std::fs::remove_file(file).expect("removed");
         }
-        std::fs::remove_dir_all(&folder).expect("removed");
     }
 
     #[cfg(all(unix, feature = "view"))]

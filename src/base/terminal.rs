@@ -113,20 +113,8 @@ pub fn write(bytes: &[u8]) {
     }
 }
 
-/// Prints a warning on standard error as one line. It does not change the exit code of the command.
+/// Prints a warning, or why the command ends, on standard error as one line. The exit code is the caller's.
 pub fn remark(message: &str) {
-    let _ = writeln!(std::io::stderr(), "echolume: {}", single_line(message));
-}
-
-/// Prints the failure on standard error as one line.
-pub fn print_failure(failure: &Failure) {
-    let (Failure::Input(message)
-    | Failure::Failed(message)
-    | Failure::NoDevice(message)
-    | Failure::Interrupted(message)
-    | Failure::SomeFailed(message)
-    | Failure::CannotTell(message)
-    | Failure::Untestable(message)) = failure;
     let _ = writeln!(std::io::stderr(), "echolume: {}", single_line(message));
 }
 

@@ -147,14 +147,6 @@ pub fn from_text<T: DeserializeOwned>(text: &str) -> Result<T, NodeError> {
     T::deserialize(Node::parse(text)?)
 }
 
-/// Deserializes a type from a table in memory.
-///
-/// # Errors
-/// A value does not fit the type.
-pub fn from_table<T: DeserializeOwned>(table: toml::Table) -> Result<T, NodeError> {
-    T::deserialize(Node::from(Value::Table(table)))
-}
-
 impl Node {
     /// Parses a TOML text.
     ///
@@ -545,7 +537,7 @@ mod tests {
     fn a_table_is_read_as_its_text() {
         for text in TEXTS {
             let Ok(table) = toml::from_str::<toml::Table>(text) else { continue };
-            let (ours, theirs) = (from_table::<All>(table), from_text::<All>(text));
+            let (ours, theirs) = (All::deserialize(Node::from(Value::Table(table))), from_text::<All>(text));
             assert_eq!(ours.as_ref().ok(), theirs.as_ref().ok(), "{text}");
             assert_eq!(ours.err().map(|e| e.to_string()), theirs.err().map(|e| e.to_string()), "{text}");
         }

@@ -83,10 +83,7 @@ impl Painter {
                 none.insert(Renderer::new(&self.context, scene.clone(), &options)?)
             }
         };
-        for frame in frames {
-            renderer.frame(frame.slice as u32, &frame.bytes, 0)?;
-        }
-        renderer.show(0)?;
+        renderer.volume(frames)?;
         let picture = renderer.picture()?;
         if !is_whole {
             self.renderer = None;

@@ -9,7 +9,7 @@ use crate::files::escaped;
 use crate::probe::{Geometry, Grid, World};
 use crate::scene::Scene;
 use crate::source::convert::{Target, Volume, lattice, no_echo};
-use crate::source::{self, Frame, Source, StoredType};
+use crate::source::{self, Frame, Source};
 use crate::terminal::{Failure, input};
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
@@ -204,19 +204,10 @@ fn measured(task: &Task, source: &mut dyn Source) -> Result<Map<String, Value>, 
     let frames = frames(&task.work, source)?;
     let (shift, stored, range) = (source.sample_type().shift(), source.stored_type(), source.range());
     let mut statistics = Statistics::default();
-    frames.iter().for_each(|frame| for_each_sample(stored, &frame.bytes, |value| statistics.take(value, range)));
+    frames.iter().for_each(|frame| stored.for_each(&frame.bytes, |value| statistics.take(value, range)));
     figures.insert("frames".into(), frames.len().into());
     figures.insert("samples".into(), statistics.figures(shift));
     Ok(figures)
-}
-
-/// Calls `each` with every sample, as stored.
-fn for_each_sample(stored: StoredType, bytes: &[u8], mut each: impl FnMut(f64)) {
-    match stored {
-        StoredType::U8 => bytes.iter().for_each(|b| each(f64::from(*b))),
-        StoredType::U16 => bytes.as_chunks().0.iter().for_each(|b| each(f64::from(u16::from_le_bytes(*b)))),
-        StoredType::F32 => bytes.as_chunks().0.iter().for_each(|b| each(f64::from(f32::from_le_bytes(*b)))),
-    }
 }
 
 /// Running statistics by Welford's method, which loses no digits where the mean is far from 0.

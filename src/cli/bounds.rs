@@ -1,6 +1,6 @@
 //! `echolume report bounds`: proven bounds of a picture.
 
-use crate::args::InputArgs;
+use crate::args::{InputArgs, make_folder};
 use crate::bounds::{Effort, PictureBounds, Proof, fault, picture, proven};
 use crate::dump::npy;
 use crate::gpu::{Renderer, RendererOptions};
@@ -102,13 +102,8 @@ impl BoundsReport {
         if let Some(why) = fault(&scene) {
             return Err(input(format!("report bounds: {why}")));
         }
-        std::fs::create_dir_all(&self.output)
-            .map_err(|e| failed(format!("{}: cannot be written: {e}", self.output.display())))?;
-        let mut frames = Vec::new();
-        self.input.for_each_frame(&mut *source, |frame| {
-            frames.push(frame);
-            Ok(())
-        })?;
+        make_folder(&self.output)?;
+        let frames = self.input.frames(&mut *source)?;
         let shown =
             tolerance.map(|tolerance| self.drawn(drawn, &frames).map(|of_it| (tolerance, of_it))).transpose()?;
         // Pixels whose error is close to the tolerance need bounds that are narrow beside it.
@@ -153,10 +148,7 @@ impl BoundsReport {
         let context = self.input.open_device(false)?;
         let slot = rendered(&scene);
         let mut renderer = Renderer::new(&context, scene, &RendererOptions::default()).map_err(failed)?;
-        for frame in frames {
-            renderer.frame(frame.slice as u32, &frame.bytes, 0).map_err(failed)?;
-        }
-        renderer.show(0).map_err(failed)?;
+        renderer.volume(frames).map_err(failed)?;
         renderer.picture().map_err(failed)?;
         let [colours, errors] = [slot, Slot::PixelErrors].map(|slot| renderer.read(slot));
         match (colours.map_err(failed)?, errors.map_err(failed)?) {

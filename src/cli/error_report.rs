@@ -1,6 +1,6 @@
 //! `echolume report error`: error against run time.
 
-use crate::args::{InputArgs, Opened, parse_nanoseconds};
+use crate::args::{InputArgs, Opened, make_folder, parse_nanoseconds};
 use crate::error_report::choose::Bound;
 use crate::error_report::plot::Figure;
 use crate::error_report::{self, Measure, choose, dials, errors_and_times, export, plot};
@@ -99,16 +99,11 @@ impl ErrorReport {
         let Opened { mut source, recorded, layers, scene } = self.input.open_recorded(&[], None)?;
         let scene = self.input.resolve_format(scene);
         if let Some(folder) = &self.output {
-            std::fs::create_dir_all(folder)
-                .map_err(|e| failed(format!("{}: cannot be written: {e}", folder.display())))?;
+            make_folder(folder)?;
         }
         let dials = self.dials(&scene)?;
         let context = self.input.open_device(false)?;
-        let mut frames = Vec::new();
-        self.input.for_each_frame(&mut *source, |frame| {
-            frames.push(frame);
-            Ok(())
-        })?;
+        let frames = self.input.frames(&mut *source)?;
         let (repeats, frames, shown) = (self.repeat, &frames[..], self.input.name());
         let measurement = errors_and_times::ErrorMeasurement {
             context: &context,
@@ -193,7 +188,7 @@ impl ErrorReport {
 }
 
 fn write(report: &error_report::Report, measure: Measure, folder: &Path) -> Result<(), Failure> {
-    std::fs::create_dir_all(folder).map_err(|e| failed(format!("{}: cannot be written: {e}", folder.display())))?;
+    make_folder(folder)?;
     replace(&folder.join("error.json"), report.to_json().map_err(failed)?.as_bytes()).map_err(failed)?;
     replace(&folder.join("error.csv"), export::csv(report).as_bytes()).map_err(failed)?;
     let mut written = vec!["error.json".to_string(), "error.csv".into()];

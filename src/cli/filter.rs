@@ -1,6 +1,6 @@
 //! `echolume filter`: applies the 2D slice filters to an ordinary picture.
 
-use crate::args::{PictureFile, check_outputs, open_device};
+use crate::args::{PictureFile, check_messages, check_outputs, open_device};
 use crate::gpu::{Context, DeviceChoice, Renderer, RendererOptions, TimeStamps};
 use crate::passes::times::pass_time_table;
 use crate::passes::{Slot, Texels};
@@ -144,10 +144,7 @@ impl Filter {
         if self.growth_table {
             self.print_growth(&context, &grey, rows)?;
         }
-        match context.messages().first() {
-            None => Ok(()),
-            Some(first) => Err(failed(format!("validation: {first}"))),
-        }
+        check_messages(&context)
     }
 
     /// The settings of the given filters, with the assignments `more` on top.

@@ -259,8 +259,9 @@ pub fn run() -> ExitCode {
     // The log itself stays open: the process ends before it is dropped.
     *lock.lock().unwrap_or_else(PoisonError::into_inner) = None;
     let Err(failure) = done else { return ExitCode::SUCCESS };
-    terminal::print_failure(&failure);
-    ExitCode::from(failure.exit_code())
+    let code = failure.exit_code();
+    terminal::remark(&failure.message());
+    ExitCode::from(code)
 }
 
 /// The arguments of this process. What is wrong with them is printed.

@@ -1,6 +1,8 @@
 //! `echolume profile --pipelines`: statistics of the compiled pipelines.
 
-use crate::args::{InputArgs, Output, ShaderArgs, check_outputs, open_device_for_statistics, write_report};
+use crate::args::{
+    InputArgs, Output, ShaderArgs, check_messages, check_outputs, open_device_for_statistics, write_report,
+};
 use crate::baselines::Stored;
 use crate::profile::pipelines::compare::compare;
 use crate::profile::pipelines::table::{comparison_table, table};
@@ -53,10 +55,8 @@ impl Request<'_> {
         }
         let profile = measure(&context, &scenes, &shaders, format!("{}{what}", self.input.name()))
             .map_err(|fault| self.shaders.failure(fault))?;
-        match context.messages().first() {
-            None => Ok(profile),
-            Some(first) => Err(failed(format!("validation: {first}"))),
-        }
+        check_messages(&context)?;
+        Ok(profile)
     }
 
     /// Prints the differences. Fails if something became worse.

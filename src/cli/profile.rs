@@ -119,11 +119,7 @@ impl Profile {
         let shaders = self.shaders.open()?;
         let context = self.input.open_device(false)?;
         // All repeats use the same volume.
-        let mut frames = Vec::new();
-        self.input.for_each_frame(&mut *source, |frame| {
-            frames.push(frame);
-            Ok(())
-        })?;
+        let frames = self.input.frames(&mut *source)?;
         let options = timed_run::ProfileOptions {
             repeats: self.repeat as usize,
             warm_up: self.warm_up as usize,
@@ -133,7 +129,7 @@ impl Profile {
             ceilings: !self.no_ceilings,
         };
         let failure = |fault| self.shaders.failure(fault);
-        let mut run = timed_run::ProfileRun::with_shaders(&context, &scene, &options, &shaders).map_err(failure)?;
+        let mut run = timed_run::ProfileRun::new(&context, &scene, &options, &shaders).map_err(failure)?;
         while run.needs_more() {
             if self.in_turn {
                 against::await_turn()?;

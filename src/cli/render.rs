@@ -7,7 +7,7 @@ use super::mesh_sheet;
 use super::one_colour;
 use super::series::{Job, SeriesArgs};
 use super::still::{self, StillArgs};
-use crate::args::{InputArgs, Output, PictureFile, ShaderArgs, check_outputs};
+use crate::args::{InputArgs, Output, PictureFile, ShaderArgs, check_messages, check_outputs, make_folder};
 use crate::dump;
 use crate::error_map;
 use crate::files;
@@ -168,8 +168,7 @@ impl Render {
         }
         let finer = self.finer(&scene)?;
         if let Some(folder) = &self.dump {
-            std::fs::create_dir_all(folder)
-                .map_err(|e| failed(format!("{}: cannot be written: {e}", folder.display())))?;
+            make_folder(folder)?;
         }
         let mut context = self.input.open_device(self.validate)?;
         let mut options = options;
@@ -234,10 +233,7 @@ impl Render {
             let [picture, finer] = [pair.0, pair.1].map(|scene| in_floats(&context, scene, &options, &kept));
             self.write_error_map(file, &picture?, &finer?)?;
         }
-        match context.messages().first() {
-            None => Ok(()),
-            Some(first) => Err(failed(format!("validation: {first}"))),
-        }
+        check_messages(&context)
     }
 
     /// Sends a volume and draws its picture. The frames are kept for an error map.
@@ -420,10 +416,7 @@ fn in_floats(
 ) -> Result<Texels, Failure> {
     scene.settings.post.floats = true;
     let mut renderer = Renderer::new(context, scene, options).map_err(failed)?;
-    for frame in frames {
-        renderer.frame(frame.slice as u32, &frame.bytes, 0).map_err(failed)?;
-    }
-    renderer.show(0).map_err(failed)?;
+    renderer.volume(frames).map_err(failed)?;
     renderer.picture().map_err(failed)?;
     renderer.read(Slot::Picture).map_err(failed)?.ok_or_else(|| failed("--error-map: the plan has no picture"))
 }

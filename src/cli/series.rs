@@ -2,7 +2,7 @@
 
 use super::drawing::{DrawFault, draw_despite_losses, send_volume};
 use super::one_colour;
-use crate::args::{InputArgs, PictureSeries, SeriesTarget, check_volume};
+use crate::args::{InputArgs, PictureSeries, SeriesTarget, check_messages, check_volume};
 use crate::files::signals::Writing;
 use crate::gpu::{Context, Renderer, RendererOptions};
 use crate::marked::{self, Demo};
@@ -143,12 +143,8 @@ impl SeriesArgs {
         // Dropped last: after everything is in order, a signal that arrived ends the process.
         let signals = Writing::begin();
         let mut context = None;
-        let result = self.draw_all(job, &target, &signals, &mut context);
-        result?;
-        match context.as_ref().and_then(|context: &Arc<Context>| context.messages().into_iter().next()) {
-            None => Ok(()),
-            Some(first) => Err(failed(format!("validation: {first}"))),
-        }
+        self.draw_all(job, &target, &signals, &mut context)?;
+        context.as_deref().map_or(Ok(()), check_messages)
     }
 
     fn draw_all(

@@ -2,7 +2,7 @@
 
 use super::one_colour;
 use super::serve::{ServeArgs, Serving};
-use crate::args::{SceneArgs, SourceArgs, StreamArgs, check_outputs};
+use crate::args::{SceneArgs, SourceArgs, StreamArgs, check_messages, check_outputs, make_folder};
 use crate::files::Lock;
 use crate::files::signals::Held;
 use crate::gpu::{Context, GpuError, Losses};
@@ -77,8 +77,7 @@ impl Stream {
         let layers = self.scene.layers(self.source.is_phantom(), &[])?;
         let settings = layers.clone().finish().map_err(input)?;
         if let Some(folder) = &self.out {
-            std::fs::create_dir_all(folder)
-                .map_err(|e| failed(format!("{}: cannot be written: {e}", folder.display())))?;
+            make_folder(folder)?;
         }
         if let Some(file) = &self.record {
             check_record(file, self.source.path())?;
@@ -101,10 +100,7 @@ impl Stream {
         drop(stream);
         serving.into_iter().for_each(Serving::end);
         done?;
-        match context.messages().first() {
-            None => Ok(()),
-            Some(first) => Err(failed(format!("validation: {first}"))),
-        }
+        check_messages(&context)
     }
 
     /// Runs the stream to its end. `context` is replaced when its device is lost.

@@ -3,8 +3,8 @@
 use super::view_config::{ConsoleConfig, First, WindowConfig, rungs};
 use super::view_open::{OpenedInWindow, Shown, check_later, locked};
 use crate::args::{
-    SceneArgs, SourceArgs, StreamArgs, check_outputs, device_failure, first_steps, parse_nanoseconds, presets_file,
-    recent_list,
+    SceneArgs, SourceArgs, StreamArgs, check_messages, check_outputs, device_failure, first_steps, parse_nanoseconds,
+    presets_file, recent_list,
 };
 use crate::files::Lock;
 use crate::gpu::shader_reload::ShaderFolder;
@@ -393,8 +393,5 @@ fn finish((mut console, context): (Console, Arc<Context>)) -> Result<(), Failure
     if unrecorded > 0 {
         return Err(failed(format!("--record: {unrecorded} frames could not be written")));
     }
-    match context.messages().first() {
-        None => Ok(()),
-        Some(first) => Err(failed(format!("validation: {first}"))),
-    }
+    check_messages(&context)
 }

@@ -128,9 +128,7 @@ fn colour(difference: f64) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::probe::{Geometry, Grid, StoredType};
-    use crate::scene::Input;
-    use crate::scene::load::Layers;
+    use crate::scene::test_block::block;
 
     /// Lightness of CIELAB over sRGB (IEC 61966-2-1).
     fn lightness([r, g, b]: [f64; 3]) -> f64 {
@@ -146,11 +144,7 @@ mod tests {
     }
 
     fn scene(assignments: &str) -> Scene {
-        let mut layers = Layers::default();
-        assignments.split_whitespace().for_each(|set| layers.set(set).expect("a setting"));
-        let grid = Grid { size: [20; 3], spacing: [1.0; 3], origin: [0.0; 3] };
-        let input = Input { stored: StoredType::U8, range: [0.0, 255.0] };
-        Scene::new(Geometry::Cartesian(grid), input, layers.finish().expect("settings")).expect("a scene")
+        block(&assignments.split_whitespace().collect::<Vec<_>>(), [20; 3])
     }
 
     /// Prevents a map of the difference of two different pictures, and one that is black because both pictures are the same.

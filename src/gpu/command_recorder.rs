@@ -4,11 +4,11 @@ use super::bands::{Band, BandLimit, Work};
 use super::buffers::{Buffer, Purpose, Readback, Upload};
 use super::context::Context;
 use super::descriptor_sets::DescriptorSets;
-use super::device_queues::DeviceQueues;
+use super::device_queues::{DeviceQueues, memory_barrier};
 use super::error::{ErrorContext, GpuError};
 use super::formats;
 use super::pipelines::{Pipeline, descriptor_type};
-use super::resources::{Image, Resource, SlotResources, WHOLE};
+use super::resources::{COLOUR, Image, Resource, SlotResources, WHOLE, image_barrier};
 use super::timeline::Submission;
 use super::timing::{Stamps, TimeStamps};
 use crate::barriers::{self, Access, PipelineStage};
@@ -427,13 +427,14 @@ impl CommandRecorder {
         let indirect = (vk::PipelineStageFlags2::DRAW_INDIRECT, vk::AccessFlags2::INDIRECT_COMMAND_READ);
         let copied = (vk::PipelineStageFlags2::ALL_TRANSFER, vk::AccessFlags2::TRANSFER_WRITE);
         // The buffer belongs to this recorder alone: an earlier dispatch may still read it.
-        order(device, commands, (indirect.0, vk::AccessFlags2::NONE), copied);
+        // SAFETY: the command buffer is being recorded, outside any render pass.
+        unsafe { memory_barrier(device, commands, (indirect.0, vk::AccessFlags2::NONE), copied) };
         let region = region(image, 0..1, 0..image.extent.height, BufferLayout::default());
         // SAFETY: the buffer is as large as the image and both live until the device is done.
         unsafe {
             device.cmd_copy_image_to_buffer(commands, image.handle, vk::ImageLayout::GENERAL, groups.handle, &[region]);
+            memory_barrier(device, commands, copied, indirect);
         }
-        order(device, commands, copied, indirect);
         Ok(())
     }
 
@@ -474,31 +475,9 @@ impl CommandRecorder {
 
 /// Records a barrier: everything before it is done, and its writes are visible to `memory` accesses after it.
 fn flush(device: &ash::Device, commands: vk::CommandBuffer, memory: vk::AccessFlags2) {
-    let barrier = [vk::MemoryBarrier2::default()
-        .src_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
-        .src_access_mask(memory & vk::AccessFlags2::MEMORY_WRITE)
-        .dst_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
-        .dst_access_mask(memory)];
-    let dependency = vk::DependencyInfo::default().memory_barriers(&barrier);
+    let all = vk::PipelineStageFlags2::ALL_COMMANDS;
     // SAFETY: the command buffer is being recorded, outside any render pass.
-    unsafe { device.cmd_pipeline_barrier2(commands, &dependency) };
-}
-
-/// Records a barrier between accesses of one stage and those of another.
-fn order(
-    device: &ash::Device,
-    commands: vk::CommandBuffer,
-    (before, written): (vk::PipelineStageFlags2, vk::AccessFlags2),
-    (after, memory): (vk::PipelineStageFlags2, vk::AccessFlags2),
-) {
-    let barrier = [vk::MemoryBarrier2::default()
-        .src_stage_mask(before)
-        .src_access_mask(written)
-        .dst_stage_mask(after)
-        .dst_access_mask(memory)];
-    let dependency = vk::DependencyInfo::default().memory_barriers(&barrier);
-    // SAFETY: the command buffer is being recorded, outside any render pass.
-    unsafe { device.cmd_pipeline_barrier2(commands, &dependency) };
+    unsafe { memory_barrier(device, commands, (all, memory & vk::AccessFlags2::MEMORY_WRITE), (all, memory)) };
 }
 
 /// Records an execution barrier between everything before and after it. It covers no memory, so that validation still notices a
@@ -607,31 +586,13 @@ impl CommandRecorder {
     pub(crate) fn clear_new(&mut self, queues: &mut DeviceQueues, slots: &SlotResources, new: &[(Slot, u32)]) {
         let images: Vec<(&Image, Slot, u32)> =
             new.iter().filter_map(|&(slot, n)| slots.image(slot, n).map(|image| (image, slot, n))).collect();
-        let transitions: Vec<_> = images
-            .iter()
-            .map(|(image, ..)| {
-                // The memory may have belonged to another image before.
-                vk::ImageMemoryBarrier2::default()
-                    .src_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
-                    .src_access_mask(vk::AccessFlags2::MEMORY_WRITE)
-                    .dst_stage_mask(vk::PipelineStageFlags2::ALL_TRANSFER)
-                    .dst_access_mask(vk::AccessFlags2::TRANSFER_WRITE)
-                    .old_layout(vk::ImageLayout::UNDEFINED)
-                    .new_layout(vk::ImageLayout::GENERAL)
-                    .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
-                    .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
-                    .image(image.handle)
-                    .subresource_range(WHOLE)
-            })
-            .collect();
-        let device = &self.context.device;
+        // The memory may have belonged to other images before.
+        let before =
+            (vk::PipelineStageFlags2::ALL_COMMANDS, vk::AccessFlags2::MEMORY_WRITE, vk::ImageLayout::UNDEFINED);
+        let after = (vk::PipelineStageFlags2::ALL_TRANSFER, vk::AccessFlags2::TRANSFER_WRITE, vk::ImageLayout::GENERAL);
+        let (device, handles) = (&self.context.device, images.iter().map(|(image, ..)| image.handle));
         // SAFETY: the images are new, alive, and used by nothing yet.
-        unsafe {
-            device.cmd_pipeline_barrier2(
-                self.commands,
-                &vk::DependencyInfo::default().image_memory_barriers(&transitions),
-            );
-        }
+        unsafe { image_barrier(device, self.commands, handles, before, after) };
         for (image, slot, n) in images {
             let access = Access::of_slot(slot, n, 0..image.shape.parts(), true, PipelineStage::Copy);
             self.barrier(queues, &[access]);
@@ -734,12 +695,7 @@ fn region(image: &Image, parts: Range<u32>, rows: Range<u32>, layout: BufferLayo
         buffer_offset: layout.offset,
         buffer_row_length: layout.row_length,
         buffer_image_height: layout.image_height,
-        image_subresource: vk::ImageSubresourceLayers {
-            aspect_mask: vk::ImageAspectFlags::COLOR,
-            mip_level: 0,
-            base_array_layer: layer,
-            layer_count: layers,
-        },
+        image_subresource: vk::ImageSubresourceLayers { base_array_layer: layer, layer_count: layers, ..COLOUR },
         image_offset: vk::Offset3D { x: 0, y: rows.start as i32, z: z as i32 },
         image_extent: vk::Extent3D { width: image.extent.width, height: rows.end - rows.start, depth },
     }

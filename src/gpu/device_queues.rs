@@ -67,14 +67,9 @@ impl DeviceQueues {
             log.record(queue, barrier, accesses);
         }
         let Some(Barrier { from, to }) = barrier else { return };
-        let barrier = [vk::MemoryBarrier2::default()
-            .src_stage_mask(stages(from))
-            .src_access_mask(writes(from))
-            .dst_stage_mask(stages(to))
-            .dst_access_mask(reads(to) | writes(to))];
-        let dependency = vk::DependencyInfo::default().memory_barriers(&barrier);
+        let (before, after) = ((stages(from), writes(from)), (stages(to), reads(to) | writes(to)));
         // SAFETY: the command buffer is being recorded, outside any render pass.
-        unsafe { context.device.cmd_pipeline_barrier2(commands, &dependency) };
+        unsafe { memory_barrier(&context.device, commands, before, after) };
     }
 
     /// Notes in the log that a time stamp was recorded on this queue.
@@ -97,6 +92,26 @@ impl DeviceQueues {
 
 fn flags<T: std::ops::BitOr<Output = T> + Default>(workers: PipelineStages, of: [(PipelineStage, T); 3]) -> T {
     of.into_iter().filter(|(worker, _)| workers.has(*worker)).fold(T::default(), |all, (_, flags)| all | flags)
+}
+
+/// Records a barrier of memory between accesses of some stages and those of others.
+///
+/// # Safety
+/// The command buffer is being recorded, outside any render pass.
+pub(super) unsafe fn memory_barrier(
+    device: &ash::Device,
+    commands: vk::CommandBuffer,
+    (before, written): (vk::PipelineStageFlags2, vk::AccessFlags2),
+    (after, memory): (vk::PipelineStageFlags2, vk::AccessFlags2),
+) {
+    let barrier = [vk::MemoryBarrier2::default()
+        .src_stage_mask(before)
+        .src_access_mask(written)
+        .dst_stage_mask(after)
+        .dst_access_mask(memory)];
+    let dependency = vk::DependencyInfo::default().memory_barriers(&barrier);
+    // SAFETY: as of this function.
+    unsafe { device.cmd_pipeline_barrier2(commands, &dependency) };
 }
 
 fn stages(workers: PipelineStages) -> vk::PipelineStageFlags2 {

@@ -124,28 +124,11 @@ impl Image {
     #[cfg(feature = "view")]
     pub(super) fn copy_to(&self, device: &ash::Device, commands: vk::CommandBuffer, to: &Image) {
         let (stage, general) = (vk::PipelineStageFlags2::ALL_TRANSFER, vk::ImageLayout::GENERAL);
-        let barrier = |from: vk::ImageLayout, access: [vk::AccessFlags2; 2]| {
-            let barrier = [vk::ImageMemoryBarrier2::default()
-                .src_stage_mask(stage)
-                .src_access_mask(access[0])
-                .dst_stage_mask(stage)
-                .dst_access_mask(access[1])
-                .old_layout(from)
-                .new_layout(general)
-                .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
-                .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
-                .image(to.handle)
-                .subresource_range(WHOLE)];
-            let dependency = vk::DependencyInfo::default().image_memory_barriers(&barrier);
+        let barrier = |from: vk::ImageLayout, [before, after]: [vk::AccessFlags2; 2]| {
             // SAFETY: the command buffer is being recorded; the image is alive.
-            unsafe { device.cmd_pipeline_barrier2(commands, &dependency) };
+            unsafe { image_barrier(device, commands, [to.handle], (stage, before, from), (stage, after, general)) };
         };
-        let layers = vk::ImageSubresourceLayers {
-            aspect_mask: vk::ImageAspectFlags::COLOR,
-            layer_count: 1,
-            ..vk::ImageSubresourceLayers::default()
-        };
-        let copy = [vk::ImageCopy::default().src_subresource(layers).dst_subresource(layers).extent(self.extent)];
+        let copy = [vk::ImageCopy::default().src_subresource(COLOUR).dst_subresource(COLOUR).extent(self.extent)];
         // The last copy is done; older layers do not know it.
         let write = vk::AccessFlags2::TRANSFER_WRITE;
         barrier(vk::ImageLayout::UNDEFINED, [write, write]);
@@ -176,6 +159,44 @@ impl Image {
         self.context.name(view, name);
         Ok(view)
     }
+}
+
+/// The first layer of an image, for copies.
+pub(crate) const COLOUR: vk::ImageSubresourceLayers = vk::ImageSubresourceLayers {
+    aspect_mask: vk::ImageAspectFlags::COLOR,
+    mip_level: 0,
+    base_array_layer: 0,
+    layer_count: 1,
+};
+
+/// One side of a barrier: stages, their accesses, and the layout of the images.
+type Side = (vk::PipelineStageFlags2, vk::AccessFlags2, vk::ImageLayout);
+
+/// Records a barrier of complete images.
+///
+/// # Safety
+/// The command buffer is being recorded, outside dynamic rendering; the images are alive.
+pub(crate) unsafe fn image_barrier(
+    device: &ash::Device,
+    commands: vk::CommandBuffer,
+    images: impl IntoIterator<Item = vk::Image>,
+    from: Side,
+    to: Side,
+) {
+    let barrier = vk::ImageMemoryBarrier2::default()
+        .src_stage_mask(from.0)
+        .src_access_mask(from.1)
+        .dst_stage_mask(to.0)
+        .dst_access_mask(to.1)
+        .old_layout(from.2)
+        .new_layout(to.2)
+        .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+        .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+        .subresource_range(WHOLE);
+    let barriers: Vec<_> = images.into_iter().map(|image| barrier.image(image)).collect();
+    let dependency = vk::DependencyInfo::default().image_memory_barriers(&barriers);
+    // SAFETY: as of this function.
+    unsafe { device.cmd_pipeline_barrier2(commands, &dependency) };
 }
 
 /// The subresource range of all layers of a color image's only mip level.

@@ -69,11 +69,7 @@ impl Axis {
     pub fn at(&self, index: f64) -> f64 {
         match self {
             Axis::Even { first, pitch, .. } => first + pitch * index,
-            Axis::Table(table) if table.len() < 2 => table.first().copied().unwrap_or(0.0),
-            Axis::Table(table) => {
-                let i = (index.floor().max(0.0) as usize).min(table.len() - 2);
-                table[i] + (table[i + 1] - table[i]) * (index - i as f64)
-            }
+            Axis::Table(table) => interpolated(table, index),
         }
     }
 
@@ -100,6 +96,15 @@ impl Axis {
             }
         }
     }
+}
+
+/// The entry of a table at a fractional index, linear between two entries and beyond both ends.
+pub(crate) fn interpolated(table: &[f64], index: f64) -> f64 {
+    if table.len() < 2 {
+        return table.first().copied().unwrap_or(0.0);
+    }
+    let i = (index.floor().max(0.0) as usize).min(table.len() - 2);
+    table[i] + (table[i + 1] - table[i]) * (index - i as f64)
 }
 
 #[cfg(test)]

@@ -275,10 +275,7 @@ impl ProbeFile {
                 };
                 let slices = match (motion.fan_angle_deg, &motion.frame_angles_deg) {
                     (Some(angle), None) => spread(angle.to_radians(), frames),
-                    (None, Some(table)) => {
-                        let table: Vec<f64> = table.iter().map(|a| a.to_radians()).collect();
-                        self.table("motion.frame_angles_deg", &table, frames, "frames")?
-                    }
+                    (None, Some(table)) => self.angles("motion.frame_angles_deg", table, frames, "frames")?,
                     _ => return self.fault("motion", "must have either fan_angle_deg or frame_angles_deg"),
                 };
                 (Motion::Fan { wobble_radius }, slices)
@@ -295,10 +292,7 @@ impl ProbeFile {
             (ArrayKind::Curved, Some(radius)) => {
                 let axis = match (lines.sector_angle_deg, &lines.angles_deg) {
                     (Some(angle), None) => spread(angle.to_radians(), count),
-                    (None, Some(table)) => {
-                        let table: Vec<f64> = table.iter().map(|a| a.to_radians()).collect();
-                        self.table("lines.angles_deg", &table, count, "lines")?
-                    }
+                    (None, Some(table)) => self.angles("lines.angles_deg", table, count, "lines")?,
                     _ => return self.fault("lines", "must have either sector_angle_deg or angles_deg"),
                 };
                 Ok((Array::Curved { radius }, axis))
@@ -312,6 +306,11 @@ impl ProbeFile {
                 Ok((Array::Linear, axis))
             }
         }
+    }
+
+    /// A table of degrees as radians.
+    fn angles(&self, field: &str, table: &[f64], count: usize, of: &str) -> Result<Axis, InputError> {
+        self.table(field, &table.iter().map(|a| a.to_radians()).collect::<Vec<_>>(), count, of)
     }
 
     fn table(&self, field: &str, table: &[f64], count: usize, of: &str) -> Result<Axis, InputError> {

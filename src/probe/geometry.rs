@@ -5,7 +5,7 @@
 //!
 //! [`Volumes`] is how the frames of a recording make up volumes, and in which direction each was swept.
 
-use super::axis::Axis;
+use super::axis::{Axis, interpolated};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
@@ -150,11 +150,7 @@ impl Probe {
         match &self.advance {
             Advance::None => 0.0,
             Advance::Same(a) => *a,
-            Advance::Each(table) if table.len() < 2 => table.first().copied().unwrap_or(0.0),
-            Advance::Each(table) => {
-                let k = (slice.floor().max(0.0) as usize).min(table.len() - 2);
-                table[k] + (table[k + 1] - table[k]) * (slice - k as f64)
-            }
+            Advance::Each(table) => interpolated(table, slice),
         }
     }
 

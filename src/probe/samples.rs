@@ -84,6 +84,15 @@ impl StoredType {
         }
     }
 
+    /// Calls `each` with every little-endian sample of `bytes`.
+    pub fn for_each(self, bytes: &[u8], mut each: impl FnMut(f64)) {
+        match self {
+            StoredType::U8 => bytes.iter().for_each(|b| each(f64::from(*b))),
+            StoredType::U16 => bytes.as_chunks().0.iter().for_each(|b| each(f64::from(u16::from_le_bytes(*b)))),
+            StoredType::F32 => bytes.as_chunks().0.iter().for_each(|b| each(f64::from(f32::from_le_bytes(*b)))),
+        }
+    }
+
     /// Appends a value to `bytes` as a little-endian sample. For an integer type it is rounded and limited to the range of the type; NaN becomes 0.
     pub fn append(self, value: f64, bytes: &mut Vec<u8>) {
         match self {

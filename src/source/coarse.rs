@@ -49,7 +49,7 @@ fn mean(frames: &[&Frame], [samples, lines]: [usize; 2], factors: [usize; 3], st
                 (first..first + along).map(|at| read(&frame.bytes, at, stored)).sum()
             };
             let sum: f64 = frames.iter().map(|frame| (0..across).map(|n| of_line(frame, n)).sum::<f64>()).sum();
-            write(&mut made, sum / count, stored);
+            stored.append(sum / count, &mut made);
         }
     }
     made
@@ -58,21 +58,7 @@ fn mean(frames: &[&Frame], [samples, lines]: [usize; 2], factors: [usize; 3], st
 /// The n-th sample; 0 beyond the end.
 fn read(bytes: &[u8], n: usize, stored: StoredType) -> f64 {
     let at = n * stored.bytes();
-    let Some(sample) = bytes.get(at..at + stored.bytes()) else { return 0.0 };
-    match *sample {
-        [a] => f64::from(a),
-        [a, b] => f64::from(u16::from_le_bytes([a, b])),
-        [a, b, c, d] => f64::from(f32::from_le_bytes([a, b, c, d])),
-        _ => 0.0,
-    }
-}
-
-fn write(bytes: &mut Vec<u8>, value: f64, stored: StoredType) {
-    match stored {
-        StoredType::U8 => bytes.push(value.round() as u8),
-        StoredType::U16 => bytes.extend((value.round() as u16).to_le_bytes()),
-        StoredType::F32 => bytes.extend((value as f32).to_le_bytes()),
-    }
+    bytes.get(at..at + stored.bytes()).map_or(0.0, |sample| stored.value(sample))
 }
 
 fn coarser_axis(axis: &Axis, factor: usize) -> Axis {

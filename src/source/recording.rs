@@ -147,11 +147,6 @@ impl Recording {
         }
     }
 
-    /// Number of all frames in the file, including those after the last complete volume.
-    pub fn frames_in_file(&self) -> usize {
-        self.layout.frames
-    }
-
     /// Number of samples that were NaN or infinite and were replaced by 0: in the frames read so far, or in all frames if the range was
     /// measured.
     pub fn replaced(&self) -> u64 {

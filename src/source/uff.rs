@@ -8,12 +8,12 @@
 
 use super::describe::{self, Rows};
 use super::keys::{Aspect, Key, Unused, Use, not_used};
+use crate::StoredType;
 use crate::files::{InputError, progress, quoted};
 use crate::frame::check_volume;
 use crate::probe::file::SLAB;
 use crate::probe::{Advance, Array, Axis, Geometry, Motion, Probe};
 use crate::{Frame, Source};
-use crate::{SampleType, StoredType};
 use hdf5_reader::group::Group;
 use hdf5_reader::{DEFAULT_CHUNK_CACHE_SLOTS, Dataset, Hdf5File, OpenOptions, SliceInfo, SliceInfoElem};
 use std::path::{Path, PathBuf};
@@ -577,10 +577,6 @@ impl Source for Beamformed {
 
     fn stored_type(&self) -> StoredType {
         if self.scale == Scale::Grey { StoredType::U8 } else { StoredType::F32 }
-    }
-
-    fn sample_type(&self) -> SampleType {
-        self.stored_type().into()
     }
 
     fn range(&self) -> [f64; 2] {

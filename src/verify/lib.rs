@@ -72,21 +72,6 @@ pub fn checks(level: Level) -> Vec<Check> {
     groups.into_iter().flat_map(|group| group(level)).collect()
 }
 
-/// Runs checks one after the other in this process, and calls `tell` with the outcome of each that was run. Once `stop` returns a signal's name, the
-/// remaining checks get the verdict interrupted.
-pub fn run(
-    dut: &mut DeviceUnderTest,
-    checks: &[Check],
-    stop: impl Fn() -> Option<&'static str>,
-    tell: impl FnMut(&Outcome),
-) -> Run {
-    let begun = Instant::now();
-    let names: Vec<CheckName> = checks.iter().map(Check::title).collect();
-    let mut group = None;
-    let outcomes = run_each(&names, stop, |n| checks[n].run_after(&mut group, dut), tell);
-    dut.run_of(outcomes, begun)
-}
-
 /// Runs checks one after the other by `one`, which gets their indices in `names`, and calls `tell` with the outcome of each that was run. Once `stop`
 /// returns a signal's name, the remaining checks get the verdict interrupted, so that there is one outcome for each name.
 pub fn run_each(
@@ -155,14 +140,6 @@ impl Findings {
         if !holds {
             self.faults.push(Fault::new(what()));
         }
-    }
-
-    /// Records a figure, and adds a fault with the text `what` if its value exceeds its limit. NaN exceeds any limit; without a limit every value
-    /// passes.
-    pub fn error(&mut self, figure: Figure, what: impl FnOnce() -> String) {
-        let within = figure.allowed.is_none_or(|allowed| figure.value <= allowed);
-        self.expect(within, what);
-        self.figures.push(figure);
     }
 }
 

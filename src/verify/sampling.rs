@@ -48,13 +48,6 @@ pub struct FilterPrecision {
 }
 
 impl FilterPrecision {
-    /// The smallest and the largest result that exact weights give within the precision of the position. `share`: position along x, y
-    /// and z as shares (0..1) of the volume's size; beyond the outermost texels their values continue.
-    pub fn bounds(self, volume: &Texels, share: [f64; 3]) -> [f64; 2] {
-        let [[low, high], _] = self.both_bounds(volume, share);
-        [low, high]
-    }
-
     /// The same, and what weights give that are rounded to the bits of a position.
     fn both_bounds(self, volume: &Texels, share: [f64; 3]) -> [[f64; 2]; 2] {
         let step = (-f64::from(self.bits)).exp2();

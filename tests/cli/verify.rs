@@ -82,7 +82,7 @@ fn every_injected_fault_and_every_dropped_barrier_is_caught() {
     assert!(by("passes") > 10 && by("known answers") > 3 && by("the barrier oracle") == 1, "{caught:?}");
     assert_eq!(by("synchronization validation"), 1, "{caught:?}");
     // Every bug of the history was recreated, and says where it was met.
-    let bugs = self_test::known_bugs();
+    let bugs = self_test::KNOWN_BUGS;
     assert!(bugs.len() >= 10, "{}", bugs.len());
     for bug in bugs {
         let outcome = run.outcomes.iter().find(|o| o.name == bug.fault).unwrap_or_else(|| panic!("{}", bug.fault));
@@ -96,8 +96,8 @@ fn the_page_lists_every_known_bug() {
     let page = fs::read_to_string(repository("docs/verify.md")).expect("the page");
     let section = page.split("\n## ").find(|section| section.starts_with("Known bugs\n")).expect("the section");
     let rows: Vec<&str> = section.lines().filter(|line| line.starts_with("| ")).collect();
-    assert_eq!(rows.len(), self_test::known_bugs().len() + 1, "a head, and a row for each");
-    for (row, bug) in rows[1..].iter().zip(self_test::known_bugs()) {
+    assert_eq!(rows.len(), self_test::KNOWN_BUGS.len() + 1, "a head, and a row for each");
+    for (row, bug) in rows[1..].iter().zip(self_test::KNOWN_BUGS) {
         let source = bug.source.strip_prefix("https://").map_or(bug.source.into(), |_| format!("<{}>", bug.source));
         assert_eq!(*row, format!("| {} | {} | {} | {source} |", bug.fault, bug.driver, bug.what));
     }

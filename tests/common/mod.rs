@@ -6,6 +6,7 @@
 pub mod figures;
 pub mod files;
 pub mod gpu;
+pub mod growth;
 pub mod layer;
 pub mod lengths;
 #[cfg(target_os = "linux")]

@@ -1,11 +1,11 @@
 //! The estimators of the enhanced sigma filter against values by hand, and the growth of its windows against a brute-force count.
 
 use crate::common::gpu::*;
+use crate::common::growth::growth_shares;
 use crate::filters::{by_reference, on_device, plane, texels};
 use echolume::Source;
 use echolume::low_level::gpu::pass_runner::PassRunner;
 use echolume::low_level::gpu::{Renderer, RendererOptions};
-use echolume::low_level::passes::filter::enhanced_sigma::growth_shares;
 use echolume::low_level::passes::{Slot, Texels};
 use echolume::low_level::plan::Plan;
 use echolume::low_level::probe::Geometry;

@@ -38,9 +38,11 @@ fn failures(bench: &mut DeviceUnderTest, checks: &[Check]) -> Vec<String> {
         outcome.figures.iter().for_each(|f| println!("    {} {}", f.what, f.value));
         outcome.notes.iter().for_each(|note| println!("    {note}"));
     };
-    let run = verify::run(bench, checks, || None, tell);
+    let names: Vec<_> = checks.iter().map(Check::title).collect();
+    let mut group = None;
+    let outcomes = verify::run_each(&names, || None, |n| checks[n].run_after(&mut group, bench), tell);
     let faults = |o: &Outcome| o.faults.iter().map(|f| format!("{}: {f:?}", o.name)).collect::<Vec<_>>();
-    run.outcomes.iter().filter(|o| o.verdict == Verdict::Failed).flat_map(faults).collect()
+    outcomes.iter().filter(|o| o.verdict == Verdict::Failed).flat_map(faults).collect()
 }
 
 /// The quick checks of groups whose time is that of compiling pipelines. The program leaves constants to the driver, for which validation takes

@@ -2,10 +2,13 @@
 
 use crate::scenes::*;
 use echolume::low_level::baselines::Stored;
+use echolume::low_level::gpu::{Context, RendererOptions};
 use echolume::low_level::passes::{DispatchArgs, by_name};
 use echolume::low_level::profile::compare::{CompareOptions, Kind, Verdict, compare};
-use echolume::low_level::profile::timed_run::{ProfileOptions, ProfileRun, run};
+use echolume::low_level::profile::timed_run::{ProfileOptions, ProfileRun};
 use echolume::low_level::profile::{Profile, export};
+use echolume::low_level::scene::Scene;
+use std::sync::Arc;
 
 const SETTINGS: &str = "mode = 'sr'
     picture = { size = [96, 96] }
@@ -18,14 +21,26 @@ fn asked(repeats: usize) -> ProfileOptions {
     ProfileOptions { repeats, warm_up: 2, still: false, angle_step: 0.0, input: "a bumpy wall".into(), ceilings: false }
 }
 
+fn begun(context: &Arc<Context>, scene: &Scene, options: &ProfileOptions) -> ProfileRun {
+    ProfileRun::new(context, scene, options, &RendererOptions::default().shaders).expect("run")
+}
+
+fn run(context: &Arc<Context>, scene: &Scene, options: &ProfileOptions) -> (Profile, Vec<export::Span>) {
+    let (frames, mut run) = (frames(), begun(context, scene, options));
+    while run.needs_more() {
+        run.repeat(&frames).expect("repeat");
+    }
+    run.finish()
+}
+
 #[test]
 fn an_injected_slow_pass_is_found_and_no_other_pass_blamed_as_much() {
     let _alone = alone();
     let (quick, slow, frames, scene) = (device(), device(), frames(), scene(SETTINGS));
     slow.faults.slow_down("median_distance", 6);
     let pair = || {
-        let mut old = ProfileRun::new(&quick, &scene, &asked(18)).expect("run");
-        let mut new = ProfileRun::new(&slow, &scene, &asked(18)).expect("run");
+        let mut old = begun(&quick, &scene, &asked(18));
+        let mut new = begun(&slow, &scene, &asked(18));
         while old.needs_more() {
             old.repeat(&frames).expect("repeat");
             new.repeat(&frames).expect("repeat");
@@ -61,8 +76,8 @@ fn identical_runs_are_hardly_ever_called_different() {
     let (context, frames, scene) = (device(), frames(), scene(SETTINGS));
     let mut different = Vec::new();
     for pair in 0..20 {
-        let mut old = ProfileRun::new(&context, &scene, &asked(12)).expect("run");
-        let mut new = ProfileRun::new(&context, &scene, &asked(12)).expect("run");
+        let mut old = begun(&context, &scene, &asked(12));
+        let mut new = begun(&context, &scene, &asked(12));
         for turn in 0.. {
             let [first, last] = if turn % 2 == 0 { [&mut old, &mut new] } else { [&mut new, &mut old] };
             first.repeat(&frames).expect("repeat");
@@ -88,7 +103,7 @@ fn identical_runs_are_hardly_ever_called_different() {
 fn a_profile_is_consistent_and_round_trips() {
     let _alone = alone();
     let context = device();
-    let (profile, spans) = run(&context, &scene(SETTINGS), &frames(), &asked(6)).expect("profile");
+    let (profile, spans) = run(&context, &scene(SETTINGS), &asked(6));
     profile.check().expect("consistent");
     // Neighbours are packed where the device is a CPU.
     let names = profile.passes.iter().map(|p| p.name.as_str()).filter(|name| *name != "packed_neighbours");
@@ -151,7 +166,7 @@ fn a_rotating_view_reruns_the_picture_and_not_the_frames() {
     for (mode, ray, tile) in [("sr", "raycast_surface", false), ("mpr", "raycast_planes", true)] {
         let scene = scene(&SETTINGS.replace("mode = 'sr'", &format!("mode = '{mode}'")));
         assert_eq!(scene.cuts_planes(), tile);
-        let (profile, _) = run(&context, &scene, &frames(), &turning).expect("profile");
+        let (profile, _) = run(&context, &scene, &turning);
         profile.check().expect("consistent");
         let of = |name: &str| profile.passes.iter().find(|p| p.name == name);
         assert_eq!(of(ray).expect("cast again").runs_per_picture, 1, "{mode}");

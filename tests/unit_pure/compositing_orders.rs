@@ -1,7 +1,8 @@
 //! Convergence orders of the compositing rules in f64, and what degrades them.
 
 use crate::common::figures::figure;
-use echolume::low_level::error_report::convergence::{Field, Fit, Flaw, NONE, Range, errors, fit, steps, stiffness};
+use crate::compositing_problem::{Field, Flaw, NONE, errors, steps, stiffness};
+use echolume::low_level::error_report::convergence::{Fit, Range, fit};
 use echolume::low_level::passes::raycast::composite::Rule;
 
 const STEPS: [f64; 2] = [1.0 / 32.0, 0.7];

@@ -5,7 +5,7 @@ use echolume::low_level::error_report::budget::{Budget, FLOOR, Share};
 use echolume::low_level::error_report::choose::{self, Bound, choose, contenders, proposals};
 use echolume::low_level::error_report::convergence::{Range, fit};
 use echolume::low_level::error_report::metrics::{
-    Levels, SurfaceError, changed_rays, distances, levels, normals, pictures, surfaces,
+    Levels, SurfaceError, changed_rays, levels, normals, pictures, surfaces,
 };
 use echolume::low_level::error_report::plot::Figure;
 use echolume::low_level::error_report::{
@@ -175,19 +175,19 @@ fn what_cannot_be_compared_is_refused_by_name() {
     assert!(said.contains("2x2x1") && said.contains("4x1x1"), "{said}");
     assert!(pictures(&texels(1, 1, &[0.0]), &texels(1, 1, &[0.0])).is_err());
     assert!(pictures(&texels(1, 3, &[]), &texels(1, 3, &[])).is_err());
-    assert!(distances(&texels(1, 1, &[f64::INFINITY]), &texels(1, 1, &[1.0])).is_err());
+    assert!(surfaces(&texels(1, 1, &[f64::INFINITY]), &texels(1, 1, &[1.0]), f64::INFINITY).is_err());
 }
 
 #[test]
 fn distances_are_compared_where_both_hit_and_misses_are_counted() {
     let a = texels(5, 1, &[10.0, 12.0, MISS, 7.0, MISS]);
     let b = texels(5, 1, &[10.5, 11.0, 3.0, MISS, MISS]);
-    let e = distances(&a, &b).expect("comparable");
+    let e = surfaces(&a, &b, f64::INFINITY).expect("comparable");
     assert_eq!((e.false_hits, e.missed_hits), (0.2, 0.2));
     let s = e.error.expect("two pixels hit in both");
     assert_eq!((s.count, s.median, s.max), (2, 0.75, 1.0));
     assert!((s.rms - (1.25f64 / 2.0).sqrt()).abs() < 1e-15 && (s.p95 - 0.975).abs() < 1e-12, "{s:?}");
-    let none = distances(&texels(1, 1, &[MISS]), &texels(1, 1, &[2.0])).expect("comparable");
+    let none = surfaces(&texels(1, 1, &[MISS]), &texels(1, 1, &[2.0]), f64::INFINITY).expect("comparable");
     assert_eq!((none.error, none.missed_hits), (None, 1.0));
 }
 
@@ -334,7 +334,7 @@ fn rays_that_jump_are_counted_and_left_out() {
     assert_eq!((e.jumps, e.missed_hits, e.false_hits), (0.125, 0.125, 0.0));
     let spread = e.error.expect("five pixels");
     assert!(spread.count == 5 && (spread.max - 0.1).abs() < 1e-12, "{spread:?}");
-    assert_eq!(distances(&a, &b).expect("comparable").jumps, 0.0);
+    assert_eq!(surfaces(&a, &b, f64::INFINITY).expect("comparable").jumps, 0.0);
     // Pixel (3, 1) is gained: it and its neighbours are left out.
     assert_eq!(changed_rays(&a, &b, 2.0, [4, 2, 1]), [false, false, true, true, false, false, true, true]);
     // The same rays under a picture of twice the size.
@@ -459,7 +459,7 @@ fn a_report_survives_its_file_and_others_are_refused() {
     let pairs: Vec<[f64; 2]> = whole.dials[0].points.iter().map(|p| [p.value, p.errors.rmse]).collect();
     whole.dials[0].order = Some(fit(&pairs, Range { step: [0.25, 1.0], floor: 1e-5 }).expect("three points"));
     whole.dials[1].reference = Reference::Converged { set: vec!["ray.step=0.01".into()], rmse: 1.0 / 3.0 * 1e-4 };
-    let surface = distances(&texels(2, 1, &[1.0, 2.0]), &texels(2, 1, &[1.1, 2.0])).expect("comparable");
+    let surface = surfaces(&texels(2, 1, &[1.0, 2.0]), &texels(2, 1, &[1.1, 2.0]), f64::INFINITY).expect("comparable");
     whole.dials[0].points[0].errors.mm = Some(surface);
     whole.dials[0].points[2].times = None;
     let text = whole.to_json().expect("finite");

@@ -5,7 +5,7 @@ use crate::common::files::data;
 use crate::common::probes::{voxels, wobbler};
 use crate::common::scenes::{FLOATS, scene};
 use echolume::low_level::error_report::convergence::{Fit, Range, fit};
-use echolume::low_level::error_report::metrics::{distances, pictures};
+use echolume::low_level::error_report::metrics::{pictures, surfaces};
 use echolume::low_level::exact_ray::gauss_kronrod::RULE;
 use echolume::low_level::exact_ray::picture::{self, Effort};
 use echolume::low_level::exact_ray::projection::projected;
@@ -410,7 +410,7 @@ fn projections_and_surfaces_of_a_real_sweep_are_the_limits_of_their_samples() {
             (slots.remove(&Slot::Distance).expect("a distance map"), effort)
         };
         let ((exact, effort), (sampled, _)) = (map(true), map(false));
-        let off = distances(&sampled, &exact).expect("comparable");
+        let off = surfaces(&sampled, &exact, f64::INFINITY).expect("comparable");
         println!("sr: {off:?}, {effort:?}");
         let spread = off.error.expect("surfaces");
         assert!(spread.count > 500 && spread.median < 2e-3, "{off:?}");

@@ -11,6 +11,11 @@ fn grid(size: [usize; 3], spacing: f64) -> Grid {
     Grid { size, spacing: [spacing; 3], origin: [-1.0, 2.0, 0.5] }
 }
 
+/// A lattice whose axes are those of the tracker.
+fn lattice(grid: Grid) -> Lattice {
+    Lattice { grid, to_volume: DAffine3::IDENTITY }
+}
+
 /// A pose without a rotation, at the first voxel of a slice.
 fn straight(grid: &Grid, slice: f64) -> DAffine3 {
     let scale = DMat3::from_diagonal(DVec3::from(grid.spacing));
@@ -23,7 +28,7 @@ fn options() -> CompoundingOptions {
 }
 
 fn compounder(grid: Grid, stored: StoredType, options: CompoundingOptions) -> Compounder {
-    Compounder::new(Lattice::straight(grid), stored, options).unwrap()
+    Compounder::new(lattice(grid), stored, options).unwrap()
 }
 
 fn floats(values: &[f32]) -> Vec<u8> {
@@ -498,10 +503,10 @@ fn a_volume_that_is_too_large_is_refused_before_anything_is_allocated() {
         (grid([4, 4, 4], 1.0), CompoundingOptions { max_hole: 65.0, ..options() }, "widest hole"),
         (grid([4, 4, 4], 1.0), CompoundingOptions { max_hole: f64::NAN, ..options() }, "widest hole"),
     ] {
-        let refused = Compounder::new(Lattice::straight(grid), StoredType::U8, options).err().unwrap();
+        let refused = Compounder::new(lattice(grid), StoredType::U8, options).err().unwrap();
         assert!(refused.contains(named) && refused.lines().count() == 1, "{refused}");
     }
-    let nowhere = Lattice { to_volume: DAffine3::NAN, ..Lattice::straight(grid([2, 2, 2], 1.0)) };
+    let nowhere = Lattice { to_volume: DAffine3::NAN, ..lattice(grid([2, 2, 2], 1.0)) };
     assert!(Compounder::new(nowhere, StoredType::U8, options()).is_err());
 }
 

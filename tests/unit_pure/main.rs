@@ -8,6 +8,7 @@ mod cluster;
 #[path = "../common/mod.rs"]
 mod common;
 mod compositing_orders;
+mod compositing_problem;
 mod cuts;
 mod default_look;
 mod error_report;

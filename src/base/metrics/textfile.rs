@@ -121,14 +121,11 @@ impl Drop for Ended<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::path::PathBuf;
+    use crate::files::WorkFolder;
     use std::time::Instant;
 
-    /// A folder of this test alone.
-    fn folder(name: &str) -> PathBuf {
-        let folder = std::env::temp_dir().join(format!("echolume-textfile-{}-{name}", std::process::id()));
-        std::fs::create_dir_all(&folder).expect("a folder");
-        folder
+    fn folder() -> WorkFolder {
+        WorkFolder::new(&std::env::temp_dir(), "echolume-textfile-").expect("a folder")
     }
 
     fn wait(until: impl Fn() -> bool) {
@@ -141,28 +138,27 @@ mod tests {
 
     #[test]
     fn the_file_holds_the_last_text_and_nothing_is_left_beside_it() {
-        let folder = folder("last");
-        let file = folder.join("a.prom");
+        let folder = folder();
+        let file = folder.path().join("a.prom");
         let textfile = Textfile::new(&file).expect("a thread");
         for n in 0..50 {
             textfile.put(format!("a {n}\n"));
         }
         drop(textfile);
         assert_eq!(std::fs::read_to_string(&file).expect("written"), "a 49\n");
-        assert_eq!(std::fs::read_dir(&folder).expect("listed").count(), 1);
+        assert_eq!(std::fs::read_dir(folder.path()).expect("listed").count(), 1);
         #[cfg(unix)]
         {
             use std::os::unix::fs::PermissionsExt;
             let mode = std::fs::metadata(&file).expect("there").permissions().mode();
             assert_eq!(mode & 0o777, 0o644, "node_exporter runs as another user");
         }
-        std::fs::remove_dir_all(&folder).expect("removed");
     }
 
     #[test]
     fn a_file_that_cannot_be_written_is_counted_and_written_as_soon_as_it_can_be() {
-        let folder = folder("failing");
-        let below = folder.join("below");
+        let folder = folder();
+        let below = folder.path().join("below");
         let file = below.join("a.prom");
         let textfile = Textfile::new(&file).expect("a thread");
         for n in 1..=3 {
@@ -175,6 +171,5 @@ mod tests {
         assert_eq!(textfile.failures(), 3);
         drop(textfile);
         assert_eq!(std::fs::read_to_string(&file).expect("written"), "a 4\n");
-        std::fs::remove_dir_all(&folder).expect("removed");
     }
 }

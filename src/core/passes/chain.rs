@@ -303,7 +303,7 @@ impl Pass {
             }
             // A slice of tiles has one texel for each tile.
             let texels = if size == scene.grid.size.map(|n| n as usize) { 1 } else { TILE as usize };
-            for (x, y) in (0..kept.size[1]).flat_map(|y| (0..kept.size[0]).map(move |x| (x, y))) {
+            for (x, y) in kept.pixels() {
                 let made = [x, y]
                     .iter()
                     .zip(r.first)

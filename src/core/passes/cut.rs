@@ -12,9 +12,6 @@ use crate::scene::{Scene, start_curve};
 
 pub(crate) const PASS: Pass = Pass {
     name: "cut",
-    stage: Stage::Preprocess,
-    frequency: Frequency::Volume,
-    link: Link::AfterSlices,
     shader: |_, _| "preprocess/cut",
     needed: |s| match (s.has_cuts(), s.unveils(), s.starts_at_curve()) {
         (true, false, false) => Ok("what was cut away is not drawn"),
@@ -35,8 +32,6 @@ pub(crate) const PASS: Pass = Pass {
         reads
     },
     writes: |_, _| vec![Bind { part: Part::Around(0), ..whole("target", Slot::CutVolume) }],
-    extent: slice_extent,
-    repeat: once,
     params: |s, t| {
         let (grid, local) = (&s.grid, s.local_origin());
         Params::default()
@@ -64,20 +59,17 @@ pub(crate) const PASS: Pass = Pass {
             ("CURVED_START", s.starts_at_curve() as i32),
         ]
     },
-    tolerance: Tolerance {
-        absolute: 5e-4,
-        relative: 0.0,
-        outliers: 1e-3,
-        why: "a copy, but for what is removed; R16F stores 1 to 4.9e-4; a texel whose centre is within 1e-5 of its distance from the origin of a \
-              contour's edge may be on either side",
-    },
+    tolerance: Tolerance::absolute(5e-4).outliers(1e-3).because(
+        "a copy, but for what is removed; R16F stores 1 to 4.9e-4; a texel whose centre is within 1e-5 of its distance \
+         from the origin of a contour's edge may be on either side",
+    ),
     reference: |scene, args, reads, writes| {
         let source = reads.get("source");
         let target = writes.get_mut("target");
         let cuts: Vec<_> = scene.cuts().collect();
         let curve = scene.start_curve();
         for z in args.slice..args.slice + args.slices {
-            for (x, y) in (0..source.size[1]).flat_map(|y| (0..source.size[0]).map(move |x| (x, y))) {
+            for (x, y) in source.pixels() {
                 let place = scene.texel_place([x as u32, y as u32, z]);
                 let is_before = scene.unveils() && (y as f64) < reads.get("start_surface").one(x, z as usize, 0);
                 let is_before = is_before || curve.as_ref().is_some_and(|curve| start_curve::is_before(curve, place));
@@ -87,6 +79,7 @@ pub(crate) const PASS: Pass = Pass {
             }
         }
     },
+    ..Pass::AFTER_SLICES
 };
 
 fn removed(scene: &Scene) -> f64 {

@@ -21,12 +21,8 @@ pub const FILTERED: Pass = Pass {
     writes: |_, _| vec![whole("picture", Slot::Picture)],
     extent: picture_extent,
     constants: |_, _| vec![("SAMPLING", 0), ("SAMPLES", SAMPLES as i32)],
-    tolerance: Tolerance {
-        absolute: 2e-3,
-        relative: 0.0,
-        outliers: 0.0,
-        why: "a device's filter may have weights of 8 bits; R16F stores 1 to 4.9e-4",
-    },
+    tolerance: Tolerance::absolute(2e-3)
+        .because("a device's filter may have weights of 8 bits; R16F stores 1 to 4.9e-4"),
     reference: |_, _, reads, writes| {
         mean(reads, writes, |volume, at| volume.trilinear(at));
     },
@@ -61,7 +57,7 @@ pub const COPY: Pass = Pass {
     reads: |_, _| vec![whole("source", Slot::Picture)],
     writes: |_, _| vec![whole("target", Slot::SmoothPicture)],
     constants: no_constants,
-    tolerance: Tolerance { absolute: 0.0, relative: 0.0, outliers: 0.0, why: "nothing is computed" },
+    tolerance: Tolerance::exact("nothing is computed"),
     reference: |_, _, reads, writes| {
         let source = reads.get("source");
         writes.get_mut("target").values.copy_from_slice(&source.values);
@@ -80,7 +76,7 @@ pub const POSITIONS: Pass = Pass {
         let volume = reads.get("volume");
         let values = writes.get_mut("values");
         let [width, height, _] = values.size;
-        for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+        for (x, y) in pixels([width, height]) {
             let share = sample_position([x, y], [width, height]);
             let at = std::array::from_fn(|axis| share[axis] * volume.size[axis] as f64 - 0.5);
             values.set([x, y, 0], &[volume.trilinear(at)]);
@@ -101,15 +97,13 @@ fn mean(reads: &Arrays, writes: &mut Arrays, sample: impl Fn(&Texels, [f64; 3]) 
     let volume = reads.get("volume");
     let picture = writes.get_mut("picture");
     let size = volume.size.map(|n| n as f64);
-    for y in 0..picture.size[1] {
-        for x in 0..picture.size[0] {
-            let share = [(x as f64 + 0.5) / picture.size[0] as f64, (y as f64 + 0.5) / picture.size[1] as f64];
-            let at = |i: u32| [share[0], share[1], (f64::from(i) + 0.5) / f64::from(SAMPLES)];
-            let texel = |i: u32| std::array::from_fn(|axis| at(i)[axis] * size[axis] - 0.5);
-            let sum: f64 = (0..SAMPLES).map(|i| sample(volume, texel(i))).sum();
-            let mean = sum / f64::from(SAMPLES);
-            picture.set([x, y, 0], &[mean, mean, mean, 1.0]);
-        }
+    for (x, y) in picture.pixels() {
+        let share = [(x as f64 + 0.5) / picture.size[0] as f64, (y as f64 + 0.5) / picture.size[1] as f64];
+        let at = |i: u32| [share[0], share[1], (f64::from(i) + 0.5) / f64::from(SAMPLES)];
+        let texel = |i: u32| std::array::from_fn(|axis| at(i)[axis] * size[axis] - 0.5);
+        let sum: f64 = (0..SAMPLES).map(|i| sample(volume, texel(i))).sum();
+        let mean = sum / f64::from(SAMPLES);
+        picture.set([x, y, 0], &[mean, mean, mean, 1.0]);
     }
 }
 

@@ -71,9 +71,6 @@ fn need(scene: &Scene) -> Need {
 /// Computes the smallest and the largest value of every tile of a slice. Only tiles of the slices that a new frame changes are updated.
 pub(crate) const TILE_RANGES: Pass = Pass {
     name: "tile_ranges",
-    stage: Stage::Preprocess,
-    frequency: Frequency::Volume,
-    link: Link::AfterSlices,
     shader: |_, _| "empty_space/tile_ranges",
     needed: need,
     // A slice changes with the frames that are smoothed into it.
@@ -83,30 +80,28 @@ pub(crate) const TILE_RANGES: Pass = Pass {
         let [width, height, _] = s.tile_counts();
         [width, height, t.slices]
     },
-    repeat: once,
     params: |_, t| Params::default().i32("slice", t.slice),
     constants: |_, _| vec![("TILE", TILE as i32)],
-    tolerance: Tolerance { absolute: 2e-5, relative: 0.0, outliers: 0.0, why: "one of 65535 steps, up or down" },
+    tolerance: Tolerance::absolute(2e-5).because("one of 65535 steps, up or down"),
     reference: |_, args, reads, writes| {
         let volume = reads.get("volume");
         let target = writes.get_mut("tile_ranges");
         let edge = TILE as usize;
         for z in args.slice as usize..(args.slice + args.slices) as usize {
-            for y in 0..target.size[1] {
-                for x in 0..target.size[0] {
-                    let (mut low, mut high) = (1.0f64, 0.0f64);
-                    for row in edge * y..(edge * (y + 1)).min(volume.size[1]) {
-                        for column in edge * x..(edge * (x + 1)).min(volume.size[0]) {
-                            let value = volume.one(column, row, z);
-                            (low, high) = (low.min(value), high.max(value));
-                        }
+            for (x, y) in target.pixels() {
+                let (mut low, mut high) = (1.0f64, 0.0f64);
+                for row in edge * y..(edge * (y + 1)).min(volume.size[1]) {
+                    for column in edge * x..(edge * (x + 1)).min(volume.size[0]) {
+                        let value = volume.one(column, row, z);
+                        (low, high) = (low.min(value), high.max(value));
                     }
-                    let steps = [(low * 65535.0).floor(), (high * 65535.0).ceil()];
-                    target.set([x, y, z], &steps.map(|n| n / 65535.0));
                 }
+                let steps = [(low * 65535.0).floor(), (high * 65535.0).ceil()];
+                target.set([x, y, z], &steps.map(|n| n / 65535.0));
             }
         }
     },
+    ..Pass::AFTER_SLICES
 };
 
 /// Computes the smallest and the largest value that samples in each brick may have, from the tiles that they may touch. Only bricks that depend on
@@ -115,7 +110,6 @@ pub(crate) const BRICK_RANGES: Pass = Pass {
     name: "brick_ranges",
     stage: Stage::Preprocess,
     frequency: Frequency::Volume,
-    link: Link::None,
     shader: |_, _| "empty_space/brick_ranges",
     needed: need,
     reads: |s, _| {
@@ -124,15 +118,8 @@ pub(crate) const BRICK_RANGES: Pass = Pass {
     },
     writes: |_, _| vec![whole("brick_ranges", Slot::BrickRanges)],
     extent: |s, _| s.bricks().count,
-    repeat: once,
     params: |_, t| Params::default().i32("slice", t.slice).i32("slices", t.slices),
-    constants: no_constants,
-    tolerance: Tolerance {
-        absolute: 0.0,
-        relative: 0.0,
-        outliers: 0.0,
-        why: "the smallest and the largest of values that are stored alike",
-    },
+    tolerance: Tolerance::exact("the smallest and the largest of values that are stored alike"),
     reference: |scene, args, reads, writes| {
         let tiles = reads.get("tile_ranges");
         let target = writes.get_mut("brick_ranges");
@@ -158,6 +145,7 @@ pub(crate) const BRICK_RANGES: Pass = Pass {
             target.set([n % width, n / width % height, n / (width * height)], &[low, high]);
         }
     },
+    ..Pass::OF_RAYS
 };
 
 /// Classifies each brick for the surface detector. After a change of transfer function, threshold or window this runs again and reads no voxel.
@@ -174,12 +162,9 @@ pub(crate) const CLASSIFY_SURFACE: Pass = Pass {
     extent: |s, _| s.bricks().count,
     params: |s, _| window(s, s.surface_view()).f32("quiet_level", quiet_level(s)),
     constants: |_, _| constants(0, false),
-    tolerance: Tolerance {
-        absolute: 0.0,
-        relative: 0.0,
-        outliers: 1e-3,
-        why: "kinds are whole numbers; a range that ends within rounding of the threshold may fall on either side",
-    },
+    tolerance: Tolerance::absolute(0.0)
+        .outliers(1e-3)
+        .because("kinds are whole numbers; a range that ends within rounding of the threshold may fall on either side"),
     reference: |s, _, reads, writes| {
         let bar = quiet_level(s);
         classify_reference(s, s.surface_view(), reads, writes, |side, range| match side {
@@ -300,7 +285,7 @@ pub(crate) const DISTANCE_SURFACE: Pass = Pass {
     extent: |s, _| s.bricks().count,
     repeat: |_| 3,
     constants: |s, t| distance_constants(beyond_surface(s), t),
-    tolerance: Tolerance { absolute: 0.0, relative: 0.0, outliers: 0.0, why: "whole numbers" },
+    tolerance: Tolerance::exact("whole numbers"),
     reference: |s, t, reads, writes| distance_reference(beyond_surface(s), t, reads, writes),
     ..Pass::OF_RAYS
 };
@@ -341,25 +326,23 @@ fn distance_reference(beyond: u32, args: &DispatchArgs, reads: &Arrays, writes: 
     let size = source.size;
     let code = |at: [usize; 3]| (source.one(at[0], at[1], at[2]) * 255.0).round() as u32;
     for z in 0..size[2] {
-        for y in 0..size[1] {
-            for x in 0..size[0] {
-                let at = [x, y, z];
-                let (kind, own) = (code(at) >> 6, code(at) & 63);
-                let mut best = own;
-                for along in 0..size[axis] {
-                    let away = along.abs_diff(at[axis]) as u32;
-                    let mut there = at;
-                    there[axis] = along;
-                    let other = code(there);
-                    if away > 0 {
-                        best = best.min(if other >> 6 == kind { away.max(other & 63) } else { away });
-                    }
+        for (x, y) in source.pixels() {
+            let at = [x, y, z];
+            let (kind, own) = (code(at) >> 6, code(at) & 63);
+            let mut best = own;
+            for along in 0..size[axis] {
+                let away = along.abs_diff(at[axis]) as u32;
+                let mut there = at;
+                there[axis] = along;
+                let other = code(there);
+                if away > 0 {
+                    best = best.min(if other >> 6 == kind { away.max(other & 63) } else { away });
                 }
-                if beyond != kind {
-                    best = best.min(at[axis] as u32 + 1).min((size[axis] - at[axis]) as u32);
-                }
-                target.set(at, &[f64::from(kind * 64 + best) / 255.0]);
             }
+            if beyond != kind {
+                best = best.min(at[axis] as u32 + 1).min((size[axis] - at[axis]) as u32);
+            }
+            target.set(at, &[f64::from(kind * 64 + best) / 255.0]);
         }
     }
 }

@@ -11,8 +11,6 @@ const MARGIN: f64 = 1.0 / 255.0;
 
 pub const DROP: Pass = Pass {
     name: "drop_floating",
-    frequency: Frequency::Volume,
-    link: Link::AfterSlices,
     shader: |_, _| "preprocess/drop_floating",
     needed: |s| match s.drops_floating() {
         true => Ok("small parts that float are not drawn"),
@@ -25,24 +23,19 @@ pub const DROP: Pass = Pass {
     },
     writes: |_, _| vec![Bind { part: Part::Around(0), ..whole("target", Slot::Volume) }],
     params: |s, t| Params::default().f32("most", lowered(s)).i32("slice", t.slice),
-    tolerance: Tolerance {
-        absolute: 5e-4,
-        relative: 0.0,
-        outliers: 0.0,
-        why: "a copy, but for the level; R16F stores 1 to 4.9e-4",
-    },
+    tolerance: Tolerance::absolute(5e-4).because("a copy, but for the level; R16F stores 1 to 4.9e-4"),
     reference: |scene, args, reads, writes| {
         let (source, floating) = (reads.get("source"), reads.get("floating"));
         let target = writes.get_mut("target");
         for z in args.slice as usize..(args.slice + args.slices) as usize {
-            for (x, y) in (0..source.size[1]).flat_map(|y| (0..source.size[0]).map(move |x| (x, y))) {
+            for (x, y) in source.pixels() {
                 let value = source.one(x, y, z);
                 let is_dropped = floating.one(x, y, z) > 0.5;
                 target.set([x, y, z], &[if is_dropped { value.min(lowered(scene)) } else { value }]);
             }
         }
     },
-    ..Pass::OF_SLICES
+    ..Pass::AFTER_SLICES
 };
 
 pub(super) const SEARCH: Search = Search {

@@ -50,13 +50,11 @@ pub(crate) const PASS: Pass = Pass {
             ("GUIDED", guide(s).is_some() as i32),
         ]
     },
-    tolerance: Tolerance {
-        absolute: 2.01 / 255.0,
-        relative: 0.0,
-        outliers: 4e-3,
-        why: "a value half-way between two levels may be stored as either, after an error of 1e-5 mm of a place in f32; the surface is found to 1/64 of a \
-              voxel, over which the light on it changes by as much; at the shell's silhouette, and between labels, a pixel may have either side",
-    },
+    tolerance: Tolerance::absolute(2.01 / 255.0).outliers(4e-3).because(
+        "a value half-way between two levels may be stored as either, after an error of 1e-5 mm of a place in f32; the \
+         surface is found to 1/64 of a voxel, over which the light on it changes by as much; at the shell's \
+         silhouette, and between labels, a pixel may have either side",
+    ),
     reference: |scene, _, reads, writes| reference(scene, reads, writes.get_mut("screen")),
     ..Pass::OF_RAYS
 };
@@ -112,8 +110,7 @@ fn reference(scene: &Scene, reads: &Arrays, screen: &mut Texels) {
     let (below, rendering) = (reads.get("unlabelled"), scene.rendering_area());
     let tiling = scene.cuts_planes().then(|| scene.tiling());
     let columns = tiling.iter().flat_map(|tiling| tiling.tiles.last()).flat_map(Tile::columns).collect::<Vec<_>>();
-    let [width, height, _] = screen.size;
-    for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+    for (x, y) in screen.pixels() {
         let over = match &tiling {
             Some(tiling) if scene.is_flat() || !rendering.holds([x, y]) => {
                 on_plane(scene, &field, tiling, &columns, [x, y])

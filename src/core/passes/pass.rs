@@ -3,6 +3,7 @@
 
 pub use super::slots::{Found, Search, Slot, rendered};
 pub(super) use super::slots::{composited_beside_surface, toned_slot};
+pub(super) use super::texels::pixels;
 pub use super::texels::{Arrays, Texels};
 use crate::scene::{MAX_DEVIATION, Scene};
 use glam::DVec3;
@@ -165,8 +166,25 @@ pub(super) fn reads_source(_: &Scene, dispatch: &Dispatch) -> Vec<Bind> {
 }
 
 /// The output of a filter: its chain's slot, which shaders name `target`. Of the 3D texture only the dispatch's slices are written.
-pub(super) fn writes_target(_: &Scene, dispatch: &Dispatch) -> Vec<Bind> {
+fn writes_target(_: &Scene, dispatch: &Dispatch) -> Vec<Bind> {
     vec![slices("target", dispatch.target())]
+}
+
+/// The output of a filter for its reference, and the slice of it that the dispatch writes: 0 unless it is the 3D texture.
+pub(super) fn target_of<'a>(writes: &'a mut Arrays, args: &DispatchArgs) -> (&'a mut Texels, usize) {
+    let target = writes.get_mut("target");
+    let z = if target.size[2] > 1 { args.slice as usize } else { 0 };
+    (target, z)
+}
+
+/// The input of a filter for its reference, and what [`target_of`] returns.
+pub(super) fn filtered<'a>(
+    reads: &'a Arrays,
+    writes: &'a mut Arrays,
+    args: &DispatchArgs,
+) -> (&'a Texels, &'a mut Texels, usize) {
+    let (target, z) = target_of(writes, args);
+    (reads.get("source"), target, z)
 }
 
 /// A sequence of filters. Each reads the output of the one before it. Their order is that of [`PASSES`](super::PASSES).
@@ -257,6 +275,30 @@ pub struct Tolerance {
     pub why: &'static str,
 }
 
+impl Tolerance {
+    /// Bit for bit.
+    pub(super) const fn exact(why: &'static str) -> Tolerance {
+        Tolerance::absolute(0.0).because(why)
+    }
+
+    /// An absolute tolerance alone, to which the methods below add.
+    pub(super) const fn absolute(absolute: f64) -> Tolerance {
+        Tolerance { absolute, relative: 0.0, outliers: 0.0, why: "" }
+    }
+
+    pub(super) const fn relative(self, relative: f64) -> Tolerance {
+        Tolerance { relative, ..self }
+    }
+
+    pub(super) const fn outliers(self, outliers: f64) -> Tolerance {
+        Tolerance { outliers, ..self }
+    }
+
+    pub(super) const fn because(self, why: &'static str) -> Tolerance {
+        Tolerance { why, ..self }
+    }
+}
+
 /// The declaration of a compute pass, the only place where it is described. Callers use the methods with the names of the fields.
 pub struct Pass {
     /// Unique name: debug label, name of its time stamps and of its test case.
@@ -300,7 +342,7 @@ impl Pass {
         repeat: once,
         params: |_, _| Params::default(),
         constants: no_constants,
-        tolerance: Tolerance { absolute: 0.0, relative: 0.0, outliers: 0.0, why: "" },
+        tolerance: Tolerance::exact(""),
         reference: |_, _, _, _| {},
     };
 
@@ -311,6 +353,11 @@ impl Pass {
         extent: slice_extent,
         ..Pass::filter(Chain::Slices)
     };
+
+    /// Defaults of passes that make slices of their own from the finished slices of the volume. Every pass has to replace the
+    /// fields that are empty in [`Pass::OF_RAYS`].
+    pub(super) const AFTER_SLICES: Pass =
+        Pass { frequency: Frequency::Volume, link: Link::AfterSlices, ..Pass::OF_SLICES };
 
     /// Defaults of filters of the distance map. Every pass has to replace the fields that are empty in [`Pass::OF_RAYS`].
     pub(super) const OF_DISTANCES: Pass = Pass { stage: Stage::Shade, ..Pass::filter(Chain::Distances) };

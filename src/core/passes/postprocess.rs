@@ -13,8 +13,6 @@ pub(in crate::passes) const LINE_STRENGTH: f64 = 0.7;
 /// Applies contrast, brightness, gamma and colour map, draws cross-lines and borders over planes, and stores the picture in 8 bits.
 pub const TONE: Pass = Pass {
     name: "tone",
-    stage: Stage::Postprocess,
-    frequency: Frequency::Picture,
     link: Link::Observer(Chain::Pictures),
     shader: |_, _| "postprocess/tone",
     needed: |s| match (s.tones_planes(), s.tones_assembled()) {
@@ -28,25 +26,19 @@ pub const TONE: Pass = Pass {
         reads
     },
     writes: |s, _| vec![whole("screen", toned_slot(s))],
-    extent: picture_extent,
-    repeat: once,
     params: |s, _| {
         let [x, y] = s.tile_area().corner;
         tone_and_lines_params(s, Params::default()).i32("tiles_x", x).i32("tiles_y", y)
     },
     constants: |s, _| tone_and_lines_constants(s),
-    tolerance: Tolerance {
-        absolute: 1.01 / 255.0,
-        relative: 0.0,
-        outliers: 0.0,
-        why: "a value half-way between two levels may be stored as either",
-    },
+    tolerance: Tolerance::absolute(1.01 / 255.0).because("a value half-way between two levels may be stored as either"),
     reference: |scene, _, reads, writes| tone_picture(scene, reads.get("picture"), writes.get_mut("screen")),
+    ..Pass::OF_PICTURES
 };
 
 fn tone_picture(scene: &Scene, picture: &Texels, screen: &mut Texels) {
     let tiling = scene.draws_lines().then(|| scene.tiling());
-    for (x, y) in (0..picture.size[1]).flat_map(|y| (0..picture.size[0]).map(move |x| (x, y))) {
+    for (x, y) in picture.pixels() {
         let rgba = picture.get([x, y, 0]);
         let colour = (rgba[3] > 0.0).then_some([rgba[0], rgba[1], rgba[2]]);
         screen.set([x, y, 0], &reference_pixel(scene, tiling.as_ref(), colour, x, y));
@@ -197,8 +189,6 @@ fn assemble_extent(scene: &Scene, _: &DispatchArgs) -> [u32; 3] {
 pub(crate) const ASSEMBLE: Pass = Pass {
     name: "assemble",
     stage: Stage::Postprocess,
-    frequency: Frequency::Picture,
-    link: Link::None,
     shader: |_, _| "postprocess/assemble.plain",
     needed: |s| match s.settings.layout {
         _ if !s.assembles() => Err("one ray makes a pixel of the whole picture"),
@@ -208,17 +198,15 @@ pub(crate) const ASSEMBLE: Pass = Pass {
     reads: |s, _| assemble_reads(s),
     writes: |_, _| vec![whole("picture", Slot::Picture)],
     extent: assemble_extent,
-    repeat: once,
     params: |s, _| assemble_params(s),
     constants: |s, _| assemble_constants(s),
-    tolerance: Tolerance {
-        absolute: 1e-3,
-        relative: 0.0,
-        outliers: 2e-3,
-        why: "a mean of at most 16 colours in f32; R16F stores 1 to 4.9e-4; a gap that is as wide as a cliff, two that are as wide as each other, or a \
-              mean of sides that is nearly even in all directions may put a pixel on either side of an edge",
-    },
+    tolerance: Tolerance::absolute(1e-3).outliers(2e-3).because(
+        "a mean of at most 16 colours in f32; R16F stores 1 to 4.9e-4; a gap that is as wide as a cliff, two that are \
+         as wide as each other, or a mean of sides that is nearly even in all directions may put a pixel on either \
+         side of an edge",
+    ),
     reference: |scene, _, reads, writes| assemble(scene, reads, writes.get_mut("picture")),
+    ..Pass::OF_RAYS
 };
 
 /// Does the same as [`ASSEMBLE`], and also tones the picture and stores it in 8 bits.
@@ -238,13 +226,10 @@ pub(crate) const ASSEMBLE_TONED: Pass = Pass {
     writes: |s, _| vec![whole("screen", toned_slot(s))],
     params: |s, _| tone_and_lines_params(s, assemble_params(s)),
     constants: |s, _| [assemble_constants(s), tone_and_lines_constants(s)].concat(),
-    tolerance: Tolerance {
-        absolute: 2.01 / 255.0,
-        relative: 0.0,
-        outliers: 2e-3,
-        why: "a value half-way between two levels may be stored as either, after an error that contrast and gamma multiply; sides of an edge as without \
-              toning",
-    },
+    tolerance: Tolerance::absolute(2.01 / 255.0).outliers(2e-3).because(
+        "a value half-way between two levels may be stored as either, after an error that contrast and gamma multiply; \
+         sides of an edge as without toning",
+    ),
     reference: |scene, _, reads, writes| {
         let mut picture = Texels::untouched(writes.get_mut("screen").size, 4);
         assemble(scene, reads, &mut picture);
@@ -306,42 +291,40 @@ fn assemble(scene: &Scene, reads: &Arrays, picture: &mut Texels) {
     let [beside, of_rendering] = [false, true].map(|is_rendering| edge_distances(scene, reads, is_rendering));
     let rendering = scene.rendering_area();
     let [corner, tiles] = [rendering, scene.tile_area()].map(|area| area.corner.map(|n| n as usize));
-    for y in 0..picture.size[1] {
-        for x in 0..picture.size[0] {
-            let is_rendering = rendering.holds([x, y]);
-            if !is_rendering && scene.cuts_planes() {
-                let plane = reads.get("planes").get([x - tiles[0], y - tiles[1], 0]).to_vec();
-                picture.set([x, y, 0], &plane);
-                continue;
-            }
-            let (shown, corner) = match is_rendering {
-                true => (reads.get("rendered"), corner),
-                false => (reads.get("composited"), [0, 0]),
-            };
-            let distances = if is_rendering { &of_rendering } else { &beside };
-            if scene.settings.ray.subsampling > 1 {
-                let apart = f64::from(scene.settings.ray.subsampling);
-                let guide = distances.as_ref().map(|distances| (distances, scene.cliff()));
-                picture.set([x, y, 0], &between(shown, guide, apart, [x - corner[0], y - corner[1]]));
-                continue;
-            }
-            let at = [x - corner[0], y - corner[1]];
-            if let Some(distances) = distances {
-                picture.set([x, y, 0], &antialiased(shown, distances, scene.cliff(), at));
-                continue;
-            }
-            if scene.adapts_rays() && reads.get("marks").one(at[0], at[1], 0) == 0.0 {
-                let single = reads.get("single").get([at[0], at[1], 0]).to_vec();
-                picture.set([x, y, 0], &single);
-                continue;
-            }
-            let mut mean = [0.0; 4];
-            for (i, j) in (0..rays * rays).map(|n| (n % rays, n / rays)) {
-                let ray = shown.get([at[0] * rays + i, at[1] * rays + j, 0]);
-                mean.iter_mut().zip(ray).for_each(|(m, v)| *m += v / (rays * rays) as f64);
-            }
-            picture.set([x, y, 0], &mean);
+    for (x, y) in picture.pixels() {
+        let is_rendering = rendering.holds([x, y]);
+        if !is_rendering && scene.cuts_planes() {
+            let plane = reads.get("planes").get([x - tiles[0], y - tiles[1], 0]).to_vec();
+            picture.set([x, y, 0], &plane);
+            continue;
         }
+        let (shown, corner) = match is_rendering {
+            true => (reads.get("rendered"), corner),
+            false => (reads.get("composited"), [0, 0]),
+        };
+        let distances = if is_rendering { &of_rendering } else { &beside };
+        if scene.settings.ray.subsampling > 1 {
+            let apart = f64::from(scene.settings.ray.subsampling);
+            let guide = distances.as_ref().map(|distances| (distances, scene.cliff()));
+            picture.set([x, y, 0], &between(shown, guide, apart, [x - corner[0], y - corner[1]]));
+            continue;
+        }
+        let at = [x - corner[0], y - corner[1]];
+        if let Some(distances) = distances {
+            picture.set([x, y, 0], &antialiased(shown, distances, scene.cliff(), at));
+            continue;
+        }
+        if scene.adapts_rays() && reads.get("marks").one(at[0], at[1], 0) == 0.0 {
+            let single = reads.get("single").get([at[0], at[1], 0]).to_vec();
+            picture.set([x, y, 0], &single);
+            continue;
+        }
+        let mut mean = [0.0; 4];
+        for (i, j) in (0..rays * rays).map(|n| (n % rays, n / rays)) {
+            let ray = shown.get([at[0] * rays + i, at[1] * rays + j, 0]);
+            mean.iter_mut().zip(ray).for_each(|(m, v)| *m += v / (rays * rays) as f64);
+        }
+        picture.set([x, y, 0], &mean);
     }
 }
 

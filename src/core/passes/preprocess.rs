@@ -23,33 +23,26 @@ pub(crate) const SCAN_CONVERT: Pass = Pass {
         let (gain, offset) = scale(s);
         Params::default().f32("gain", gain).f32("offset", offset).i32("slice", t.slice)
     },
-    tolerance: Tolerance {
-        absolute: 1e-3,
-        relative: 0.0,
-        outliers: 0.0,
-        why: "a table entry near 3640 has 2.4e-4 samples of rounding in f32, times a step of at most 1 between samples, \
-              twice over two interpolations; R16F stores 1 to 4.9e-4",
-    },
+    tolerance: Tolerance::absolute(1e-3).because(
+        "a table entry near 3640 has 2.4e-4 samples of rounding in f32, times a step of at most 1 between samples, \
+         twice over two interpolations; R16F stores 1 to 4.9e-4",
+    ),
     reference: |scene, args, reads, writes| {
         let Some(probe) = scene.probe() else { return };
         let frames = reads.get("frames");
-        let target = writes.get_mut("target");
-        let z = if target.size[2] > 1 { args.slice as usize } else { 0 };
+        let (target, z) = target_of(writes, args);
         let (gain, offset) = scale(scene);
-        for row in 0..scene.grid.size[1] {
-            for column in 0..scene.grid.size[0] {
-                let (x, y) = scene.grid.place(f64::from(column), f64::from(row));
-                let Some((sample, line)) = scan_index(scene, probe, x, y) else {
-                    // The volume's own texels there are never written; filters must not see what an earlier frame left.
-                    if !args.writes_volume() {
-                        target.set([column as usize, row as usize, z], &[0.0]);
-                    }
-                    continue;
-                };
-                let value = bilinear(frames, sample, line);
-                let value = (value * gain + offset).clamp(0.0, 1.0);
-                target.set([column as usize, row as usize, z], &[value]);
-            }
+        for (column, row) in target.pixels() {
+            let (x, y) = scene.grid.place(column as f64, row as f64);
+            let Some((sample, line)) = scan_index(scene, probe, x, y) else {
+                // The volume's own texels there are never written; filters must not see what an earlier frame left.
+                if !args.writes_volume() {
+                    target.set([column, row, z], &[0.0]);
+                }
+                continue;
+            };
+            let value = bilinear(frames, sample, line) * gain + offset;
+            target.set([column, row, z], &[value.clamp(0.0, 1.0)]);
         }
     },
     ..Pass::OF_SLICES
@@ -86,8 +79,6 @@ fn scale(scene: &Scene) -> (f64, f64) {
 /// lines, log compression. With the decimation factor M, sample j of the result is centred on sample j M of the frame.
 pub(crate) const CONDITION: Pass = Pass {
     name: "condition",
-    stage: Stage::Preprocess,
-    frequency: Frequency::Frame,
     link: Link::None,
     shader: |_, _| "preprocess/condition",
     needed: |s| match s.probe() {
@@ -105,7 +96,6 @@ pub(crate) const CONDITION: Pass = Pass {
         let [samples, lines] = s.line_lattice();
         [samples, lines, t.slices]
     },
-    repeat: once,
     params: |s, _| {
         let (gain, offset) = normalisation(s);
         let deviation = s.conditioning.deviation(s.decimation());
@@ -125,13 +115,10 @@ pub(crate) const CONDITION: Pass = Pass {
             ("GAINED", !c.tgc.is_empty() as i32),
         ]
     },
-    tolerance: Tolerance {
-        absolute: 5e-5,
-        relative: 0.0,
-        outliers: 0.0,
-        why: "a positive sum in f32 is good to 2e-6 of its value, log2 to 5e-7, both 6 dB an octave over a range of at least \
-              20 dB; one level of u16 above the darkest loses 1e-4 of itself in the offset",
-    },
+    tolerance: Tolerance::absolute(5e-5).because(
+        "a positive sum in f32 is good to 2e-6 of its value, log2 to 5e-7, both 6 dB an octave over a range of at \
+         least 20 dB; one level of u16 above the darkest loses 1e-4 of itself in the offset",
+    ),
     reference: |scene, _, reads, writes| {
         let frames = reads.get("frames");
         let target = writes.get_mut("conditioned");
@@ -149,6 +136,7 @@ pub(crate) const CONDITION: Pass = Pass {
             }
         }
     },
+    ..Pass::OF_SLICES
 };
 
 /// A stored sample as 0..1 times, or plus, its depth's gain.
@@ -190,22 +178,14 @@ pub(crate) const LOAD_SLICE: Pass = Pass {
     },
     reads: |_, _| vec![layers("frames", Slot::Frames)],
     params: load_params,
-    tolerance: Tolerance {
-        absolute: 5e-4,
-        relative: 0.0,
-        outliers: 0.0,
-        why: "one multiplication and addition in f32; R16F stores 1 to 4.9e-4",
-    },
+    tolerance: Tolerance::absolute(5e-4).because("one multiplication and addition in f32; R16F stores 1 to 4.9e-4"),
     reference: |scene, args, reads, writes| {
         let frames = reads.get("frames");
-        let target = writes.get_mut("target");
-        let z = if target.size[2] > 1 { args.slice as usize } else { 0 };
+        let (target, z) = target_of(writes, args);
         let (gain, offset) = normalisation(scene);
-        for y in 0..frames.size[1] {
-            for x in 0..frames.size[0] {
-                let value = frames.one(x, y, 0) * gain + offset;
-                target.set([x, y, z], &[value.clamp(0.0, 1.0)]);
-            }
+        for (x, y) in frames.pixels() {
+            let value = frames.one(x, y, 0) * gain + offset;
+            target.set([x, y, z], &[value.clamp(0.0, 1.0)]);
         }
     },
     ..Pass::OF_SLICES
@@ -236,9 +216,6 @@ fn load_params(scene: &Scene, args: &DispatchArgs) -> Params {
 /// This needs four times the volume's memory in addition, and one more pass over every new slice.
 pub const PACKED_NEIGHBOURS: Pass = Pass {
     name: "packed_neighbours",
-    stage: Stage::Preprocess,
-    frequency: Frequency::Volume,
-    link: Link::AfterSlices,
     shader: |_, _| "preprocess/packed_neighbours",
     needed: |s| match s.packs() {
         true => Ok("rays load the four neighbours of a slice at once"),
@@ -248,10 +225,9 @@ pub const PACKED_NEIGHBOURS: Pass = Pass {
     reads: |s, _| vec![Bind { part: Part::Around(s.reach_to_frames()), ..whole("volume", Slot::of_rays(s)) }],
     writes: |_, _| vec![Bind { part: Part::Around(0), ..whole("packed_neighbours", Slot::PackedNeighbours) }],
     extent: |s, t| in_runs([s.grid.size[0], s.grid.size[1], t.slices], 0),
-    repeat: once,
     params: |_, t| Params::default().i32("slice", t.slice),
     constants: |s, _| vec![("RUN", RUN as i32), ("STORED", packed_format(s))],
-    tolerance: Tolerance { absolute: 0.0, relative: 0.0, outliers: 0.0, why: "copies of what is stored" },
+    tolerance: Tolerance::exact("copies of what is stored"),
     reference: |scene, args, reads, writes| {
         let volume = reads.get("volume");
         let target = writes.get_mut("packed_neighbours");
@@ -272,6 +248,7 @@ pub const PACKED_NEIGHBOURS: Pass = Pass {
             }
         }
     },
+    ..Pass::AFTER_SLICES
 };
 
 /// STORED of packed_neighbours.comp.

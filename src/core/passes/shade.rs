@@ -65,26 +65,21 @@ pub const LIGHT: Pass = Pass {
             cap::constant(s),
         ]
     },
-    tolerance: Tolerance {
-        absolute: 6e-3,
-        relative: 6e-3,
-        outliers: 5e-3,
-        why: "a slope is off by 1e-6 in f32, and a shininess of 1e6 multiplies what that does to a cosine; a neighbour at \
-              exactly the cliff's height may count or not",
-    },
+    tolerance: Tolerance::absolute(6e-3).relative(6e-3).outliers(5e-3).because(
+        "a slope is off by 1e-6 in f32, and a shininess of 1e6 multiplies what that does to a cosine; a neighbour at \
+         exactly the cliff's height may count or not",
+    ),
     reference: |scene, _, reads, writes| {
         let picture = writes.get_mut("picture");
-        for y in 0..picture.size[1] {
-            for x in 0..picture.size[0] {
-                // Echoes are not lit.
-                let cut = cap::cut_at(scene, reads, x, y);
-                let behind = match cut.filter(|cut| cut.ends_ray()) {
-                    Some(_) => [0.0; 4],
-                    None => reference_pixel(scene, reads, lit(scene, reads, x, y), x, y),
-                };
-                let colour = cut.map_or(behind, |cut| cut.over(behind));
-                picture.set([x, y, 0], &colour);
-            }
+        for (x, y) in picture.pixels() {
+            // Echoes are not lit.
+            let cut = cap::cut_at(scene, reads, x, y);
+            let behind = match cut.filter(|cut| cut.ends_ray()) {
+                Some(_) => [0.0; 4],
+                None => reference_pixel(scene, reads, lit(scene, reads, x, y), x, y),
+            };
+            let colour = cut.map_or(behind, |cut| cut.over(behind));
+            picture.set([x, y, 0], &colour);
         }
     },
     ..Pass::OF_DISTANCES
@@ -294,22 +289,17 @@ pub const SHADOW: Pass = Pass {
             ("MOST_STEPS", MOST_STEPS as i32),
         ]
     },
-    tolerance: Tolerance {
-        absolute: 5e-3,
-        relative: 0.0,
-        outliers: 3e-2,
-        why: "a place is off by 2e-5 mm in f32, and an edge of softness 0.15 at 0.4 mm makes 3e-4 of that; where the map has a \
-              cliff, a thickness or a border, a place may fall on either side and the whole step counts or not",
-    },
+    tolerance: Tolerance::absolute(5e-3).outliers(3e-2).because(
+        "a place is off by 2e-5 mm in f32, and an edge of softness 0.15 at 0.4 mm makes 3e-4 of that; where the map \
+         has a cliff, a thickness or a border, a place may fall on either side and the whole step counts or not",
+    ),
     reference: |scene, _, reads, writes| {
         let distances = reads.get("distance_map");
         let shadow = writes.get_mut("shadow");
-        for y in 0..shadow.size[1] {
-            for x in 0..shadow.size[0] {
-                let arrives = place(scene, distances, x as i64, y as i64)
-                    .map_or(1.0, |(place, distance)| arriving(scene, distances, x, y, place, distance));
-                shadow.set([x, y, 0], &[arrives]);
-            }
+        for (x, y) in shadow.pixels() {
+            let arrives = place(scene, distances, x as i64, y as i64)
+                .map_or(1.0, |(place, distance)| arriving(scene, distances, x, y, place, distance));
+            shadow.set([x, y, 0], &[arrives]);
         }
     },
     ..Pass::OF_DISTANCES
@@ -403,20 +393,15 @@ pub(crate) const OCCLUSION: Pass = Pass {
         let occlusion = s.settings.light.occlusion.unwrap_or_default();
         camera_params(s).f32("radius", occlusion.radius).f32("strength", occlusion.strength)
     },
-    tolerance: Tolerance {
-        absolute: 4e-3,
-        relative: 0.0,
-        outliers: 3e-2,
-        why: "a sum of 32 cosines in f32; a place on the spiral at a pixel's very border may be read from its neighbour, and a \
-              neighbour at exactly the cliff's height may tilt the normal or not",
-    },
+    tolerance: Tolerance::absolute(4e-3).outliers(3e-2).because(
+        "a sum of 32 cosines in f32; a place on the spiral at a pixel's very border may be read from its neighbour, \
+         and a neighbour at exactly the cliff's height may tilt the normal or not",
+    ),
     reference: |scene, _, reads, writes| {
         let distances = reads.get("distance_map");
         let occlusion = writes.get_mut("occlusion");
-        for y in 0..occlusion.size[1] {
-            for x in 0..occlusion.size[0] {
-                occlusion.set([x, y, 0], &[open(scene, distances, x as i64, y as i64).unwrap_or(1.0)]);
-            }
+        for (x, y) in occlusion.pixels() {
+            occlusion.set([x, y, 0], &[open(scene, distances, x as i64, y as i64).unwrap_or(1.0)]);
         }
     },
     ..Pass::OF_DISTANCES

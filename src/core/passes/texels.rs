@@ -4,6 +4,7 @@ use super::slots::{Format, Slot};
 use crate::scene::Scene;
 use half::f16;
 use std::borrow::Cow;
+use std::ops::Range;
 
 /// An array of texels with `channels` values each; x varies fastest.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,6 +33,11 @@ impl Texels {
             }
         }
         texels
+    }
+
+    /// The places (x, y) of one layer, row by row.
+    pub fn pixels(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
+        pixels([self.size[0], self.size[1]])
     }
 
     fn index(&self, [x, y, z]: [usize; 3]) -> usize {
@@ -220,6 +226,14 @@ fn in_order(format: Format, values: &[f64]) -> Cow<'_, [f64]> {
         Format::Bgra8 => values.chunks_exact(4).flat_map(|c| [c[2], c[1], c[0], c[3]]).collect(),
         _ => Cow::Borrowed(values),
     }
+}
+
+/// The places (x, y) of an image of this width and height, row by row.
+pub(super) fn pixels<T: Copy + Default>([width, height]: [T; 2]) -> impl Iterator<Item = (T, T)>
+where
+    Range<T>: Iterator<Item = T>,
+{
+    (T::default()..height).flat_map(move |y| (T::default()..width).map(move |x| (x, y)))
 }
 
 /// The arrays of one pass by the names that its shader gives them.

@@ -10,7 +10,6 @@
 
 use super::Input;
 use crate::probe::Geometry;
-use crate::probe::StoredType;
 
 /// Bins of a histogram over 0..1.
 const BINS: usize = 1024;
@@ -101,15 +100,8 @@ impl EchoHistogram {
     pub fn take(&mut self, bytes: &[u8]) {
         let [low, high] = self.input.range;
         let scaled = |value: f64| ((value - low) / (high - low)).clamp(0.0, 1.0);
-        let values: Vec<f64> = match self.input.stored {
-            StoredType::U8 => bytes.iter().map(|v| scaled(f64::from(*v))).collect(),
-            StoredType::U16 => {
-                bytes.as_chunks::<2>().0.iter().map(|v| scaled(f64::from(u16::from_le_bytes(*v)))).collect()
-            }
-            StoredType::F32 => {
-                bytes.as_chunks::<4>().0.iter().map(|v| scaled(f64::from(f32::from_le_bytes(*v)))).collect()
-            }
-        };
+        let mut values = Vec::with_capacity(bytes.len() / self.input.stored.bytes());
+        self.input.stored.for_each(bytes, |value| values.push(scaled(value)));
         let ([width, height], [wide, tall]) = (self.size, self.block);
         for row in (0..height - height % tall).step_by(tall) {
             for column in (0..width - width % wide).step_by(wide) {

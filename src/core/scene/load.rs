@@ -456,8 +456,8 @@ mod tests {
 
     #[test]
     fn a_transfer_function_may_lie_in_a_file_of_its_own() {
-        let folder = std::env::temp_dir().join(format!("echolume-transfer-{}", std::process::id()));
-        std::fs::create_dir_all(&folder).unwrap();
+        let work = crate::files::WorkFolder::new(&std::env::temp_dir(), "echolume-transfer-").unwrap();
+        let folder = work.path();
         let write = |name: &str, text: &str| std::fs::write(folder.join(name), text).unwrap();
         write(
             "fire.toml",
@@ -474,7 +474,6 @@ mod tests {
         assert!(error.contains("broken.toml") && error.contains("color") && error.lines().count() == 1, "{error}");
         let missing = Layers::default().set("volume.transfer=missing.toml").unwrap_err().to_string();
         assert!(missing.contains("missing.toml: cannot be read"), "{missing}");
-        std::fs::remove_dir_all(&folder).unwrap();
     }
 
     #[test]

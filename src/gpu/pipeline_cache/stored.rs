@@ -171,22 +171,10 @@ impl CacheFile {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::files::WorkFolder;
 
-    /// A folder of one test.
-    struct Folder(PathBuf);
-
-    impl Folder {
-        fn new(name: &str) -> Folder {
-            let folder = std::env::temp_dir().join(format!("echolume-caches-{}-{name}", std::process::id()));
-            std::fs::create_dir_all(&folder).unwrap();
-            Folder(folder)
-        }
-    }
-
-    impl Drop for Folder {
-        fn drop(&mut self) {
-            let _ = std::fs::remove_dir_all(&self.0);
-        }
+    fn folder() -> WorkFolder {
+        WorkFolder::new(&std::env::temp_dir(), "echolume-caches-").unwrap()
     }
 
     fn identity() -> DriverIdentity {
@@ -202,8 +190,8 @@ mod tests {
 
     #[test]
     fn what_was_written_is_read_back() {
-        let folder = Folder::new("read");
-        let file = CacheFile::new(&folder.0.join("a/b"), &identity());
+        let folder = folder();
+        let file = CacheFile::new(&folder.path().join("a/b"), &identity());
         assert_eq!(file.read(), Ok(None));
         for more in [vec![], vec![7; 100_000]] {
             file.write(&data(&identity(), &more)).unwrap();
@@ -216,8 +204,8 @@ mod tests {
     /// Any byte that is another, and any length that is shorter or longer: no driver is ever given such data.
     #[test]
     fn a_damaged_file_is_refused_wherever_the_damage_is() {
-        let folder = Folder::new("damaged");
-        let file = CacheFile::new(&folder.0, &identity());
+        let folder = folder();
+        let file = CacheFile::new(folder.path(), &identity());
         file.write(&data(&identity(), &[1, 2, 3, 4, 5])).unwrap();
         let good = std::fs::read(file.path()).unwrap();
         assert_eq!(good.len(), HEADER + VULKAN_HEADER + 5);
@@ -240,7 +228,7 @@ mod tests {
     /// A file that was copied or renamed, and data of another driver in a file that is complete.
     #[test]
     fn a_file_of_another_device_driver_or_program_is_refused() {
-        let folder = Folder::new("other");
+        let folder = folder();
         let ours = identity();
         let others = [
             DriverIdentity { vendor: 1, ..identity() },
@@ -248,9 +236,9 @@ mod tests {
             DriverIdentity { driver_version: 1, ..identity() },
             DriverIdentity { uuid: [1; 16], ..identity() },
         ];
-        let file = CacheFile::new(&folder.0, &ours);
+        let file = CacheFile::new(folder.path(), &ours);
         for other in &others {
-            let theirs = CacheFile::new(&folder.0, other);
+            let theirs = CacheFile::new(folder.path(), other);
             assert_ne!(file.path(), theirs.path());
             theirs.write(&data(other, &[1])).unwrap();
             std::fs::copy(theirs.path(), file.path()).unwrap();
@@ -271,21 +259,21 @@ mod tests {
 
     #[test]
     fn a_folder_keeps_the_newest_files_and_no_rubbish() {
-        let folder = Folder::new("tidy");
+        let folder = folder();
         let old = |path: &Path, days: u64| {
             let at = SystemTime::now() - Duration::from_secs(days * 24 * 3600);
             std::fs::File::options().write(true).open(path).unwrap().set_modified(at).unwrap();
         };
         let of = |version| {
             let identity = DriverIdentity { driver_version: version, ..identity() };
-            CacheFile::new(&folder.0, &identity)
+            CacheFile::new(folder.path(), &identity)
         };
         for version in 0..12 {
             let file = of(version);
             file.write(&data(&file.identity, &[])).unwrap();
             old(file.path(), u64::from(100 - version));
         }
-        let parts = [".echolume-old.part", ".echolume-new.part", "foreign.txt"].map(|name| folder.0.join(name));
+        let parts = [".echolume-old.part", ".echolume-new.part", "foreign.txt"].map(|name| folder.path().join(name));
         for part in &parts {
             std::fs::write(part, "x").unwrap();
         }
@@ -300,8 +288,8 @@ mod tests {
 
     #[test]
     fn a_cache_beyond_the_limit_begins_anew() {
-        let folder = Folder::new("large");
-        let file = CacheFile::new(&folder.0, &identity());
+        let folder = folder();
+        let file = CacheFile::new(folder.path(), &identity());
         file.write(&data(&identity(), &[1])).unwrap();
         let large = data(&identity(), &vec![0; MAX_BYTES as usize]);
         assert!(file.write(&large).unwrap_err().contains("anew"));
@@ -310,8 +298,8 @@ mod tests {
 
     #[test]
     fn a_folder_that_cannot_be_written_is_an_error_and_no_panic() {
-        let folder = Folder::new("blocked");
-        let blocked = folder.0.join("file");
+        let folder = folder();
+        let blocked = folder.path().join("file");
         std::fs::write(&blocked, "x").unwrap();
         let file = CacheFile::new(&blocked.join("below"), &identity());
         assert_eq!(file.read(), Ok(None));

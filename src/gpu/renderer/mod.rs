@@ -21,6 +21,7 @@ use super::timing::TimeStamps;
 use crate::passes::slots::{Format, Initializer, encoded};
 use crate::passes::{DispatchArgs, Frequency, PassTime, Slot, Span, Stage, Texels};
 use crate::plan::{Contents, Plan, Rerun, Step};
+use crate::probe::Frame;
 use crate::queues::MAX_QUEUES;
 use crate::queues::oracle::SubmissionLog;
 use crate::scene::{Scene, VisibleBounds};
@@ -238,6 +239,17 @@ impl Renderer {
 }
 
 impl Renderer {
+    /// Sends the frames of a volume to volume image 0, which the next picture shows.
+    ///
+    /// # Errors
+    /// As of [`Renderer::frame`].
+    pub fn volume<'a>(&mut self, frames: impl IntoIterator<Item = &'a Frame>) -> Result<(), GpuError> {
+        for frame in frames {
+            self.frame(frame.slice as u32, &frame.bytes, 0)?;
+        }
+        self.show(0)
+    }
+
     /// Sends one frame to stage 1, which writes slice `slice` of volume image `image`. `bytes` are samples of the stored type, line by line. Returns
     /// when the bytes are copied, and waits only if all staging buffers are in use. A frame that is not visible in this scene is skipped and counted.
     ///

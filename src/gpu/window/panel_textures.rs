@@ -5,7 +5,7 @@ use super::flat_image::FlatImage;
 use crate::buffers::{Buffer, Purpose};
 use crate::context::Context;
 use crate::error::{ErrorContext, GpuError};
-use crate::resources::WHOLE;
+use crate::resources::{COLOUR, image_barrier};
 use ash::vk;
 use egui::epaint::{ImageData, ImageDelta, Primitive};
 use egui_ash_renderer::Renderer;
@@ -180,47 +180,32 @@ impl PanelTextures {
         let device = &self.context.device;
         for Upload { texture, staging, at, size } in self.pending.drain(..) {
             let Some(texture) = self.textures.get_mut(&texture) else { continue };
-            let read = (vk::PipelineStageFlags2::FRAGMENT_SHADER, vk::AccessFlags2::SHADER_SAMPLED_READ);
-            let written = (vk::PipelineStageFlags2::COPY, vk::AccessFlags2::TRANSFER_WRITE);
             let (shown, copied) = (vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL, vk::ImageLayout::TRANSFER_DST_OPTIMAL);
-            let before = if texture.is_filled { shown } else { vk::ImageLayout::UNDEFINED };
-            let turn = |(from, to), (stage, access), (next_stage, next_access)| {
-                let barrier = [vk::ImageMemoryBarrier2::default()
-                    .src_stage_mask(stage)
-                    .src_access_mask(access)
-                    .dst_stage_mask(next_stage)
-                    .dst_access_mask(next_access)
-                    .old_layout(from)
-                    .new_layout(to)
-                    .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
-                    .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
-                    .image(texture.image.handle)
-                    .subresource_range(WHOLE)];
-                let dependency = vk::DependencyInfo::default().image_memory_barriers(&barrier);
+            let read = (vk::PipelineStageFlags2::FRAGMENT_SHADER, vk::AccessFlags2::SHADER_SAMPLED_READ, shown);
+            let written = (vk::PipelineStageFlags2::COPY, vk::AccessFlags2::TRANSFER_WRITE, copied);
+            let turn = |from, to| {
                 // SAFETY: the command buffer is being recorded, outside dynamic rendering; the image is alive.
-                unsafe { device.cmd_pipeline_barrier2(commands, &dependency) };
-            };
-            let layers = vk::ImageSubresourceLayers {
-                aspect_mask: vk::ImageAspectFlags::COLOR,
-                layer_count: 1,
-                ..Default::default()
+                unsafe { image_barrier(device, commands, [texture.image.handle], from, to) };
             };
             let region = vk::BufferImageCopy::default()
-                .image_subresource(layers)
+                .image_subresource(COLOUR)
                 .image_offset(vk::Offset3D { x: at[0] as i32, y: at[1] as i32, z: 0 })
                 .image_extent(vk::Extent3D { width: size[0], height: size[1], depth: 1 });
             // The memory of a new one may have been that of something else, which is done; layers before 2024 do not know it.
             let last = match texture.is_filled {
-                true => (read.0, vk::AccessFlags2::NONE),
-                false => (vk::PipelineStageFlags2::ALL_COMMANDS, vk::AccessFlags2::MEMORY_WRITE),
+                true => (read.0, vk::AccessFlags2::NONE, shown),
+                false => {
+                    let all = vk::PipelineStageFlags2::ALL_COMMANDS;
+                    (all, vk::AccessFlags2::MEMORY_WRITE, vk::ImageLayout::UNDEFINED)
+                }
             };
-            turn((before, copied), last, written);
+            turn(last, written);
             // SAFETY: the staging buffer holds the bytes of the region, which egui places inside its texture; both live until the device
             // is done.
             unsafe {
                 device.cmd_copy_buffer_to_image(commands, staging.handle, texture.image.handle, copied, &[region]);
             }
-            turn((copied, shown), written, read);
+            turn(written, read);
             texture.is_filled = true;
             self.in_flight.push(staging);
         }

@@ -11,7 +11,7 @@ use crate::device_queues::DeviceQueues;
 use crate::error::{ErrorContext, GpuError};
 use crate::formats;
 use crate::passes::Slot;
-use crate::resources::{Image, WHOLE};
+use crate::resources::{COLOUR, Image, WHOLE, image_barrier};
 use ash::vk;
 use egui_ash_renderer::allocator::DefaultAllocator;
 use egui_ash_renderer::{DynamicRendering, Options, RenderMode, Renderer};
@@ -403,13 +403,8 @@ impl Screen {
                 go(Stage::Composed);
                 barrier(&device, commands, shown, Stage::Acquired, Stage::Copied);
                 let (from, to) = (vk::ImageLayout::TRANSFER_SRC_OPTIMAL, vk::ImageLayout::TRANSFER_DST_OPTIMAL);
-                let layers = vk::ImageSubresourceLayers {
-                    aspect_mask: vk::ImageAspectFlags::COLOR,
-                    layer_count: 1,
-                    ..Default::default()
-                };
                 let extent = vk::Extent3D { width: size[0], height: size[1], depth: 1 };
-                let whole = [vk::ImageCopy::default().src_subresource(layers).dst_subresource(layers).extent(extent)];
+                let whole = [vk::ImageCopy::default().src_subresource(COLOUR).dst_subresource(COLOUR).extent(extent)];
                 // SAFETY: both images are alive, of this size and of one format, and in these layouts since the barriers above.
                 unsafe { device.cmd_copy_image(commands, target, from, shown, to, &whole) };
                 barrier(&device, commands, shown, Stage::Copied, Stage::Shown);
@@ -510,11 +505,9 @@ pub fn monitor_size(context: &Context, choice: &MonitorChoice) -> Result<[u32; 2
 fn region(image: &Image, at: [u32; 2], size: [u32; 2]) -> (vk::ImageCopy, [u32; 2]) {
     let from = [image.extent.width, image.extent.height];
     let [w, h] = std::array::from_fn(|i| from[i].min(size[i].saturating_sub(at[i])));
-    let layers =
-        vk::ImageSubresourceLayers { aspect_mask: vk::ImageAspectFlags::COLOR, layer_count: 1, ..Default::default() };
     let copy = vk::ImageCopy {
-        src_subresource: layers,
-        dst_subresource: layers,
+        src_subresource: COLOUR,
+        dst_subresource: COLOUR,
         dst_offset: vk::Offset3D { x: at[0] as i32, y: at[1] as i32, z: 0 },
         extent: vk::Extent3D { width: w, height: h, depth: 1 },
         ..Default::default()
@@ -615,19 +608,9 @@ impl Stage {
 
 /// Records the transition of a window's image from one stage to another.
 fn barrier(device: &ash::Device, commands: vk::CommandBuffer, image: vk::Image, from: Stage, to: Stage) {
-    let barrier = [vk::ImageMemoryBarrier2::default()
-        .src_stage_mask(from.stages())
-        .src_access_mask(from.accesses())
-        .dst_stage_mask(to.stages())
-        .dst_access_mask(to.accesses())
-        .old_layout(from.layout())
-        .new_layout(to.layout())
-        .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
-        .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
-        .image(image)
-        .subresource_range(WHOLE)];
+    let side = |of: Stage| (of.stages(), of.accesses(), of.layout());
     // SAFETY: the command buffer is being recorded, outside dynamic rendering; the image was acquired.
-    unsafe { device.cmd_pipeline_barrier2(commands, &vk::DependencyInfo::default().image_memory_barriers(&barrier)) };
+    unsafe { image_barrier(device, commands, [image], side(from), side(to)) };
 }
 
 /// The panels to draw, as egui lays them out.

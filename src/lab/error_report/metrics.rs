@@ -135,14 +135,6 @@ pub fn pictures(measured: &Texels, reference: &Texels) -> Result<PictureError, S
     Ok(PictureError { rmse, max, psnr, ssim: similarity(&grey(&a), &grey(&b), measured.size) })
 }
 
-/// Compares two distance maps, mm. Any difference of two hits counts as an error, none as a jump to another surface.
-///
-/// # Errors
-/// One line: sizes or channels differ, there is no pixel, or a value is not finite.
-pub fn distances(measured: &Texels, reference: &Texels) -> Result<SurfaceError, String> {
-    surfaces(measured, reference, f64::INFINITY)
-}
-
 /// Compares two distance maps, mm. Distances that differ by more than `cliff` mm count as jumps to another surface, not as errors.
 ///
 /// # Errors

@@ -71,10 +71,7 @@ impl<'a> Running<'a> {
     /// # Errors
     /// The device fails, or it has time stamps and the time of a part is missing.
     pub fn run(&mut self) -> Result<Option<[f64; 2]>, GpuError> {
-        for frame in self.frames {
-            self.renderer.frame(frame.slice as u32, &frame.bytes, 0)?;
-        }
-        self.renderer.show(0)?;
+        self.renderer.volume(self.frames)?;
         self.renderer.picture()?;
         let taken = self.renderer.take_times()?;
         if !self.has_times {

@@ -46,38 +46,12 @@ pub struct ProfileRun {
     ceilings: Option<Ceilings>,
 }
 
-/// Profiles a scene. `frames`: those of one volume. Returns the profile, and the spans of host and device of all measured repeats.
-///
-/// # Errors
-/// The device cannot hold the scene, or fails.
-pub fn run(
-    context: &Arc<Context>,
-    scene: &Scene,
-    frames: &[Frame],
-    options: &ProfileOptions,
-) -> Result<(Profile, Vec<export::Span>), GpuError> {
-    let mut run = ProfileRun::new(context, scene, options)?;
-    while run.needs_more() {
-        run.repeat(frames)?;
-    }
-    Ok(run.finish())
-}
-
 impl ProfileRun {
-    /// Measures the ceilings if the options ask for them, and makes the renderer. No repeat has run yet.
-    ///
-    /// # Errors
-    /// The device cannot hold the scene, or fails.
-    pub fn new(context: &Arc<Context>, scene: &Scene, options: &ProfileOptions) -> Result<ProfileRun, GpuError> {
-        ProfileRun::with_shaders(context, scene, options, &RendererOptions::default().shaders)
-    }
-
-    /// Measures the ceilings if the options ask for them, and makes the renderer with these shaders instead of the embedded ones. No repeat has run
-    /// yet.
+    /// Measures the ceilings if the options ask for them, and makes the renderer with these shaders. No repeat has run yet.
     ///
     /// # Errors
     /// The device cannot hold the scene, or fails, or a shader does not compile.
-    pub fn with_shaders(
+    pub fn new(
         context: &Arc<Context>,
         scene: &Scene,
         options: &ProfileOptions,
@@ -117,10 +91,7 @@ impl ProfileRun {
         let start = self.began.elapsed();
         let turned = self.rotate()?;
         if self.done == 0 || !self.options.still || matches!(turned, Some(Rerun::Frames | Rerun::Everything)) {
-            for frame in frames {
-                self.renderer.frame(frame.slice as u32, &frame.bytes, 0)?;
-            }
-            self.renderer.show(0)?;
+            self.renderer.volume(frames)?;
         } else if turned.is_none() {
             // Nothing changed: request the picture again.
             self.renderer.show(0)?;

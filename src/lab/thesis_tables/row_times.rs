@@ -94,10 +94,7 @@ fn measure(
     }
     for n in 0..options.warm_up + options.repeats {
         for (row, renderer) in table.rows.iter_mut().zip(&mut renderers) {
-            for frame in sweeps.get(&row.conditions.frames).into_iter().flatten() {
-                renderer.frame(frame.slice as u32, &frame.bytes, 0)?;
-            }
-            renderer.show(0)?;
+            renderer.volume(sweeps.get(&row.conditions.frames).into_iter().flatten())?;
             renderer.picture()?;
             let times = renderer.take_times()?;
             if n >= options.warm_up {

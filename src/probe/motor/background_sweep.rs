@@ -48,7 +48,7 @@ impl BackgroundSweep {
         let sweep = Sweep { volumes: None, ..sweep };
         let speed = sweep.speed(&drive.table, drive.guard.port().settings().round_trip());
         let speed = speed.map_err(|fault| drive.guard.fail("sweep", fault))?;
-        let track = Track { positions: Vec::new(), longest_gap: MAX_GAP };
+        let track = Track::new(MAX_GAP);
         let positions = PositionLog {
             start: Instant::now(),
             start_since_1970: SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs_f64(),

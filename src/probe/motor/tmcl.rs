@@ -115,11 +115,6 @@ impl Request {
         Request::new(address, motor, command::MOVE_TO, 0, position)
     }
 
-    /// MVP REL: moves by a number of microsteps.
-    pub fn move_by(address: u8, motor: u8, distance: i32) -> Request {
-        Request::new(address, motor, command::MOVE_TO, 1, distance)
-    }
-
     /// SAP: sets an axis parameter, see [`axis`].
     pub fn set_axis(address: u8, motor: u8, parameter: u8, value: i32) -> Request {
         Request::new(address, motor, command::SET_AXIS, parameter, value)
@@ -153,11 +148,6 @@ impl Request {
     /// RFS STATUS: asks whether a reference search is in progress; the value of the reply is 0 if none is.
     pub fn search_status(address: u8, motor: u8) -> Request {
         Request::new(address, motor, command::REFERENCE_SEARCH, 2, 0)
-    }
-
-    /// GIO: reads an input of a bank (0 digital, 1 analogue).
-    pub fn get_input(address: u8, bank: u8, input: u8) -> Request {
-        Request::new(address, bank, command::GET_INPUT, input, 0)
     }
 
     /// Asks for the version of the firmware as a number: module type in the upper 16 bits (0 if the module omits it), version in the lower ones.

@@ -317,21 +317,20 @@ pub(super) fn is_log_file(path: &Path) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::files::WorkFolder;
     use std::sync::Mutex;
     use std::sync::atomic::AtomicU64;
 
     /// A folder of one test, deleted at its end.
-    struct Folder(PathBuf);
+    struct Folder(WorkFolder);
 
     impl Folder {
-        fn new(name: &str) -> Folder {
-            let path = std::env::temp_dir().join(format!("echolume-rotating-{}-{name}", std::process::id()));
-            fs::create_dir_all(&path).expect("make a folder for the test");
-            Folder(path)
+        fn new() -> Folder {
+            Folder(WorkFolder::new(&std::env::temp_dir(), "echolume-rotating-").expect("make a folder for the test"))
         }
 
         fn log(&self) -> PathBuf {
-            self.0.join("a.log")
+            self.0.path().join("a.log")
         }
 
         fn text(&self, number: u32) -> String {
@@ -344,19 +343,13 @@ mod tests {
         }
     }
 
-    impl Drop for Folder {
-        fn drop(&mut self) {
-            let _ = fs::remove_dir_all(&self.0);
-        }
-    }
-
     fn line(number: usize) -> String {
         format!("2026-01-01T00:00:00.000000Z  INFO line {number:06} {}\n", "x".repeat(50))
     }
 
     #[test]
     fn full_files_are_rotated_and_the_oldest_is_deleted() {
-        let folder = Folder::new("count");
+        let folder = Folder::new();
         let mut log = RotatingLog::open(&folder.log(), 5000, 3).expect("open");
         let written: String = (0..1000).map(line).collect();
         for n in 0..1000 {
@@ -371,7 +364,7 @@ mod tests {
 
     #[test]
     fn a_restart_continues_the_log_and_keeps_the_limits() {
-        let folder = Folder::new("restart");
+        let folder = Folder::new();
         for n in 0..300 {
             let mut log = RotatingLog::open(&folder.log(), 5000, 2).expect("open");
             log.write_all(line(n).as_bytes()).expect("never fails");
@@ -388,12 +381,12 @@ mod tests {
 
     #[test]
     fn a_log_that_was_renamed_is_opened_again_when_that_is_said() {
-        let folder = Folder::new("reopened");
+        let folder = Folder::new();
         let reopens: Arc<AtomicBool> = Arc::default();
         let mut log = RotatingLog::open(&folder.log(), 5000, 2).expect("open").reopened(reopens.clone());
         let mut write = |n: usize| log.write_all(line(n).as_bytes()).expect("never fails");
         write(0);
-        let aside = folder.0.join("aside");
+        let aside = folder.0.path().join("aside");
         fs::rename(folder.log(), &aside).expect("renamed");
         write(1);
         reopens.store(true, Ordering::Relaxed);
@@ -410,8 +403,8 @@ mod tests {
 
     #[test]
     fn a_log_whose_folder_is_made_later_begins_there() {
-        let folder = Folder::new("late");
-        let path = folder.0.join("later/a.log");
+        let folder = Folder::new();
+        let path = folder.0.path().join("later/a.log");
         let shared: Arc<Mutex<Vec<u8>>> = Arc::default();
         struct Until(Arc<Mutex<Vec<u8>>>);
         impl Write for Until {
@@ -427,7 +420,7 @@ mod tests {
         let (mut log, mut patient) = (late(Duration::ZERO), late(Duration::MAX));
         assert!(log.fault().is_some_and(|fault| fault.contains("later/a.log: cannot be written")), "{:?}", log.fault());
         (0..2).for_each(|n| log.write_all(line(n).as_bytes()).expect("never fails"));
-        fs::create_dir(folder.0.join("later")).expect("make the folder");
+        fs::create_dir(folder.0.path().join("later")).expect("make the folder");
         patient.write_all(line(2).as_bytes()).expect("never fails");
         assert!(!path.exists(), "the pause between tries was not kept");
         (3..5).for_each(|n| log.write_all(line(n).as_bytes()).expect("never fails"));
@@ -445,7 +438,7 @@ mod tests {
 
     #[test]
     fn a_file_that_is_not_a_log_is_neither_written_nor_renamed() {
-        let folder = Folder::new("foreign");
+        let folder = Folder::new();
         fs::write(folder.log(), "ObjectType = Image").expect("write");
         let refused = |named: &str| {
             let error = RotatingLog::open(&folder.log(), 5000, 3).map(drop).expect_err("refused");
@@ -460,13 +453,13 @@ mod tests {
         refused("a.log.1: is in the way");
         // A number that rotation does not reach is not checked.
         assert!(RotatingLog::open(&folder.log(), 5000, 1).is_ok());
-        let missing = RotatingLog::open(&folder.0.join("none/a.log"), 5000, 3).map(drop).expect_err("refused");
+        let missing = RotatingLog::open(&folder.0.path().join("none/a.log"), 5000, 3).map(drop).expect_err("refused");
         assert!(missing.contains("none/a.log: cannot be written"), "{missing}");
     }
 
     #[test]
     fn lines_in_parts_and_lines_longer_than_a_file_stay_within_the_limits() {
-        let folder = Folder::new("parts");
+        let folder = Folder::new();
         let mut log = RotatingLog::open(&folder.log(), 5000, 3).expect("open");
         for n in 0..200 {
             // In several parts, and as an event of two lines.
@@ -486,7 +479,7 @@ mod tests {
 
     #[test]
     fn threads_do_not_mix_their_lines_and_lose_none() {
-        let folder = Folder::new("threads");
+        let folder = Folder::new();
         let log = Mutex::new(RotatingLog::open(&folder.log(), 20_000, 20).expect("open"));
         std::thread::scope(|scope| {
             for thread in 0..8 {
@@ -538,7 +531,7 @@ mod tests {
 
     #[test]
     fn a_full_disk_leaves_no_partial_line_and_is_reported_when_there_is_space() {
-        let folder = Folder::new("full");
+        let folder = Folder::new();
         let space = Arc::new(AtomicU64::new(2 * line(0).len() as u64 + 30));
         let disk_space = space.clone();
         let opener = move |path: &Path| -> io::Result<Box<dyn Sink>> {
@@ -562,17 +555,17 @@ mod tests {
 
     #[test]
     fn a_deleted_folder_loses_lines_only() {
-        let folder = Folder::new("gone");
+        let folder = Folder::new();
         let mut log = RotatingLog::open(&folder.log(), 4096, 3).expect("open");
         for n in 0..40 {
             log.write_all(line(n).as_bytes()).expect("never fails");
         }
-        fs::remove_dir_all(&folder.0).expect("remove the folder");
+        fs::remove_dir_all(folder.0.path()).expect("remove the folder");
         // Some lines go into the deleted file, until it is full.
         for n in 0..200 {
             log.write_all(line(n).as_bytes()).expect("never fails");
         }
-        fs::create_dir_all(&folder.0).expect("make it again");
+        fs::create_dir_all(folder.0.path()).expect("make it again");
         log.write_all(line(0).as_bytes()).expect("never fails");
         log.write_all(line(1).as_bytes()).expect("never fails");
         let text = folder.text(0);
@@ -581,7 +574,7 @@ mod tests {
 
     #[test]
     fn a_file_that_cannot_be_renamed_is_not_overwritten() {
-        let folder = Folder::new("stuck");
+        let folder = Folder::new();
         let mut log = RotatingLog::open(&folder.log(), 4096, 2).expect("open");
         fs::create_dir(rotated_name(&folder.log(), 1)).expect("something is in the way");
         for n in 0..200 {

@@ -30,11 +30,6 @@ impl Lattice {
         World::new(axes, back.transform_point3(origin))
     }
 
-    /// A lattice whose axes are those of the tracker.
-    pub fn straight(grid: Grid) -> Lattice {
-        Lattice { grid, to_volume: DAffine3::IDENTITY }
-    }
-
     /// The lattice that contains the clipped part of the frames with these poses, and a margin of `options.margin`. Invalid poses are ignored.
     ///
     /// Its axes are the mean of the frames' axes: lateral along the rows, depth along the columns and perpendicular to lateral, elevation along

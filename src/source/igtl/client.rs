@@ -148,11 +148,6 @@ impl Client {
         Ok(Client { shared, thread: Some(thread) })
     }
 
-    /// Takes the oldest message from the queue; None if the queue is empty.
-    pub fn try_next(&self) -> Option<Received> {
-        self.shared.lock().queue.pop()
-    }
-
     /// Takes the oldest message from the queue. If the queue is empty, waits for a message for at most `timeout`; None if none arrives.
     pub fn next(&self, timeout: Duration) -> Option<Received> {
         let started = Instant::now();

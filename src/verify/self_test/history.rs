@@ -14,7 +14,7 @@ pub struct KnownBug {
 }
 
 /// All known bugs, in the order of the table in docs/verify.md.
-pub(super) const KNOWN_BUGS: &[KnownBug] = &[
+pub const KNOWN_BUGS: &[KnownBug] = &[
     KnownBug {
         fault: "half precision",
         driver: "Intel, Skylake (OpenGL ES)",

@@ -4,7 +4,7 @@
 mod history;
 mod injected_faults;
 
-pub use history::KnownBug;
+pub use history::KNOWN_BUGS;
 
 use super::built_in::{ALL_FILTERS, BYTES, frames, scene, wobbler};
 use crate::gpu::{Context, ContextOptions, GpuError, Renderer, RendererOptions};
@@ -66,11 +66,6 @@ impl Detection {
             pictures: Vec::new(),
         }
     }
-}
-
-/// Publicly reported bugs, each with the name of the fault that recreates it.
-pub fn known_bugs() -> &'static [KnownBug] {
-    history::KNOWN_BUGS
 }
 
 /// Whether a deliberate crash was detected, from the outcome of the check whose process crashed.

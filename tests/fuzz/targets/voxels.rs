@@ -44,7 +44,7 @@ pub fn compounder(bytes: &[u8]) -> String {
         _ => {
             let size = std::array::from_fn(|_| usize::from(bytes.u8() % 13));
             let grid = Grid { size, spacing: [1.0, bytes.number(), 1.0], origin: [0.0, bytes.number(), 0.0] };
-            Lattice::straight(grid)
+            Lattice { grid, to_volume: glam::DAffine3::IDENTITY }
         }
     };
     let kept = stored(bytes.u8());

@@ -90,7 +90,7 @@ fn messages_come_in_order_whatever_the_pieces() {
         }
         let expected = ClientStatistics { connected: true, messages: 5, bytes: length, ..ClientStatistics::default() };
         assert_eq!(client.statistics(), expected);
-        assert!(client.try_next().is_none());
+        assert!(client.next(Duration::ZERO).is_none());
         gone(client);
     }
 }
@@ -176,7 +176,7 @@ fn a_slow_consumer_loses_the_oldest_and_the_count_says_so() {
     let client = Client::connect(&serve(vec![send_and_stay(all)]), options).unwrap();
     let statistics = until(&client, |s| s.messages == 50);
     assert_eq!(statistics.dropped, 46);
-    let left: Vec<f64> = std::iter::from_fn(|| client.try_next()).map(|r| r.message.time()).collect();
+    let left: Vec<f64> = std::iter::from_fn(|| client.next(Duration::ZERO)).map(|r| r.message.time()).collect();
     assert_eq!(left, [46.0, 47.0, 48.0, 49.0]);
 }
 
@@ -298,7 +298,7 @@ fn options_of_zero_do_no_harm() {
     let server = || serve((0..100).map(|_| send_and_stay(bytes(&transform("Probe", 1.0, 1.0)))).collect());
     let client = Client::connect(&server(), options.clone()).unwrap();
     until(&client, |s| s.lost_framing > 0);
-    assert!(client.try_next().is_none() && client.last_error().is_some());
+    assert!(client.next(Duration::ZERO).is_none() && client.last_error().is_some());
     gone(client);
     let client = Client::connect(&server(), ClientOptions { body_limit: 48, ..options }).unwrap();
     assert_eq!(take(&client).time(), 1.0);

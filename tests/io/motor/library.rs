@@ -64,7 +64,8 @@ fn a_sweep_covers_its_angle_in_order_of_time_and_places_frames() {
     }
     let (first, last) = (positions[0].time, positions[positions.len() - 1].time);
     let count = positions.len();
-    let track = Track::new(positions, 10.0).expect("in order");
+    let mut track = Track::new(10.0);
+    assert!(positions.into_iter().all(|p| track.push(p)), "in order");
     assert_eq!(track.at(first - 1e-3), ArrayState::Unknown);
     assert_eq!(track.at(last + 1e-3), ArrayState::Unknown);
     assert!(

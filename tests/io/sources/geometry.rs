@@ -12,7 +12,7 @@ fn forward_and_backward_sweeps_keep_their_slices_in_geometric_order() {
     folder.write("s.probe.toml", TABLE);
     let more = "UltrasoundImageType = BRIGHTNESS\nUltrasoundImageOrientation = FM\n";
     let mut recording = open(folder.write("s.mha", image("4 2 7", "MET_UCHAR", more, &data)));
-    assert_eq!((recording.volumes(), recording.frames_in_file()), (2, 7));
+    assert_eq!(recording.volumes(), 2);
     let frames = all_frames(&mut recording).unwrap();
     let order: Vec<_> = frames.iter().map(|f| (f.volume, f.number, f.slice, f.backward, f.bytes[0])).collect();
     assert_eq!(order[..3], [(0, 0, 0, false, 0), (0, 1, 1, false, 1), (0, 2, 2, false, 2)]);

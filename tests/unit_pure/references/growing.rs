@@ -1,7 +1,7 @@
 //! The enhanced sigma filter and how far its windows grow, counted by brute force.
 
 use super::*;
-use echolume::low_level::passes::filter::enhanced_sigma::growth_shares;
+use crate::common::growth::growth_shares;
 use echolume::low_level::probe::{Axis, Motion, Probe};
 
 /// The expected result at a pixel with a known centre: the rings that its window grows by, and the mean.

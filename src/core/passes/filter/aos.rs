@@ -7,18 +7,13 @@ use super::perona_malik::{conductance, constant, need};
 use crate::passes::pass::*;
 use crate::scene::{PeronaMalik, Scene, Scheme};
 
-pub(super) const TOLERANCE: Tolerance = Tolerance {
-    absolute: 3e-5,
-    relative: 3e-6,
-    outliers: 0.0,
-    why: "every term of the solvers is positive, so that a row of n pixels is off by about n ulp; noise in place of shares of at \
-          most 1 sums to tens; then what the target's format stores",
-};
+pub(super) const TOLERANCE: Tolerance = Tolerance::absolute(3e-5).relative(3e-6).because(
+    "every term of the solvers is positive, so that a row of n pixels is off by about n ulp; noise in place of shares \
+     of at most 1 sums to tens; then what the target's format stores",
+);
 
 pub const SLICE: Pass = Pass {
     name: "aos_slice",
-    stage: Stage::Preprocess,
-    frequency: Frequency::Frame,
     link: Link::Filter(Filter { dispatches: |s| SLICES.solver(s).dispatches(), ..Filter::of_slices(|_| None) }),
     shader: |s, t| SLICES.shader(s, t),
     needed: |s| need(s.slice_filters.perona_malik, Scheme::Aos),
@@ -30,12 +25,11 @@ pub const SLICE: Pass = Pass {
     constants: |s, t| SLICES.constants(s, s.slice_filters.perona_malik, t, false),
     tolerance: TOLERANCE,
     reference: |s, t, reads, writes| SLICES.reference(s, s.slice_filters.perona_malik, t, reads, writes),
+    ..Pass::OF_SLICES
 };
 
 pub const PICTURE: Pass = Pass {
     name: "aos_picture",
-    stage: Stage::Postprocess,
-    frequency: Frequency::Picture,
     link: Link::Filter(Filter { dispatches: |s| PICTURES.solver(s).dispatches(), ..Filter::of(Chain::Pictures) }),
     shader: |s, t| PICTURES.shader(s, t),
     needed: |s| need(s.settings.post.perona_malik, Scheme::Aos),
@@ -47,6 +41,7 @@ pub const PICTURE: Pass = Pass {
     constants: |s, t| PICTURES.constants(s, s.settings.post.perona_malik, t, false),
     tolerance: TOLERANCE,
     reference: |s, t, reads, writes| PICTURES.reference(s, s.settings.post.perona_malik, t, reads, writes),
+    ..Pass::OF_PICTURES
 };
 
 /// How the rows and columns of an image are solved.

@@ -13,8 +13,6 @@ const STEPS: u32 = 3;
 
 pub const SLICE: Pass = Pass {
     name: "aos_richardson_slice",
-    stage: Stage::Preprocess,
-    frequency: Frequency::Frame,
     link: Link::Filter(Filter { dispatches, ..Filter::of_slices(|_| None) }),
     shader: |s, t| SLICES.shader(s, t),
     needed: |s| need(s.slice_filters.perona_malik, Scheme::AosRichardson),
@@ -41,14 +39,14 @@ pub const SLICE: Pass = Pass {
         SLICES.reference(s, step_of(s, t), t, reads, writes);
         if is_last(s, t) {
             let complete = reads.get("step_result");
-            let target = writes.get_mut("target");
-            let z = if target.size[2] > 1 { t.slice as usize } else { 0 };
-            for (x, y) in (0..complete.size[1]).flat_map(|y| (0..complete.size[0]).map(move |x| (x, y))) {
+            let (target, z) = target_of(writes, t);
+            for (x, y) in complete.pixels() {
                 let extrapolated = 2.0 * target.one(x, y, z) - complete.one(x, y, 0);
                 target.set([x, y, z], &[extrapolated]);
             }
         }
     },
+    ..Pass::OF_SLICES
 };
 
 fn dispatches(scene: &Scene) -> u32 {

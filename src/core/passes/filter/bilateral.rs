@@ -21,40 +21,35 @@ pub(crate) const DISTANCE: Pass = Pass {
             .i32("slice", t.slice)
     },
     constants: |s, _| vec![("RADIUS", radius(s) as i32)],
-    tolerance: Tolerance {
-        absolute: 2e-5,
-        relative: 1e-6,
-        outliers: 0.0,
-        why: "sums of differences from the centre in f32, whose weights are off by a few ulp; then f32's own rounding of mm",
-    },
+    tolerance: Tolerance::absolute(2e-5).relative(1e-6).because(
+        "sums of differences from the centre in f32, whose weights are off by a few ulp; then f32's own rounding of mm",
+    ),
     reference: |scene, _, reads, writes| {
         let b = settings(scene);
         let source = reads.get("source");
         let target = writes.get_mut("target");
         let [width, height, _] = source.size;
         let radius = radius(scene) as usize;
-        for y in 0..height {
-            for x in 0..width {
-                let centre = source.one(x, y, 0);
-                if !is_hit(centre) {
-                    target.set([x, y, 0], &[centre]);
-                    continue;
-                }
-                let (mut sum, mut weight) = (0.0, 0.0);
-                for j in y.saturating_sub(radius)..=(y + radius).min(height - 1) {
-                    for i in x.saturating_sub(radius)..=(x + radius).min(width - 1) {
-                        let value = source.one(i, j, 0);
-                        if is_hit(value) {
-                            let place = (i as f64 - x as f64).powi(2) + (j as f64 - y as f64).powi(2);
-                            let away = ((value - centre) / b.distance).powi(2);
-                            let w = (-0.5 * (place / (b.pixels * b.pixels) + away)).exp();
-                            sum += w * value;
-                            weight += w;
-                        }
+        for (x, y) in pixels([width, height]) {
+            let centre = source.one(x, y, 0);
+            if !is_hit(centre) {
+                target.set([x, y, 0], &[centre]);
+                continue;
+            }
+            let (mut sum, mut weight) = (0.0, 0.0);
+            for j in y.saturating_sub(radius)..=(y + radius).min(height - 1) {
+                for i in x.saturating_sub(radius)..=(x + radius).min(width - 1) {
+                    let value = source.one(i, j, 0);
+                    if is_hit(value) {
+                        let place = (i as f64 - x as f64).powi(2) + (j as f64 - y as f64).powi(2);
+                        let away = ((value - centre) / b.distance).powi(2);
+                        let w = (-0.5 * (place / (b.pixels * b.pixels) + away)).exp();
+                        sum += w * value;
+                        weight += w;
                     }
                 }
-                target.set([x, y, 0], &[sum / weight]);
             }
+            target.set([x, y, 0], &[sum / weight]);
         }
     },
     ..Pass::OF_DISTANCES

@@ -16,7 +16,7 @@ pub const SLICE: Pass = Pass {
     needed: |s| need(s.slice_filters.enhanced_sigma),
     params: |s, t| params(s.slice_filters.enhanced_sigma, [LEAST, TIE], t),
     constants: |s, _| constants(s, s.slice_filters.enhanced_sigma, false),
-    tolerance: Tolerance { absolute: 6e-4, relative: 0.0, outliers: 2e-3, why: WHY },
+    tolerance: Tolerance::absolute(6e-4).outliers(2e-3).because(WHY),
     reference: |s, t, reads, writes| {
         let enhanced = Enhanced::new(s, s.slice_filters.enhanced_sigma, [LEAST, TIE], |_| true);
         enhanced.filter(t, reads, writes, |found| found.mean);
@@ -34,7 +34,7 @@ pub(crate) const DISTANCE: Pass = Pass {
     params: |s, t| params(s.distance.enhanced_sigma, [least_distance(s), 0.0], t),
     constants: |s, _| constants(s, s.distance.enhanced_sigma, false),
     // A pixel in mm differs by 4e-6 between f32 and f64, a hundred times as much as one in 0..1.
-    tolerance: Tolerance { absolute: 2e-5, relative: 1e-6, outliers: 5e-3, why: WHY },
+    tolerance: Tolerance::absolute(2e-5).relative(1e-6).outliers(5e-3).because(WHY),
     reference: |s, t, reads, writes| {
         let enhanced = Enhanced::new(s, s.distance.enhanced_sigma, [least_distance(s), 0.0], is_hit);
         enhanced.filter(t, reads, writes, |found| found.mean);
@@ -48,7 +48,7 @@ pub const PICTURE: Pass = Pass {
     needed: |s| need(s.settings.post.enhanced_sigma),
     params: |s, t| params(s.settings.post.enhanced_sigma, [LEAST, TIE], t),
     constants: |s, _| constants(s, s.settings.post.enhanced_sigma, false),
-    tolerance: Tolerance { absolute: 1e-3, relative: 1e-3, outliers: 1e-2, why: WHY },
+    tolerance: Tolerance::absolute(1e-3).relative(1e-3).outliers(1e-2).because(WHY),
     reference: |s, t, reads, writes| {
         let enhanced = Enhanced::new(s, s.settings.post.enhanced_sigma, [LEAST, TIE], |_| true);
         enhanced.filter(t, reads, writes, |found| found.mean);
@@ -70,12 +70,9 @@ pub const GROWTH: Pass = Pass {
     writes: |_, _| vec![slices("target", Slot::Growth)],
     params: |s, t| params(s.slice_filters.enhanced_sigma, [LEAST, TIE], t),
     constants: |s, _| constants(s, s.slice_filters.enhanced_sigma, true),
-    tolerance: Tolerance {
-        absolute: 0.0,
-        relative: 0.0,
-        outliers: 2e-3,
-        why: "whole rings; a pixel within rounding of the range's end may count or not, and with it a ring",
-    },
+    tolerance: Tolerance::absolute(0.0)
+        .outliers(2e-3)
+        .because("whole rings; a pixel within rounding of the range's end may count or not, and with it a ring"),
     reference: |s, t, reads, writes| {
         let enhanced = Enhanced::new(s, s.slice_filters.enhanced_sigma, [LEAST, TIE], |_| true);
         enhanced.filter(t, reads, writes, |found| vec![f64::from(found.rings)]);
@@ -143,13 +140,9 @@ impl Enhanced {
     }
 
     fn filter(&self, args: &DispatchArgs, reads: &Arrays, writes: &mut Arrays, value: fn(Found) -> Vec<f64>) {
-        let source = reads.get("source");
-        let target = writes.get_mut("target");
-        let z = if target.size[2] > 1 { args.slice as usize } else { 0 };
-        for y in 0..source.size[1] {
-            for x in 0..source.size[0] {
-                target.set([x, y, z], &value(self.at(source, x as i64, y as i64)));
-            }
+        let (source, target, z) = filtered(reads, writes, args);
+        for (x, y) in source.pixels() {
+            target.set([x, y, z], &value(self.at(source, x as i64, y as i64)));
         }
     }
 
@@ -199,30 +192,4 @@ impl Enhanced {
         let mean = |c: usize| alike.iter().map(|v| v[c]).sum::<f64>() / alike.len() as f64;
         Found { mean: (0..source.channels).map(mean).collect(), rings: (radius - start) as u32 }
     }
-}
-
-/// Shares (0..1, summing to 1) of the pixels within the sector whose window's edge grew by +0, +2, +4 ... pixels up to the largest growth (thesis
-/// Tables 7-9), from the map that [`GROWTH`] writes.
-pub fn growth_shares(scene: &Scene, growth: &Texels) -> Vec<f64> {
-    let enhanced = scene.slice_filters.enhanced_sigma.unwrap_or_default();
-    let rings = (enhanced.largest / 2).saturating_sub(enhanced.window / 2) as usize;
-    let mut counts = vec![0u64; rings + 1];
-    for y in 0..growth.size[1] {
-        for x in 0..growth.size[0] {
-            if is_insonified(scene, x, y) {
-                counts[(growth.one(x, y, 0).max(0.0) as usize).min(rings)] += 1;
-            }
-        }
-    }
-    let all = counts.iter().sum::<u64>().max(1) as f64;
-    counts.into_iter().map(|n| n as f64 / all).collect()
-}
-
-/// True if the slice's pixel is inside the sector; pixels beyond it only repeat the values at its rim.
-fn is_insonified(scene: &Scene, x: usize, y: usize) -> bool {
-    let Some(probe) = scene.probe() else { return true };
-    let (lateral, depth) = scene.grid.place(x as f64, y as f64);
-    let (sample, line) = probe.plane_indices(lateral, depth);
-    let within = |at: f64, count: usize| at >= 0.0 && at <= (count - 1) as f64;
-    within(sample, probe.samples) && within(line, probe.lines.len())
 }

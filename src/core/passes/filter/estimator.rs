@@ -11,23 +11,17 @@ pub const SLICE: Pass = Pass {
     needed: |s| s.settings.slices.estimator.map_or(Err("not asked for"), |_| Ok("asked for")),
     params: |s, t| params(Params::default(), s.settings.slices.estimator_edge, LEAST).i32("slice", t.slice),
     constants: |s, _| vec![("ESTIMATOR", constant(s.settings.slices.estimator.unwrap_or_default()))],
-    tolerance: Tolerance {
-        absolute: 6e-4,
-        relative: 0.0,
-        outliers: 1e-3,
-        why: "at most 25 values in f32; of two masks that vary alike to f32's rounding either may win; R16F stores 1 to 4.9e-4",
-    },
+    tolerance: Tolerance::absolute(6e-4).outliers(1e-3).because(
+        "at most 25 values in f32; of two masks that vary alike to f32's rounding either may win; R16F stores 1 to \
+         4.9e-4",
+    ),
     reference: |scene, args, reads, writes| {
         let slices = &scene.settings.slices;
-        let source = reads.get("source");
-        let target = writes.get_mut("target");
-        let z = if target.size[2] > 1 { args.slice as usize } else { 0 };
-        for y in 0..source.size[1] {
-            for x in 0..source.size[0] {
-                let around = |dx: i64, dy: i64| source.clamped(x as i64 + dx, y as i64 + dy, 0);
-                let estimator = slices.estimator.unwrap_or_default();
-                target.set([x, y, z], &[estimate(estimator, &around, |_| true, slices.estimator_edge, LEAST)]);
-            }
+        let (source, target, z) = filtered(reads, writes, args);
+        for (x, y) in source.pixels() {
+            let around = |dx: i64, dy: i64| source.clamped(x as i64 + dx, y as i64 + dy, 0);
+            let estimator = slices.estimator.unwrap_or_default();
+            target.set([x, y, z], &[estimate(estimator, &around, |_| true, slices.estimator_edge, LEAST)]);
         }
     },
     ..Pass::OF_SLICES

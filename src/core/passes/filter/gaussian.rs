@@ -48,7 +48,7 @@ fn tile_words(radius: u32) -> u32 {
 }
 
 const WHY: &str = "at most 193 weighted values in f32; R16F stores 1 to 4.9e-4";
-const TOLERANCE: Tolerance = Tolerance { absolute: 6e-4, relative: 0.0, outliers: 0.0, why: WHY };
+const TOLERANCE: Tolerance = Tolerance::absolute(6e-4).because(WHY);
 
 pub const LATERAL: Pass = within_slices::<RENDERED, 0>("gaussian_lateral");
 pub const DEPTH: Pass = within_slices::<RENDERED, 1>("gaussian_depth");
@@ -61,8 +61,6 @@ pub(crate) const SECTION_ELEVATION: Pass = across_slices::<SECTIONS>("section_el
 const fn within_slices<const VOLUME: usize, const AXIS: usize>(name: &'static str) -> Pass {
     Pass {
         name,
-        stage: Stage::Preprocess,
-        frequency: Frequency::Frame,
         link: Link::Filter(Filter {
             reach: |s| {
                 let mut reach = [0; 2];
@@ -74,14 +72,12 @@ const fn within_slices<const VOLUME: usize, const AXIS: usize>(name: &'static st
         }),
         shader: |_, _| "filter/gaussian",
         needed: |s| need(VOLUME, s, AXIS),
-        reads: reads_source,
-        writes: writes_target,
         extent: |s, t| in_runs_of(RUN, slice_extent(s, t), AXIS),
-        repeat: once,
         params: |s, t| params(VOLUME, s, AXIS, t),
         constants: |s, _| constants(VOLUME, s, AXIS),
         tolerance: TOLERANCE,
         reference: |s, t, reads, writes| reference(VOLUME, s, AXIS, t, reads, writes),
+        ..Pass::OF_SLICES
     }
 }
 
@@ -89,9 +85,6 @@ const fn within_slices<const VOLUME: usize, const AXIS: usize>(name: &'static st
 const fn across_slices<const VOLUME: usize>(name: &'static str) -> Pass {
     Pass {
         name,
-        stage: Stage::Preprocess,
-        frequency: Frequency::Volume,
-        link: Link::AfterSlices,
         shader: |_, _| "filter/gaussian",
         needed: |s| match s.sharpens() {
             true => (VOLUMES[VOLUME].needed)(s, Ok("the cubic B-spline is to meet the slices")),
@@ -106,7 +99,6 @@ const fn across_slices<const VOLUME: usize>(name: &'static str) -> Pass {
             target.map(|slot| Bind { part: Part::Around(0), ..whole("target", slot) }).collect()
         },
         extent: |s, t| in_runs_of(RUN, [s.grid.size[0], s.grid.size[1], t.slices], 2),
-        repeat: once,
         params: |s, t| params(VOLUME, s, 2, t),
         constants: |s, _| [constants(VOLUME, s, 2), vec![("LAYERED", 0)]].concat(),
         tolerance: TOLERANCE,
@@ -114,6 +106,7 @@ const fn across_slices<const VOLUME: usize>(name: &'static str) -> Pass {
             true => sharpened(t, reads, writes),
             false => reference(VOLUME, s, 2, t, reads, writes),
         },
+        ..Pass::AFTER_SLICES
     }
 }
 
@@ -159,7 +152,7 @@ fn sharpened(args: &DispatchArgs, reads: &Arrays, writes: &mut Arrays) {
     let source = reads.get("source");
     let target = writes.get_mut("target");
     for z in args.slice as usize..(args.slice + args.slices) as usize {
-        for (x, y) in (0..source.size[1]).flat_map(|y| (0..source.size[0]).map(move |x| (x, y))) {
+        for (x, y) in source.pixels() {
             let tap = |away: i64| source.clamped(x as i64, y as i64, z as i64 + away);
             target.set([x, y, z], &[((8.0 * tap(0) - tap(-1) - tap(1)) / 6.0).clamp(0.0, 1.0)]);
         }
@@ -173,24 +166,22 @@ fn reference(volume: usize, scene: &Scene, axis: usize, args: &DispatchArgs, rea
     let radius = i64::from((VOLUMES[volume].radius)(scene)[axis]);
     let slices = if axis < 2 { 0..1 } else { args.slice as usize..(args.slice + args.slices) as usize };
     for z in slices {
-        for y in 0..source.size[1] {
-            for x in 0..source.size[0] {
-                let centre = [x, y, z];
-                let (mut sum, mut weight) = (0.0, 0.0);
-                for i in -radius..=radius {
-                    let along = centre[axis] as i64 + i;
-                    if along < 0 || along >= source.size[axis] as i64 {
-                        continue;
-                    }
-                    let mut tap = centre;
-                    tap[axis] = along as usize;
-                    let w = (-0.5 * (i as f64 / deviation).powi(2)).exp();
-                    sum += w * source.one(tap[0], tap[1], tap[2]);
-                    weight += w;
+        for (x, y) in source.pixels() {
+            let centre = [x, y, z];
+            let (mut sum, mut weight) = (0.0, 0.0);
+            for i in -radius..=radius {
+                let along = centre[axis] as i64 + i;
+                if along < 0 || along >= source.size[axis] as i64 {
+                    continue;
                 }
-                let z = if axis < 2 && target.size[2] > 1 { args.slice as usize } else { z };
-                target.set([x, y, z], &[sum / weight]);
+                let mut tap = centre;
+                tap[axis] = along as usize;
+                let w = (-0.5 * (i as f64 / deviation).powi(2)).exp();
+                sum += w * source.one(tap[0], tap[1], tap[2]);
+                weight += w;
             }
+            let z = if axis < 2 && target.size[2] > 1 { args.slice as usize } else { z };
+            target.set([x, y, z], &[sum / weight]);
         }
     }
 }

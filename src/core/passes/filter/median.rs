@@ -11,12 +11,7 @@ pub const SLICE: Pass = Pass {
     extent: |s, t| in_runs_of(columns(s), in_runs(slice_extent(s, t), 1), 0),
     params: |_, t| Params::default().i32("slice", t.slice),
     constants: |s, _| vec![("COLUMNS", columns(s) as i32)],
-    tolerance: Tolerance {
-        absolute: 5e-4,
-        relative: 0.0,
-        outliers: 0.0,
-        why: "a value that is there, chosen exactly; only storing in R16F rounds",
-    },
+    tolerance: Tolerance::absolute(5e-4).because("a value that is there, chosen exactly; only storing in R16F rounds"),
     reference: |_, args, reads, writes| reference(1, args, reads, writes, |_| true),
     ..Pass::OF_SLICES
 };
@@ -38,28 +33,24 @@ pub(crate) const DISTANCE: Pass = Pass {
     extent: |s, t| in_runs(ray_extent(s, t), 1),
     params: |_, t| Params::default().i32("slice", t.slice),
     constants: |s, _| vec![("RADIUS", (s.distance.median / 2) as i32)],
-    tolerance: Tolerance { absolute: 0.0, relative: 0.0, outliers: 0.0, why: "a value that is there, chosen exactly" },
+    tolerance: Tolerance::exact("a value that is there, chosen exactly"),
     reference: |s, args, reads, writes| reference(s.distance.median / 2, args, reads, writes, is_hit),
     ..Pass::OF_DISTANCES
 };
 
 /// The middle of the sorted window; of an even number, the lower. Hits and misses vote first: a tie is a miss.
 fn reference(radius: u32, args: &DispatchArgs, reads: &Arrays, writes: &mut Arrays, valid: fn(f64) -> bool) {
-    let source = reads.get("source");
-    let target = writes.get_mut("target");
-    let z = if target.size[2] > 1 { args.slice as usize } else { 0 };
+    let (source, target, z) = filtered(reads, writes, args);
     let radius = i64::from(radius);
-    for y in 0..source.size[1] {
-        for x in 0..source.size[0] {
-            let mut window = Vec::new();
-            for j in -radius..=radius {
-                window.extend((-radius..=radius).map(|i| source.clamped(x as i64 + i, y as i64 + j, 0)));
-            }
-            let all = window.len();
-            window.retain(|v| valid(*v));
-            window.sort_by(f64::total_cmp);
-            let median = if 2 * window.len() <= all { MISS } else { window[(window.len() - 1) / 2] };
-            target.set([x, y, z], &[median]);
+    for (x, y) in source.pixels() {
+        let mut window = Vec::new();
+        for j in -radius..=radius {
+            window.extend((-radius..=radius).map(|i| source.clamped(x as i64 + i, y as i64 + j, 0)));
         }
+        let all = window.len();
+        window.retain(|v| valid(*v));
+        window.sort_by(f64::total_cmp);
+        let median = if 2 * window.len() <= all { MISS } else { window[(window.len() - 1) / 2] };
+        target.set([x, y, z], &[median]);
     }
 }

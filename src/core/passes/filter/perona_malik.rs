@@ -15,7 +15,7 @@ pub const SLICE: Pass = Pass {
     repeat: |s| repeat(s.slice_filters.perona_malik),
     params: |s, t| params(s.slice_filters.perona_malik, t),
     constants: |s, _| vec![constant(s.slice_filters.perona_malik)],
-    tolerance: Tolerance { absolute: 1e-6, relative: 0.0, outliers: 0.0, why: WHY },
+    tolerance: Tolerance::absolute(1e-6).because(WHY),
     reference: |s, t, reads, writes| reference(s.slice_filters.perona_malik, t, reads, writes, |_| true),
     ..Pass::OF_SLICES
 };
@@ -30,7 +30,7 @@ pub(crate) const DISTANCE: Pass = Pass {
     repeat: |s| repeat(s.distance.perona_malik),
     params: |s, t| params(s.distance.perona_malik, t),
     constants: |s, _| vec![constant(s.distance.perona_malik)],
-    tolerance: Tolerance { absolute: 1e-5, relative: 1e-6, outliers: 0.0, why: WHY },
+    tolerance: Tolerance::absolute(1e-5).relative(1e-6).because(WHY),
     reference: |s, t, reads, writes| reference(s.distance.perona_malik, t, reads, writes, is_hit),
     ..Pass::OF_DISTANCES
 };
@@ -42,7 +42,7 @@ pub const PICTURE: Pass = Pass {
     repeat: |s| repeat(s.settings.post.perona_malik),
     params: |s, t| params(s.settings.post.perona_malik, t),
     constants: |s, _| vec![constant(s.settings.post.perona_malik)],
-    tolerance: Tolerance { absolute: 1e-6, relative: 1e-6, outliers: 0.0, why: WHY },
+    tolerance: Tolerance::absolute(1e-6).relative(1e-6).because(WHY),
     reference: |s, t, reads, writes| reference(s.settings.post.perona_malik, t, reads, writes, |_| true),
     ..Pass::OF_PICTURES
 };
@@ -84,9 +84,7 @@ pub(super) fn conductance(p: &PeronaMalik, a: &[f64], b: &[f64]) -> f64 {
 
 fn reference(p: Option<PeronaMalik>, args: &DispatchArgs, reads: &Arrays, writes: &mut Arrays, valid: fn(f64) -> bool) {
     let p = p.unwrap_or_default();
-    let source = reads.get("source");
-    let target = writes.get_mut("target");
-    let z = if target.size[2] > 1 { args.slice as usize } else { 0 };
+    let (source, target, z) = filtered(reads, writes, args);
     let [width, height, _] = source.size;
     let mut next = source.clone();
     // What flows between two neighbours leaves the one and enters the other.
@@ -104,19 +102,15 @@ fn reference(p: Option<PeronaMalik>, args: &DispatchArgs, reads: &Arrays, writes
         next.set(a, &at_a);
         next.set(b, &at_b);
     };
-    for y in 0..height {
-        for x in 0..width {
-            if x + 1 < width {
-                exchange([x, y, 0], [x + 1, y, 0]);
-            }
-            if y + 1 < height {
-                exchange([x, y, 0], [x, y + 1, 0]);
-            }
+    for (x, y) in pixels([width, height]) {
+        if x + 1 < width {
+            exchange([x, y, 0], [x + 1, y, 0]);
+        }
+        if y + 1 < height {
+            exchange([x, y, 0], [x, y + 1, 0]);
         }
     }
-    for y in 0..height {
-        for x in 0..width {
-            target.set([x, y, z], next.get([x, y, 0]));
-        }
+    for (x, y) in pixels([width, height]) {
+        target.set([x, y, z], next.get([x, y, 0]));
     }
 }

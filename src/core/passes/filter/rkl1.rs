@@ -13,8 +13,6 @@ use crate::scene::{PeronaMalik, Scene, Scheme};
 
 pub const SLICE: Pass = Pass {
     name: "rkl1_slice",
-    stage: Stage::Preprocess,
-    frequency: Frequency::Frame,
     link: Link::Filter(Filter { dispatches: stages, ..Filter::of_slices(|_| None) }),
     shader: |_, _| "filter/rkl1",
     needed: |s| need(s.slice_filters.perona_malik, Scheme::Rkl1),
@@ -30,7 +28,6 @@ pub const SLICE: Pass = Pass {
         stage if stage == stages(s) => vec![slices("target", t.target())],
         stage => vec![slices("target", kept(stage))],
     },
-    extent: slice_extent,
     repeat: |s| stages(s) * settings(s).repeat,
     params: |s, t| {
         let p = settings(s);
@@ -43,14 +40,12 @@ pub const SLICE: Pass = Pass {
             .i32("slice", t.slice)
     },
     constants: |s, t| vec![constant(s.slice_filters.perona_malik), ("FIRST", i32::from(stage_of(s, t) == 1))],
-    tolerance: Tolerance {
-        absolute: 3e-6,
-        relative: 3e-6,
-        outliers: 0.0,
-        why: "mu and nu are below 2 and cancel to 1, and the share of a stage is at most 1/2 of four flows in f32; then what the \
-              target's format stores",
-    },
+    tolerance: Tolerance::absolute(3e-6).relative(3e-6).because(
+        "mu and nu are below 2 and cancel to 1, and the share of a stage is at most 1/2 of four flows in f32; then \
+         what the target's format stores",
+    ),
     reference,
+    ..Pass::OF_SLICES
 };
 
 fn settings(scene: &Scene) -> PeronaMalik {
@@ -94,8 +89,7 @@ fn reference(scene: &Scene, dispatch: &Dispatch, reads: &Arrays, writes: &mut Ar
     let c = Coefficients::of(stages(scene), stage);
     let last = reads.get("last");
     let flows = flows(&p, last);
-    let target = writes.get_mut("target");
-    let z = if target.size[2] > 1 { dispatch.slice as usize } else { 0 };
+    let (target, z) = target_of(writes, dispatch);
     let width = last.size[0];
     for (n, flow) in flows.iter().enumerate() {
         let before = if stage > 1 { c.nu * reads.get("before").values[n] } else { 0.0 };

@@ -25,7 +25,7 @@ pub const SLICE: Pass = Pass {
         let is_tiled = reads_tile(s, tile_words(radius(sigma)));
         [constants(sigma), vec![("TILED", i32::from(is_tiled))]].concat()
     },
-    tolerance: Tolerance { absolute: 6e-4, relative: 0.0, outliers: 1e-3, why: WHY },
+    tolerance: Tolerance::absolute(6e-4).outliers(1e-3).because(WHY),
     reference: |s, t, reads, writes| reference(s.slice_filters.sigma, TIE, t, reads, writes, |_| true),
     ..Pass::OF_SLICES
 };
@@ -38,7 +38,7 @@ pub(crate) const DISTANCE: Pass = Pass {
     repeat: |s| s.distance.sigma.unwrap_or_default().repeat,
     params: |s, t| params(s.distance.sigma, 0.0, t),
     constants: |s, _| constants(s.distance.sigma),
-    tolerance: Tolerance { absolute: 1e-5, relative: 1e-6, outliers: 1e-3, why: WHY },
+    tolerance: Tolerance::absolute(1e-5).relative(1e-6).outliers(1e-3).because(WHY),
     reference: |s, t, reads, writes| reference(s.distance.sigma, 0.0, t, reads, writes, is_hit),
     ..Pass::OF_DISTANCES
 };
@@ -51,7 +51,7 @@ pub const PICTURE: Pass = Pass {
     repeat: |s| s.settings.post.sigma.unwrap_or_default().repeat,
     params: |s, t| params(s.settings.post.sigma, TIE, t),
     constants: |s, _| constants(s.settings.post.sigma),
-    tolerance: Tolerance { absolute: 6e-4, relative: 1e-3, outliers: 1e-3, why: WHY },
+    tolerance: Tolerance::absolute(6e-4).relative(1e-3).outliers(1e-3).because(WHY),
     reference: |s, t, reads, writes| reference(s.settings.post.sigma, TIE, t, reads, writes, |_| true),
     ..Pass::OF_PICTURES
 };
@@ -114,42 +114,37 @@ fn reference(
 ) {
     let radius = i64::from(radius(sigma));
     let sigma = sigma.unwrap_or_default();
-    let source = reads.get("source");
-    let target = writes.get_mut("target");
-    let z = if target.size[2] > 1 { args.slice as usize } else { 0 };
+    let (source, target, z) = filtered(reads, writes, args);
     let [width, height, _] = source.size;
     let inside = |x: i64, y: i64| x >= 0 && y >= 0 && x < width as i64 && y < height as i64;
-    for y in 0..height as i64 {
-        for x in 0..width as i64 {
-            let centre = source.get([x as usize, y as usize, 0]).to_vec();
-            let filtered: Vec<f64> = (0..source.channels)
-                .map(|c| {
-                    let at = |x: i64, y: i64| source.get([x as usize, y as usize, 0])[c];
-                    if !valid(centre[c]) {
-                        return centre[c];
-                    }
-                    let range = match sigma.noise {
-                        scene::Noise::Additive => range(sigma.sigma),
-                        scene::Noise::Multiplicative => range(sigma.sigma) * centre[c].abs(),
-                    };
-                    let window = (y - radius..=y + radius).flat_map(|j| (x - radius..=x + radius).map(move |i| (i, j)));
-                    let there: Vec<f64> =
-                        window.filter(|&(i, j)| inside(i, j)).map(|(i, j)| at(i, j)).filter(|v| valid(*v)).collect();
-                    let close: Vec<f64> =
-                        there.iter().copied().filter(|v| (v - centre[c]).abs() <= range + tie).collect();
-                    if close.len() as u32 > few(sigma.window) || close.len() == there.len() {
-                        return close.iter().sum::<f64>() / close.len() as f64;
-                    }
-                    let near: Vec<f64> = [(x, y - 1), (x - 1, y), (x, y + 1), (x + 1, y)]
-                        .into_iter()
-                        .filter(|&(i, j)| inside(i, j))
-                        .map(|(i, j)| at(i, j))
-                        .filter(|v| valid(*v))
-                        .collect();
-                    if near.is_empty() { centre[c] } else { near.iter().sum::<f64>() / near.len() as f64 }
-                })
-                .collect();
-            target.set([x as usize, y as usize, z], &filtered);
-        }
+    for (x, y) in pixels([width as i64, height as i64]) {
+        let centre = source.get([x as usize, y as usize, 0]).to_vec();
+        let filtered: Vec<f64> = (0..source.channels)
+            .map(|c| {
+                let at = |x: i64, y: i64| source.get([x as usize, y as usize, 0])[c];
+                if !valid(centre[c]) {
+                    return centre[c];
+                }
+                let range = match sigma.noise {
+                    scene::Noise::Additive => range(sigma.sigma),
+                    scene::Noise::Multiplicative => range(sigma.sigma) * centre[c].abs(),
+                };
+                let window = (y - radius..=y + radius).flat_map(|j| (x - radius..=x + radius).map(move |i| (i, j)));
+                let there: Vec<f64> =
+                    window.filter(|&(i, j)| inside(i, j)).map(|(i, j)| at(i, j)).filter(|v| valid(*v)).collect();
+                let close: Vec<f64> = there.iter().copied().filter(|v| (v - centre[c]).abs() <= range + tie).collect();
+                if close.len() as u32 > few(sigma.window) || close.len() == there.len() {
+                    return close.iter().sum::<f64>() / close.len() as f64;
+                }
+                let near: Vec<f64> = [(x, y - 1), (x - 1, y), (x, y + 1), (x + 1, y)]
+                    .into_iter()
+                    .filter(|&(i, j)| inside(i, j))
+                    .map(|(i, j)| at(i, j))
+                    .filter(|v| valid(*v))
+                    .collect();
+                if near.is_empty() { centre[c] } else { near.iter().sum::<f64>() / near.len() as f64 }
+            })
+            .collect();
+        target.set([x as usize, y as usize, z], &filtered);
     }
 }

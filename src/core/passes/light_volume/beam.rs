@@ -183,7 +183,7 @@ impl Beam {
         for layer in self.lit_layers(scene, args) {
             let mut next = Texels::untouched([width, height, 1], 4);
             let share = self.share(scene, layer);
-            for (u, v) in (0..height).flat_map(|v| (0..width).map(move |u| (u, v))) {
+            for (u, v) in pixels([width, height]) {
                 let layer = layer as usize;
                 let cell = match found.axis {
                     0 => [layer, u, v],
@@ -193,7 +193,7 @@ impl Beam {
                 let mut light = [1.0; 3];
                 if let Some(front) = &front {
                     light = [0.0; 3];
-                    for (i, j) in (0..3).flat_map(|j| (0..3).map(move |i| (i, j))) {
+                    for (i, j) in pixels([3, 3]) {
                         let tap = |at: usize, whole: f64, n: usize, size: usize| {
                             (at as i64 + whole as i64 + i64::from(stride) * (n as i64 - 1)).clamp(0, size as i64 - 1)
                                 as usize
@@ -213,7 +213,7 @@ impl Beam {
         }
         if let Some(front) = front {
             let target = writes.get_mut("next_front");
-            for (u, v) in (0..height).flat_map(|v| (0..width).map(move |u| (u, v))) {
+            for (u, v) in pixels([width, height]) {
                 target.set([u, v, 0], front.get([u, v, 0]));
             }
         }
@@ -230,12 +230,9 @@ pub(crate) const PROPAGATE: Pass = Pass {
     repeat: |s| KEY.dispatches(s),
     params: |s, t| KEY.params(s, t),
     constants: |s, t| KEY.constants(s, t),
-    tolerance: Tolerance {
-        absolute: 1e-6,
-        relative: 6e-4,
-        outliers: 0.0,
-        why: "nine terms in f32 a layer, none negative; then RGBA16F",
-    },
+    tolerance: Tolerance::absolute(1e-6)
+        .relative(6e-4)
+        .because("nine terms in f32 a layer, none negative; then RGBA16F"),
     reference: |s, t, reads, writes| KEY.reference(s, t, reads, writes),
     ..MATTER
 };

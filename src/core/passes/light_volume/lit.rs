@@ -124,12 +124,17 @@ impl<'a> Lit<'a> {
         })
     }
 
-    /// Light (red, green, blue) that white matter at a place scatters towards the viewer, without a highlight. `along`: unit direction of the ray.
-    pub fn scattered(&self, place: DVec3, along: DVec3) -> [f64; 3] {
+    /// At a place: light and sheen, the normal, as long as it is certain, and the fourth channel of the normals.
+    fn at(&self, place: DVec3) -> ([f64; 4], DVec3, f64) {
         let cells = (place - self.lattice.low) / self.lattice.cell - 0.5;
         let at = clamped(cells.to_array(), self.shade);
-        let (shade, oriented) = (self.shade.interpolated(at), self.normals.interpolated(at));
-        let direction = DVec3::new(oriented[0], oriented[1], oriented[2]);
+        let [x, y, z, rest] = self.normals.interpolated(at);
+        (self.shade.interpolated(at), DVec3::new(x, y, z), rest)
+    }
+
+    /// Light (red, green, blue) that white matter at a place scatters towards the viewer, without a highlight. `along`: unit direction of the ray.
+    pub fn scattered(&self, place: DVec3, along: DVec3) -> [f64; 3] {
+        let (shade, direction, _) = self.at(place);
         let grazing = match direction.length() {
             certain if certain < 1e-4 => 0.0,
             certain => 1.0 - (-direction.dot(along) / certain).max(0.0),
@@ -140,10 +145,7 @@ impl<'a> Lit<'a> {
     /// Light that matter of the colour `albedo` at a place, mm in space, sends towards the viewer, with its highlight. `along`: unit direction of the
     /// ray.
     pub fn light(&self, scene: &Scene, albedo: [f64; 3], place: DVec3, along: DVec3) -> [f64; 3] {
-        let cells = (place - self.lattice.low) / self.lattice.cell - 0.5;
-        let at = clamped(cells.to_array(), self.shade);
-        let (shade, oriented) = (self.shade.interpolated(at), self.normals.interpolated(at));
-        let direction = DVec3::new(oriented[0], oriented[1], oriented[2]);
+        let (shade, direction, kept) = self.at(place);
         let certain = direction.length();
         if certain < 1e-4 {
             return std::array::from_fn(|c| albedo[c] * shade[c]);
@@ -153,7 +155,7 @@ impl<'a> Lit<'a> {
         let gloss = if normal.dot(self.towards) > 0.0 { normal.dot(halfway).max(0.0) } else { 0.0 };
         let light = &scene.settings.light;
         let grazing = 1.0 - (-normal.dot(along)).max(0.0);
-        let highlight = light.specular * gloss.powf(light.shininess) * certain * oriented[3];
+        let highlight = light.specular * gloss.powf(light.shininess) * certain * kept;
         std::array::from_fn(|c| {
             albedo[c] * (shade[c] + shade[3] * SHEEN * grazing.powi(3)) + highlight * light.colour[c]
         })

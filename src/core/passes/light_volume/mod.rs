@@ -73,13 +73,10 @@ pub(crate) const MATTER: Pass = Pass {
         constants.push(("TAPS", light_of(s).taps as i32));
         constants
     },
-    tolerance: Tolerance {
-        absolute: 4e-3,
-        relative: 0.0,
-        outliers: 4e-3,
-        why: "a place is off by 1e-5 mm in f32, so a sample by as much of a voxel's contrast, which the transfer function multiplies; a \
-              cell at the very border of the sector or the box may fall on either side",
-    },
+    tolerance: Tolerance::absolute(4e-3).outliers(4e-3).because(
+        "a place is off by 1e-5 mm in f32, so a sample by as much of a voxel's contrast, which the transfer function \
+         multiplies; a cell at the very border of the sector or the box may fall on either side",
+    ),
     reference: |scene, _, reads, writes| {
         let volume = reads.get("volume");
         let table = transfer_of(scene);
@@ -118,12 +115,7 @@ pub(crate) const REDUCE: Pass = Pass {
     repeat: |s| s.ambient_cones().levels(),
     params: |_, _| Params::default(),
     constants: no_constants,
-    tolerance: Tolerance {
-        absolute: 1e-6,
-        relative: 6e-4,
-        outliers: 0.0,
-        why: "64 terms in f32, none negative; then R16F",
-    },
+    tolerance: Tolerance::absolute(1e-6).relative(6e-4).because("64 terms in f32, none negative; then R16F"),
     reference: |_, _, reads, writes| {
         let source = reads.get("source");
         let target = writes.get_mut("target");
@@ -183,12 +175,9 @@ pub(crate) const DIFFUSE: Pass = Pass {
         let widest = scatter(s).into_iter().fold(0.0, f64::max);
         vec![("AXIS", t.iteration as i32), ("RADIUS", (2.0 * widest).ceil() as i32)]
     },
-    tolerance: Tolerance {
-        absolute: 1e-5,
-        relative: 1e-3,
-        outliers: 0.0,
-        why: "a mean with weights that are off by 1e-6 each; then RGBA16F",
-    },
+    tolerance: Tolerance::absolute(1e-5)
+        .relative(1e-3)
+        .because("a mean with weights that are off by 1e-6 each; then RGBA16F"),
     reference: |scene, t, reads, writes| {
         let (pyramid, source) = (reads.get("pyramid_1"), reads.get("source"));
         let target = writes.get_mut("target");
@@ -271,12 +260,9 @@ pub(crate) const AMBIENT: Pass = Pass {
             ("BETWEEN", (cones.wider > 0.0) as i32),
         ]
     },
-    tolerance: Tolerance {
-        absolute: 2e-5,
-        relative: 1e-3,
-        outliers: 0.0,
-        why: "a place is off by 1e-6 cells, a power by 1e-5 of what it is; then RGBA16F",
-    },
+    tolerance: Tolerance::absolute(2e-5)
+        .relative(1e-3)
+        .because("a place is off by 1e-6 cells, a power by 1e-5 of what it is; then RGBA16F"),
     reference: |scene, _, reads, writes| {
         let light = light_of(scene);
         let unit = reach_unit(light);
@@ -372,12 +358,10 @@ pub const SHADE: Pass = Pass {
             .f32("slope", volume.slope)
     },
     constants: no_constants,
-    tolerance: Tolerance {
-        absolute: 2e-4,
-        relative: 2e-3,
-        outliers: 2e-3,
-        why: "differences of echoes in f32, an orientation where they nearly cancel; then RGBA16F",
-    },
+    tolerance: Tolerance::absolute(2e-4)
+        .relative(2e-3)
+        .outliers(2e-3)
+        .because("differences of echoes in f32, an orientation where they nearly cancel; then RGBA16F"),
     reference: |scene, _, reads, writes| {
         let (light, volume, cell) = (&scene.settings.light, light_of(scene), scene.light_lattice().cell);
         let towards = scene.light_direction(light.direction);

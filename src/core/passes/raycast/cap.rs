@@ -36,18 +36,15 @@ pub(crate) const PASS: Pass = Pass {
         constants.push(("FADE", s.fades_caps() as i32));
         constants
     },
-    tolerance: Tolerance {
-        absolute: 1e-3,
-        relative: 0.0,
-        outliers: 1e-2,
-        why: "a place is off by 1e-5 mm in f32, so a sample by as much of a voxel's contrast, and the device's filter may \
-              round its weights; a place at the very border of the sector or the box, or a mean echo at the level itself, may fall on either side",
-    },
+    tolerance: Tolerance::absolute(1e-3).outliers(1e-2).because(
+        "a place is off by 1e-5 mm in f32, so a sample by as much of a voxel's contrast, and the device's filter may \
+         round its weights; a place at the very border of the sector or the box, or a mean echo at the level itself, \
+         may fall on either side",
+    ),
     reference: |scene, _, reads, writes| {
         let volume = reads.get("volume");
         let cap = writes.get_mut("cap");
-        let [width, height, _] = cap.size;
-        for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+        for (x, y) in cap.pixels() {
             cap.set([x, y, 0], &reference_pixel(scene, volume, x, y).unwrap_or([0.0; 2]));
         }
     },

@@ -60,17 +60,13 @@ pub(crate) const CANDIDATES: Pass = Pass {
         constants.extend([("HALF", ring.half as i32), ("FOLLOW_LENGTH", ring.follow as i32)]);
         constants
     },
-    tolerance: Tolerance {
-        absolute: 4e-3,
-        relative: 1e-5,
-        outliers: 2e-2,
-        why: "of places, that of raycast_surface; a weight is a contrast, off by 1e-6, over three thresholds; a difference within that of the \
-              threshold or of 0.7 of the peak, or two edges of the same weight, may go either way",
-    },
+    tolerance: Tolerance::absolute(4e-3).relative(1e-5).outliers(2e-2).because(
+        "of places, that of raycast_surface; a weight is a contrast, off by 1e-6, over three thresholds; a difference \
+         within that of the threshold or of 0.7 of the peak, or two edges of the same weight, may go either way",
+    ),
     reference: |scene, _, reads, writes| {
         let candidates = writes.get_mut("candidates");
-        let [width, height, _] = candidates.size;
-        for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+        for (x, y) in candidates.pixels() {
             let ray = ray::Ray::cast(scene, reads.get("volume"), scene.surface_view(), scene.ring.step, x, y);
             let [(first, weight), (second, other)] = candidates_of(scene, &ray);
             candidates.set([x, y, 0], &[first, second, weight, other]);
@@ -95,12 +91,10 @@ pub(crate) const PATHS: Pass = Pass {
         Params::default().i32("way", t.iteration).f32("slope", slope).f32("jump", jump).f32("missing", MISSING)
     },
     constants: no_constants,
-    tolerance: Tolerance {
-        absolute: 2e-3,
-        relative: 1e-5,
-        outliers: 0.0,
-        why: "sums of numbers up to 1e4, of which f32 has 1e-3: minima are continuous, and each step takes the least away, so that errors do not add up",
-    },
+    tolerance: Tolerance::absolute(2e-3).relative(1e-5).because(
+        "sums of numbers up to 1e4, of which f32 has 1e-3: minima are continuous, and each step takes the least away, \
+         so that errors do not add up",
+    ),
     reference: |scene, t, reads, writes| {
         let (prices, way) = (prices(scene), t.iteration);
         let candidates = reads.get("candidates");
@@ -140,15 +134,12 @@ pub(crate) const CHOICE: Pass = Pass {
         constants.extend([("HALF", s.ring.half as i32), cap::constant(s)]);
         constants
     },
-    tolerance: Tolerance {
-        absolute: 2e-3,
-        relative: 1e-5,
-        outliers: 1e-2,
-        why: "a place is copied; costs that differ by less than 1e-5 may choose either; a sample at the border of the sector may be left out of an echo",
-    },
+    tolerance: Tolerance::absolute(2e-3).relative(1e-5).outliers(1e-2).because(
+        "a place is copied; costs that differ by less than 1e-5 may choose either; a sample at the border of the \
+         sector may be left out of an echo",
+    ),
     reference: |scene, _, reads, writes| {
-        let [width, height, _] = writes.get("distance_map").size;
-        for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+        for (x, y) in writes.get("distance_map").pixels() {
             let more: [f64; 2] =
                 std::array::from_fn(|c| PATHS_OF.iter().map(|(name, _)| reads.get(name).get([x, y, 0])[c]).sum());
             let places = reads.get("candidates").get([x, y, 0]);

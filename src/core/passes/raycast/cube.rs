@@ -40,21 +40,16 @@ pub(crate) const PASS: Pass = Pass {
         constants.push(("EDGES", s.settings.cube.edges as i32));
         constants
     },
-    tolerance: Tolerance {
-        absolute: 1e-2,
-        relative: 0.0,
-        outliers: 2e-3,
-        why: "the sector's border is found to 1/64 of half a slice pixel, the reference to the end: as much of a voxel's \
-              contrast and of an edge line's rise; a ray that grazes a border may fall on either side",
-    },
+    tolerance: Tolerance::absolute(1e-2).outliers(2e-3).because(
+        "the sector's border is found to 1/64 of half a slice pixel, the reference to the end: as much of a voxel's \
+         contrast and of an edge line's rise; a ray that grazes a border may fall on either side",
+    ),
     reference: |scene, _, reads, writes| {
         let volume = reads.get("volume");
         let picture = writes.get_mut("picture");
         let block = scene.block();
-        for y in 0..picture.size[1] {
-            for x in 0..picture.size[0] {
-                picture.set([x, y, 0], &reference_pixel(scene, volume, &block, x as f64 + 0.5, y as f64 + 0.5));
-            }
+        for (x, y) in picture.pixels() {
+            picture.set([x, y, 0], &reference_pixel(scene, volume, &block, x as f64 + 0.5, y as f64 + 0.5));
         }
     },
     ..Pass::OF_RAYS

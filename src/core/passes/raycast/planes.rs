@@ -22,19 +22,15 @@ pub(crate) const PASS: Pass = Pass {
     extent,
     params: |s, _| params(s),
     constants: |s, _| constants(s),
-    tolerance: Tolerance {
-        absolute: 1e-3,
-        relative: 0.0,
-        outliers: 4e-3,
-        why: "a place is off by 1e-5 mm in f32, so a sample by as much of a voxel's contrast, and the device's filter may \
-              round its weights; a sample at the very border of the sector or the box may fall on either side",
-    },
+    tolerance: Tolerance::absolute(1e-3).outliers(4e-3).because(
+        "a place is off by 1e-5 mm in f32, so a sample by as much of a voxel's contrast, and the device's filter may \
+         round its weights; a sample at the very border of the sector or the box may fall on either side",
+    ),
     reference: |scene, _, reads, writes| {
         let volume = reads.get("volume");
         let picture = writes.get_mut("picture");
         let (cut, [left, top]) = (Cut::of(scene), scene.tile_area().corner);
-        let [width, height, _] = picture.size;
-        for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+        for (x, y) in picture.pixels() {
             let rgba =
                 value_at(scene, volume, &cut, x + left as usize, y + top as usize).map_or([0.0; 4], |v| [v, v, v, 1.0]);
             picture.set([x, y, 0], &rgba);
@@ -55,18 +51,15 @@ pub(crate) const TONED: Pass = Pass {
     writes: |s, _| vec![whole("screen", toned_slot(s))],
     params: |s, _| postprocess::tone_params(s, params(s)).f32("line_strength", postprocess::LINE_STRENGTH),
     constants: |s, _| [constants(s), postprocess::tone_constants(s)].concat(),
-    tolerance: Tolerance {
-        absolute: 2.01 / 255.0,
-        relative: 0.0,
-        outliers: 4e-3,
-        why: "a value half-way between two levels may be stored as either, after an error of 1e-3 that contrast multiplies; samples at               the very border as without toning",
-    },
+    tolerance: Tolerance::absolute(2.01 / 255.0).outliers(4e-3).because(
+        "a value half-way between two levels may be stored as either, after an error of 1e-3 that contrast multiplies; \
+         samples at               the very border as without toning",
+    ),
     reference: |scene, _, reads, writes| {
         let volume = reads.get("volume");
         let screen = writes.get_mut("screen");
         let cut = Cut::of(scene);
-        let [width, height, _] = screen.size;
-        for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+        for (x, y) in screen.pixels() {
             let colour = value_at(scene, volume, &cut, x, y).map(|v| [v; 3]);
             screen.set([x, y, 0], &postprocess::reference_pixel(scene, Some(&cut.tiling), colour, x, y));
         }

@@ -21,22 +21,17 @@ pub(crate) const PASS: Pass = Pass {
         constants.push(("KEPT", kept(s)));
         constants
     },
-    tolerance: Tolerance {
-        absolute: 2e-3,
-        relative: 0.0,
-        outliers: 5e-3,
-        why: "places are off by 1e-5 mm in f32, and R16F stores 1 to 4.9e-4; a sample at the very border of the sector may fall \
-              on either side, and with it the largest of all",
-    },
+    tolerance: Tolerance::absolute(2e-3).outliers(5e-3).because(
+        "places are off by 1e-5 mm in f32, and R16F stores 1 to 4.9e-4; a sample at the very border of the sector may \
+         fall on either side, and with it the largest of all",
+    ),
     reference: |scene, _, reads, writes| {
         let volume = reads.get("volume");
         let picture = writes.get_mut("picture");
-        for y in 0..picture.size[1] {
-            for x in 0..picture.size[0] {
-                let ray = ray::Ray::cast(scene, volume, scene.projection_view(), scene.step, x, y);
-                let value = projected(scene, &ray);
-                picture.set([x, y, 0], &value.map_or([0.0; 4], |v| [v, v, v, 1.0]));
-            }
+        for (x, y) in picture.pixels() {
+            let ray = ray::Ray::cast(scene, volume, scene.projection_view(), scene.step, x, y);
+            let value = projected(scene, &ray);
+            picture.set([x, y, 0], &value.map_or([0.0; 4], |v| [v, v, v, 1.0]));
         }
     },
     ..Pass::OF_RAYS

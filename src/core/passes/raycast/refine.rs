@@ -23,17 +23,14 @@ pub(crate) const MARK_EDGES: Pass = Pass {
     extent: rendering_extent,
     params: |s, _| tone_params(s, Params::default()).f32("threshold", THRESHOLD),
     constants: |s, _| tone_constants(s).into_iter().filter(|(name, _)| *name != "CROSSING").collect(),
-    tolerance: Tolerance {
-        absolute: 0.0,
-        relative: 0.0,
-        outliers: 1e-3,
-        why: "a sum of three colours is off by 1e-6 in f32: a difference at the threshold itself may be on either side",
-    },
+    tolerance: Tolerance::absolute(0.0).outliers(1e-3).because(
+        "a sum of three colours is off by 1e-6 in f32: a difference at the threshold itself may be on either side",
+    ),
     reference: |scene, _, reads, writes| {
         let picture = reads.get("picture");
         let marks = writes.get_mut("marks");
         let [width, height, _] = marks.size;
-        for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+        for (x, y) in pixels([width, height]) {
             let at = |dx: i64, dy: i64| {
                 let inside = |n: usize, by: i64, size: usize| (n as i64 + by).clamp(0, size as i64 - 1) as usize;
                 let rgba = picture.get([inside(x, dx, width), inside(y, dy, height), 0]);

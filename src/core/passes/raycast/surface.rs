@@ -24,16 +24,13 @@ pub(crate) const PASS: Pass = Pass {
     writes: |s, _| writes(s),
     params: |s, _| params(s),
     constants: |s, _| constants(s),
-    tolerance: Tolerance {
-        absolute: 2e-3,
-        relative: 1e-5,
-        outliers: 2e-2,
-        why: "a parabola through three differences that are off by 1e-6 moves by 1e-3 of a step; a difference within that of \
-              the threshold, two equal peaks, or a sample at the border of the sector may go either way and move the place",
-    },
+    tolerance: Tolerance::absolute(2e-3).relative(1e-5).outliers(2e-2).because(
+        "a parabola through three differences that are off by 1e-6 moves by 1e-3 of a step; a difference within that \
+         of the threshold, two equal peaks, or a sample at the border of the sector may go either way and move the \
+         place",
+    ),
     reference: |scene, _, reads, writes| {
-        let size = writes.get("distance_map").size;
-        for (x, y) in (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| (x, y))) {
+        for (x, y) in writes.get("distance_map").pixels() {
             reference_ray(scene, reads, writes, x, y);
         }
     },

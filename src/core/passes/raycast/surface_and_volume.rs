@@ -36,15 +36,11 @@ pub(crate) const PASS: Pass = Pass {
         constants.extend(volume::compositing_constants(s, false));
         constants
     },
-    tolerance: Tolerance {
-        absolute: 4e-3,
-        relative: 1e-5,
-        outliers: 2e-2,
-        why: "of distances, the tolerance of raycast_surface; of colours, that of raycast_volume, on the same samples",
-    },
+    tolerance: Tolerance::absolute(4e-3).relative(1e-5).outliers(2e-2).because(
+        "of distances, the tolerance of raycast_surface; of colours, that of raycast_volume, on the same samples",
+    ),
     reference: |scene, _, reads, writes| {
-        let size = writes.get("picture").size;
-        for (x, y) in (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| (x, y))) {
+        for (x, y) in writes.get("picture").pixels() {
             surface::reference_ray(scene, reads, writes, x, y);
             let colour = match cap::cut_at(scene, reads, x, y) {
                 Some(cut) => cut.over([0.0; 4]),

@@ -2,7 +2,7 @@
 
 use super::detector::{judged, polarity};
 use super::ray::{Ray, interpolated, texel};
-use crate::passes::texels::Texels;
+use crate::passes::texels::{Texels, pixels};
 use crate::scene::{Mode, Scene, View};
 
 /// Most rays whose samples are looked at, and most samples of each.
@@ -90,7 +90,7 @@ fn largest_edge(scene: &Scene, [low, high]: [f64; 2], samples: &[Option<f64>]) -
 fn planes(scene: &Scene, volume: &Texels, survey: &mut Survey) {
     let tiling = scene.tiling();
     let [width, height] = scene.picture_size().map(|n| n as usize);
-    for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+    for (x, y) in pixels([width, height]) {
         let Some(tile) = tiling.tile_at(x, y) else { continue };
         let place = tiling.point(tile, [x, y].map(|n| n as f64 + 0.5));
         let within = (0..3).all(|axis| place[axis] >= scene.low[axis] && place[axis] <= scene.high[axis]);

@@ -118,17 +118,14 @@ pub const FIRST: Pass = Pass {
         constants.push(("COMPOSITING", 1));
         constants
     },
-    tolerance: Tolerance {
-        absolute: 4e-3,
-        relative: 0.0,
-        outliers: 2e-2,
-        why: "as raycast_volume; a ray whose error is close to what is allowed may take other steps, which change it by as much; behind bricks that are \
-              skipped long steps begin anew, which changes the estimate of an error, and light in the middle of a long step is the mean of two",
-    },
+    tolerance: Tolerance::absolute(4e-3).outliers(2e-2).because(
+        "as raycast_volume; a ray whose error is close to what is allowed may take other steps, which change it by as \
+         much; behind bricks that are skipped long steps begin anew, which changes the estimate of an error, and light \
+         in the middle of a long step is the mean of two",
+    ),
     reference: |scene, _, reads, writes| {
         let medium = Cast::new(scene, reads);
-        let [width, height, _] = writes.get("lattice").size;
-        for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+        for (x, y) in writes.get("lattice").pixels() {
             let (rgba, error) = medium.settled([2 * x, 2 * y], 0);
             let [r, g, b] = on_screen(scene, rgba);
             writes.get_mut("lattice").set([x, y, 0], &rgba);
@@ -149,12 +146,10 @@ pub const ENLARGE: Pass = Pass {
     extent: ray_extent,
     params: |s, _| sized(s, Params::default().f32("allowed", allowed(s))),
     constants: no_constants,
-    tolerance: Tolerance {
-        absolute: 1e-3,
-        relative: 0.0,
-        outliers: 1e-3,
-        why: "means of four colours, stored in halves; sums of errors are off by 1e-7 in f32: one at what is allowed may be on either side",
-    },
+    tolerance: Tolerance::absolute(1e-3).outliers(1e-3).because(
+        "means of four colours, stored in halves; sums of errors are off by 1e-7 in f32: one at what is allowed may be \
+         on either side",
+    ),
     reference: |scene, _, reads, writes| {
         // As the shader has it.
         let allowed = f64::from(allowed(scene) as f32);
@@ -170,7 +165,7 @@ pub const ENLARGE: Pass = Pass {
         };
         writes.get_mut("error_marks").values.fill(0.0);
         let ([width, height, _], [columns, rows, _]) = (writes.get("picture").size, lattice.size);
-        for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+        for (x, y) in pixels([width, height]) {
             let corners: [[usize; 2]; 4] =
                 std::array::from_fn(|k| [((x + k % 2) / 2).min(columns - 1), ((y + k / 2) / 2).min(rows - 1)]);
             let mean = |of: &Texels, c| corners.iter().map(|[x, y]| of.get([*x, *y, 0])[c]).sum::<f64>() / 4.0;
@@ -216,7 +211,7 @@ pub const LIST: Pass = Pass {
         let [columns, rows] = tiles(s);
         Params::default().i32("tile_columns", columns).i32("tile_rows", rows)
     },
-    tolerance: Tolerance { absolute: 0.0, relative: 0.0, outliers: 0.0, why: "sums of integers" },
+    tolerance: Tolerance::exact("sums of integers"),
     reference: |_, _, reads, writes| {
         let marks = reads.get("error_marks");
         let mut before = 0;
@@ -255,8 +250,7 @@ pub(crate) const REFINE: Pass = Pass {
     },
     reference: |scene, _, reads, writes| {
         let (medium, marks) = (Cast::new(scene, reads), reads.get("error_marks"));
-        let [width, height, _] = writes.get("picture").size;
-        for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+        for (x, y) in writes.get("picture").pixels() {
             let tile = TILE as usize;
             let (word, bit) = place_in_tile([x % tile, y % tile]);
             let marks = marks.values[2 * (x / tile + (y / tile) * marks.size[0]) + word];

@@ -62,14 +62,11 @@ pub(crate) const PASS: Pass = Pass {
         constants.push(("STEPS_AT_ONCE", if s.is_for_cpu() { s.lit_steps() as i32 } else { 1 }));
         constants
     },
-    tolerance: Tolerance {
-        absolute: 4e-3,
-        relative: 0.0,
-        outliers: 4e-3,
-        why: "places are off by 1e-5 mm in f32, so by as much of a voxel's contrast a sample, and in noise that counts where a \
-              threshold makes absorption jump; an early end leaves 1/512; a sample at the very border of the sector may fall on \
-              either side",
-    },
+    tolerance: Tolerance::absolute(4e-3).outliers(4e-3).because(
+        "places are off by 1e-5 mm in f32, so by as much of a voxel's contrast a sample, and in noise that counts \
+         where a threshold makes absorption jump; an early end leaves 1/512; a sample at the very border of the sector \
+         may fall on either side",
+    ),
     reference: |scene, _, reads, writes| {
         let middle_of = if scene.adapts_rays() { f64::from(scene.settings.ray.rays) } else { 1.0 };
         reference_rays(scene, reads, writes, |x, y| Some(ray::middle_of(x, y).map(|n| n * middle_of)));
@@ -111,8 +108,7 @@ fn reference_rays(
     let volume = reads.get("volume");
     let table = reads.get("transfer");
     let tables = Tables { of_steps: table, curve: curve(scene, table), lit: Lit::new(scene, reads) };
-    let size = writes.get("picture").size;
-    for (x, y) in (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| (x, y))) {
+    for (x, y) in writes.get("picture").pixels() {
         let Some(at) = place(x, y) else { continue };
         let mut ray = ray::Ray::through(scene, volume, scene.volume_view(), scene.step, at);
         match kind(scene) {

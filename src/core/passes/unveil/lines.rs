@@ -2,6 +2,7 @@
 
 use super::Unveiled;
 use crate::passes::raycast::ray;
+use crate::passes::texels::pixels;
 use crate::scene::Scene;
 use crate::scene::planes::{Tile, Tiling};
 use crate::scene::start_curve::StartCurve;
@@ -83,7 +84,7 @@ fn on_tile(scene: &Scene, start: &Start, tiling: &Tiling, tile: &Tile) -> StartL
     let values: Vec<Option<f64>> =
         points.iter().map(|[x, y]| start.behind(scene, tiling.point(tile, at(*x, *y)))).collect();
     let mut pieces = Vec::new();
-    for (x, y) in (0..CELLS).flat_map(|y| (0..CELLS).map(move |x| (x, y))) {
+    for (x, y) in pixels([CELLS, CELLS]) {
         // Around the cell.
         let corners = [(x, y), (x + 1, y), (x + 1, y + 1), (x, y + 1)];
         let crossing = |n: usize| {

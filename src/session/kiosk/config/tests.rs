@@ -188,8 +188,8 @@ fn messages_about_flags_become_messages_about_keys() {
 
 #[test]
 fn a_file_that_is_no_small_text_is_refused_in_one_line() {
-    let folder = std::env::temp_dir().join(format!("echolume-config-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).expect("make a folder");
+    let work = crate::files::WorkFolder::new(&std::env::temp_dir(), "echolume-config-").expect("make a folder");
+    let folder = work.path();
     let write = |name: &str, bytes: &[u8]| std::fs::write(folder.join(name), bytes).expect("write");
     write("long.toml", "#".repeat((1 << 20) + 1).as_bytes());
     write("latin.toml", b"source = '\xe4'");
@@ -204,5 +204,4 @@ fn a_file_that_is_no_small_text_is_refused_in_one_line() {
         assert!(error.contains(named) && error.contains(name) && error.lines().count() == 1, "{error}");
     }
     assert_eq!(Config::read(&folder.join("right.toml")).expect("right").files.log, Some(folder.join("a.log")));
-    std::fs::remove_dir_all(&folder).expect("remove the folder");
 }

@@ -59,12 +59,10 @@ pub(crate) const MAJORANTS: Pass = Pass {
     extent: |s, _| s.bricks().count,
     params: |s, _| empty_space::window(s, s.volume_view()),
     constants: |s, _| vec![("ENTRIES", s.transfer_entries() as i32)],
-    tolerance: Tolerance {
-        absolute: 0.0,
-        relative: 1e-6,
-        outliers: 1e-3,
-        why: "an entry of the medium; a range that ends within rounding of an entry may take another one in",
-    },
+    tolerance: Tolerance::absolute(0.0)
+        .relative(1e-6)
+        .outliers(1e-3)
+        .because("an entry of the medium; a range that ends within rounding of an entry may take another one in"),
     reference: |scene, _, reads, writes| {
         let (ranges, medium) = (reads.get("brick_ranges"), reads.get("medium"));
         let target = writes.get_mut("majorants");
@@ -93,7 +91,7 @@ pub const BEGIN: Pass = Pass {
     extent: ray_extent,
     params: |_, _| Params::default(),
     constants: no_constants,
-    tolerance: Tolerance { absolute: 0.0, relative: 0.0, outliers: 0.0, why: "zeros" },
+    tolerance: Tolerance::exact("zeros"),
     reference: |_, _, _, writes| {
         for name in ["next_sums", "next_squares"] {
             writes.get_mut(name).values.fill(0.0);
@@ -155,20 +153,16 @@ pub(crate) const PATHS: Pass = Pass {
         ]);
         constants
     },
-    tolerance: Tolerance {
-        absolute: 4e-3,
-        relative: 4e-3,
-        outliers: 4e-2,
-        why: "places along a path are off by 1e-5 mm in f32, so extinctions by as much of a voxel's contrast; where a random number lies that \
-              close to a decision, the path becomes another one",
-    },
+    tolerance: Tolerance::absolute(4e-3).relative(4e-3).outliers(4e-2).because(
+        "places along a path are off by 1e-5 mm in f32, so extinctions by as much of a voxel's contrast; where a \
+         random number lies that close to a decision, the path becomes another one",
+    ),
     reference: |scene, args, reads, writes| {
         let medium = Medium::new(scene, reads);
         let still = still(scene);
         let first = args.iteration * still.samples_at_once();
         let last = (first + still.samples_at_once()).min(still.samples);
-        let [width, height, _] = writes.get("next_sums").size;
-        for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+        for (x, y) in writes.get("next_sums").pixels() {
             let mut sum: [f64; 4] = std::array::from_fn(|c| reads.get("sums").get([x, y, 0])[c]);
             let mut square = reads.get("squares").one(x, y, 0);
             for sample in first..last {
@@ -211,18 +205,13 @@ pub(crate) const RESOLVE: Pass = Pass {
             .vec3("ground_edge", ground.edge)
     },
     constants: |s, _| vec![("GROUND", s.settings.light.volume.is_some_and(|volume| volume.ground.is_some()) as i32)],
-    tolerance: Tolerance {
-        absolute: 1e-3,
-        relative: 0.0,
-        outliers: 0.0,
-        why: "a response curve and a power in f32; R16F stores 1 to 4.9e-4",
-    },
+    tolerance: Tolerance::absolute(1e-3).because("a response curve and a power in f32; R16F stores 1 to 4.9e-4"),
     reference: |scene, _, reads, writes| {
         let sums = reads.get("sums");
         let picture = writes.get_mut("picture");
         let (volume, samples) = (scene.settings.light.volume, f64::from(still(scene).samples));
         let (exposure, ground) = (volume.unwrap_or_default().exposure, volume.and_then(|volume| volume.ground));
-        for (x, y) in (0..sums.size[1]).flat_map(|y| (0..sums.size[0]).map(move |x| (x, y))) {
+        for (x, y) in sums.pixels() {
             let mut mean: [f64; 4] = std::array::from_fn(|c| sums.get([x, y, 0])[c] / samples);
             mean[3] = mean[3].min(1.0);
             picture.set([x, y, 0], &light_volume::on_film(scene, exposure, ground, mean, ray::middle_of(x, y)));
