@@ -216,7 +216,7 @@ impl Segment {
             );
         }
         let range = match scale {
-            Scale::Linear => String::new(),
+            Scale::Linear => " (linear)".into(),
             Scale::Decibels(range) => format!(" ({range:.0} dB)"),
         };
         let share = scale.share(found.level);

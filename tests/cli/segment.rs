@@ -39,7 +39,7 @@ fn a_body_in_a_file_is_measured_labelled_in_its_place_and_written() {
         let mut arguments = vec!["segment", &*input, "-o", &*output, "--csv", &*csv, "--stl", &*stl, "--smooth", "0.8"];
         arguments.extend(is_dark.then_some("--dark"));
         let said = done(&arguments);
-        assert!(said.contains("1 bodies") && said.contains("linear samples"), "{said}");
+        assert!(said.contains("bodies: 1") && said.contains("(linear)"), "{said}");
         let table = fs::read_to_string(&csv).expect("a table");
         let row: Vec<&str> = table.lines().nth(1).expect("a body").split(',').collect();
         let number = |n: usize| row[n].parse::<f64>().expect("a number");

@@ -114,7 +114,7 @@ fn what_contradicts_itself_is_neither_read_nor_written() {
         fail(r, "passes", "tone");
         check(r, "passes", "tone").faults[0].worst.as_mut().expect("worst").beyond = 5000;
     };
-    assert_eq!(broken(&beyond), "passes / tone: 5000 texels beyond their tolerance, of 4096");
+    assert_eq!(broken(&beyond), "passes / tone: 5000 values beyond their tolerance, of 4096");
 }
 
 proptest! {

@@ -215,8 +215,8 @@ pub struct EnhancedSigma {
     pub noise: Noise,
     /// Estimator of the centre. Absent: Perona-Malik in modes of planes, the median in all others (thesis 5.7).
     pub centre: Option<Estimator>,
-    /// Edge constant k of a Perona-Malik centre: differences above it are preserved. In 0..1 on slices and on the brightness of pictures, in mm on
-    /// distances, also if the noise is multiplicative.
+    /// Edge constant k of a Perona-Malik centre: differences above it are preserved. In 0..1 on slices and on the brightness of pictures, in
+    /// millimetres on distances, also if the noise is multiplicative.
     pub edge: f64,
     /// Records by how many rings each pixel's window grew (thesis Tables 7-9). Slices only.
     pub growth: bool,
