@@ -3,7 +3,7 @@
 use super::drawing::{DrawFault, draw_despite_losses};
 use super::recordings::read_volume;
 use crate::args::{InputArgs, PictureFile, check_outputs, check_volume, recorded};
-use crate::compare::{self, Difference, MAX_TILES};
+use crate::compare::{self, Difference, MAX_TILES, tile_name};
 use crate::gpu::{Context, Renderer, RendererOptions};
 use crate::marked::{self, Demo};
 use crate::picture::Picture;
@@ -11,8 +11,8 @@ use crate::probe::Rigid;
 use crate::scene::load::Layers;
 use crate::scene::{Scene, Settings};
 use crate::segment::registration::{centre, register};
+use crate::source::Source;
 use crate::source::convert::Volume;
-use crate::source::{DEMO_DATA, Source};
 use crate::terminal::{Failure, failed, input, remark, say};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -132,7 +132,7 @@ impl CompareArgs {
         let (_, volume, _) = read_volume(&mut *source, Path::new(&job.input.name()), number, |_, _| ())?;
         let settings = sized(scene.settings.clone(), each);
         let first = Drawn {
-            name: tile_name('A', &job.input.name(), &*source),
+            name: tile_name('A', short(&job.input.name()), source.is_synthetic()),
             is_synthetic: source.is_synthetic(),
             scene: scene_of(&*source, number, &settings)?,
             volume,
@@ -172,7 +172,7 @@ impl CompareArgs {
                 if shows_difference {
                     let Difference { picture, end, rms } = compare::difference(&bare[0], &bare[1]).map_err(failed)?;
                     say!("difference: A - B, RMS {rms:.2} of 255 levels; scale -{end} to {end}");
-                    pictures.push(("A \u{2212} B".into(), picture));
+                    pictures.push((compare::DIFFERENCE.into(), picture));
                 }
                 compare::beside(pictures, size)
             }
@@ -238,7 +238,7 @@ impl CompareArgs {
             volume = volume.moved_onto(geometry, |place| back.transform_point3(place), source.range()[0]);
             scene = Scene::new(geometry.clone(), scene.input, settings).map_err(input)?;
         }
-        let name = tile_name(letter, &file.display().to_string(), &*source);
+        let name = tile_name(letter, short(&file.display().to_string()), source.is_synthetic());
         Ok(Drawn { name, is_synthetic: source.is_synthetic(), scene, volume })
     }
 }
@@ -258,14 +258,6 @@ fn scene_of(source: &dyn Source, volume: usize, settings: &Settings) -> Result<S
     recorded.is_completed = false;
     let layers = Layers::of(settings).ok_or_else(|| failed("the settings cannot be written"))?;
     recorded.scene(&layers).map_err(input)
-}
-
-/// The name of a tile: its letter, the file without its folder, and whether the volume is of the phantom.
-fn tile_name(letter: char, file: &str, source: &dyn Source) -> String {
-    match source.is_synthetic() {
-        true => format!("{letter}  {} \u{b7} {DEMO_DATA}", short(file)),
-        false => format!("{letter}  {}", short(file)),
-    }
 }
 
 /// The name of a file without its folder.

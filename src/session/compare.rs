@@ -3,6 +3,7 @@
 use crate::canvas::{self, Canvas, Drawing, Drawn};
 use crate::marked;
 use crate::picture::Picture;
+use crate::source::DEMO_DATA;
 use plotters::prelude::{DrawingBackend, RGBColor, ShapeStyle};
 
 /// Width of what lies between tiles, pixels.
@@ -20,6 +21,17 @@ const LEAST_END: u16 = 16;
 const BEYOND: f64 = 0.01;
 /// Most tiles of a picture.
 pub const MAX_TILES: usize = 4;
+
+/// The name of the tile of a difference.
+pub const DIFFERENCE: &str = "A \u{2212} B";
+
+/// The name of a tile: its letter, the name of the volume, and whether it is the phantom's.
+pub fn tile_name(letter: char, volume: impl std::fmt::Display, is_synthetic: bool) -> String {
+    match is_synthetic {
+        true => format!("{letter}  {volume} \u{b7} {DEMO_DATA}"),
+        false => format!("{letter}  {volume}"),
+    }
+}
 
 /// Columns and rows of tiles: up to three beside each other, or in a high picture one above the other; four in a square.
 pub fn grid(tiles: usize, [width, height]: [u32; 2]) -> [u32; 2] {

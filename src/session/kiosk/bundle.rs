@@ -81,13 +81,12 @@ impl Bundle {
     /// Adds a file of this name with `text`, which is redacted and then cut at 2^20 characters: a private name at the cut is recognised. `description`:
     /// its line in the README.
     pub fn add(&mut self, name: &str, description: &str, text: &str) {
-        let mut text = self.redactor.redact(text);
-        text.truncate(text.char_indices().nth(MAX_ENTRY).map_or(text.len(), |(end, _)| end));
-        self.entries.push(Entry { name: name.into(), description: description.into(), text });
+        self.add_up_to(MAX_ENTRY, name, description, text);
     }
 
-    fn add_entry(&mut self, name: &str, description: &str, text: &str) {
-        let text = self.redactor.redact(text);
+    fn add_up_to(&mut self, most: usize, name: &str, description: &str, text: &str) {
+        let mut text = self.redactor.redact(text);
+        text.truncate(text.char_indices().nth(most).map_or(text.len(), |(end, _)| end));
         self.entries.push(Entry { name: name.into(), description: description.into(), text });
     }
 
@@ -132,7 +131,7 @@ impl Bundle {
                 Ok((bytes, cut)) => {
                     left -= left.min(bytes.len() as u64);
                     let description = if cut { "the end of the log" } else { "the log" };
-                    self.add_entry(&name, description, &String::from_utf8_lossy(&bytes));
+                    self.add_up_to(usize::MAX, &name, description, &String::from_utf8_lossy(&bytes));
                 }
                 Err(error) => self.note(&format!("{name}: {} cannot be read: {error}", file.display())),
             }

@@ -4,6 +4,7 @@ use super::colours::{BACKING, MARK, TEXT, UNCOLOURED, WEAK_TEXT};
 use super::names::{self, Tell};
 use super::{PanelState, ROW_HEIGHT, SMALL_TEXT, TOUCH_SIZE, picture_rect};
 use crate::command::Command;
+use crate::compare::{DIFFERENCE, tile_name};
 use crate::comparison::{CompareView, Link, Shown};
 use crate::texts;
 use egui::accesskit::Role;
@@ -76,10 +77,10 @@ pub(super) fn show(ui: &Ui, state: &PanelState, scale: f32, execute: &mut dyn Fn
         true => first.with_min_x(first.left() + shown.wipe as f32 * first.width()),
         false => tile(state, 1, scale),
     };
-    name(painter, second, &texts::tile_b(&shown.name, shown.is_synthetic), true);
-    name(painter, first, &texts::tile_a(&shown.first), !is_wipe);
+    name(painter, second, &tile_name('B', &shown.name, shown.is_synthetic), true);
+    name(painter, first, &tile_name('A', &shown.first, false), !is_wipe);
     match shown.view {
-        CompareView::Difference => name(painter, tile(state, 2, scale), texts::TILE_DIFFERENCE, true),
+        CompareView::Difference => name(painter, tile(state, 2, scale), DIFFERENCE, true),
         CompareView::Wipe => handle(ui, first, second.left(), execute),
         CompareView::Tiles => {}
     }

@@ -39,13 +39,6 @@ pub(crate) const WHY_NOTHING_TO_COMPARE: &str = "there is no whole volume yet";
 pub(crate) fn compared_as_it_was(name: impl Display) -> String {
     format!("{name}, as it was")
 }
-pub(crate) fn tile_a(name: impl Display) -> String {
-    format!("A  {name}")
-}
-pub(crate) fn tile_b(name: impl Display, is_synthetic: bool) -> String {
-    if is_synthetic { format!("B  {name} · {}", super::DEMO_DATA) } else { format!("B  {name}") }
-}
-pub(crate) const TILE_DIFFERENCE: &str = "A \u{2212} B";
 pub(crate) fn not_compared(fault: impl Display) -> String {
     format!("Not compared: {fault}")
 }
