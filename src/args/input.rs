@@ -319,7 +319,7 @@ impl InputArgs {
 /// The arguments that choose the settings of a scene, in layers, and the device.
 #[derive(clap::Args)]
 pub struct SceneArgs {
-    /// vr (volume), sr (surface), mixed, mip, minip, xray (mean), mpr (plane), orthogonal, tomography, cube
+    /// vr or volume, sr or surface, mixed, mip, minip, xray or mean, mpr or plane, orthogonal, tomography, cube
     #[arg(long)]
     mode: Option<String>,
     /// single; 4up: three orthogonal planes and the rendering; beside: the rendering and the planes in a column beside it; pair: volume and surface side by side

@@ -39,8 +39,8 @@ const VOXEL_BYTES: u64 = 12;
 #[derive(Clone, clap::Args)]
 pub struct SourceArgs {
     #[arg(long, value_name = "SOURCE", default_value = "phantom", help = format!(
-        "phantom; a recording: {}; for view, a workspace (.toml); - for standard input (a line of JSON, then raw frames, as \
-         tools/pipe_frames.py writes them); igtl://HOST[:PORT] for OpenIGTLink",
+        "phantom; a recording: {}; a folder or a 'pattern*.png' of numbered pictures; for view, a workspace (.toml); - for standard \
+         input (a line of JSON, then raw frames, as tools/pipe_frames.py writes them); igtl://HOST[:PORT] for OpenIGTLink",
         described()
     ))]
     source: String,

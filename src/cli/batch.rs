@@ -31,7 +31,7 @@ static GRACE: AtomicU64 = AtomicU64::new(0);
 #[command(
     after_help = "A unit is a line of the manifest: {\"input\": FILE, \"command\": [\"render\", \"--preset\", \"bone\"]}, or a \"scene\" with the settings of a \
                   scene file instead of a command; also convert, measure and verify. Its outputs are named by a hash of the recording, the command and \
-                  the version, in DIR/units. Units that are done are skipped, so that the same command goes on after anything. docs/batch.md has the \
+                  the version, in DIR/units. Units that are done are skipped, so that the same command continues an interrupted batch. docs/batch.md has the \
                   details.\n\n\
                   Exit codes: 0 all units of the shard are done, 1 try again (a signal, or nothing could be written), 2 the manifest or the command line \
                   is wrong, 3 no device or a lost one (try again elsewhere), 4 some units failed and the others are done.\n\n\

@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 #[command(
-    after_help = "For every ray of volume rendering, low and high contain the exact integral of the sampled field: computed on the CPU in interval \
+    after_help = "For every ray of volume rendering, low and high enclose the exact integral of the sampled field: computed on the CPU in interval \
                   arithmetic, with the volume that stage 1 makes in f64, before the tone mapping of stage 4. With ray.tolerance the scene is also drawn on the \
                   device, and of each pixel it is said whether its error is within the tolerance by proof, or by its own estimate.\n\n\
                   Examples:\n  \
@@ -32,7 +32,7 @@ pub struct BoundsReport {
     /// Write low.png, high.png, width.png, low.npy, high.npy and bounds.json into this folder
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
-    /// Width of the widest channel of a ray (0..1) below which its parts are halved no more
+    /// Difference of the bounds of a ray's widest channel (0..1) below which its parts are no longer halved
     #[arg(long, value_name = "WIDTH", default_value_t = 0.01)]
     width: f64,
     /// Largest number of parts of a ray, 16..=1000000

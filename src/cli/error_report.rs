@@ -33,8 +33,8 @@ pub struct ErrorReport {
     /// Number of volumes timed at each setting of a dial, in turn with the scene as it is; from 6 on an interval of 95 % is known
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=1000))]
     repeat: u32,
-    /// Reference: exact (rays integrated without steps), f64 on the CPU, converged (the device's best), or auto: exact for dials of rays,
-    /// f64 for others, if it takes under a minute
+    /// Reference: exact (rays integrated without steps), f64 on the CPU, converged (the finest settings on the device), or auto: exact for
+    /// dials of rays, f64 for others, if it takes under a minute
     #[arg(long, value_name = "WHAT", default_value = "auto")]
     against: String,
     /// Write error.json, error.csv, error.svg and error.png into this folder; and looks.svg and looks.png, if dials of another look were measured

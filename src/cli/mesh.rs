@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
     after_help = "The surface is where the volume, between 0 and 1 of its sample range, passes the threshold. It is closed at the border of the \
                         volume, half a voxel outside, so that it can be printed; with --open it ends there. Coordinates are mm, those of the \
                         world (LPS) where the recording states them. STL has neither colours nor a unit. With a base or closed it is \
-                        watertight. What a picture shows, an open sheet from its distance map in its colours, is written by render --mesh.\n\nExamples:\n  \
+                        watertight, unless --fast leaves edges open. What a picture shows, an open sheet from its distance map in its colours, is written by render --mesh.\n\nExamples:\n  \
                         echolume mesh sweep.mha face.stl\n  \
                         echolume mesh sweep.mha face.stl --simplify 0.1\n  \
                         echolume mesh sweep.mha relief.stl --base 3\n  \

@@ -141,7 +141,7 @@ use tracing_subscriber::util::SubscriberInitExt;
                   Try: echolume render -o face.png\n     echolume render sweep.mha -o picture.png --preset fetal\n\
                   Not a medical device.",
     after_long_help = "Exit codes of every command: 0 done, 1 failed, 2 bad input or usage, 3 no Vulkan device or not the one asked for, 4 \
-                       stopped by a signal before all was done (verify). `batch`: also 1, stopped by a signal, 3, device lost, and 4, some units failed. `profile`: also 5, the noise may hide a slowdown. Any other command ends by the signal itself. `-` as a recording \
+                       stopped by a signal before all was done (verify). `batch`: also 1, stopped by a signal, 3, device lost, and 4, some units failed. `profile`: also 5, the noise may hide a slowdown. `stream` ends with 0 after a signal, and `probe` as its help says; any other command ends by the signal itself. `-` as a recording \
                        is standard input; `-o -` writes a picture to standard output, and every line to standard error. \
                        ECHOLUME_PROGRESS=lines in the environment writes how far the work is as lines to standard error, for a program that runs this one. \
                        Recordings, pictures, volumes, workspaces and logs can be read by their owner alone; ECHOLUME_PRIVATE=0 lets the umask decide."

@@ -9,11 +9,11 @@ use clap::{Args, Subcommand};
 use std::path::PathBuf;
 use std::time::{Duration, Instant, SystemTime};
 
-const KILLED: &str = "The motor is stopped when the command ends, fails, panics, or gets SIGINT, SIGTERM or SIGHUP. A process \
-that is killed outright (SIGKILL, power) cannot stop it. Where the module has a watchdog (TMCL global parameter 68, \"serial \
+const KILLED: &str = "A command that moves the motor stops it when it ends, fails, panics, or gets SIGINT, SIGTERM or SIGHUP. Every \
+command stops it if the module does not answer as it should. A process that is killed outright (SIGKILL, power) cannot stop it. Where the module has a watchdog (TMCL global parameter 68, \"serial \
 heartbeat\"; `probe status` says so), set watchdog_ms = 1000 in the [motor] table: the module then stops the motor itself when \
 no command has come for so long. home and sweep write it into the module, which keeps it. Where it has none, keep a switch for \
-the motor's power at hand.\n\nExit codes: 0 done, 1 failed, 2 bad input.";
+the motor's power at hand.\n\nExit codes: 0 done, also if a signal ends a sweep without --volumes, 1 failed, 2 bad input.";
 
 #[derive(Args)]
 #[command(after_help = KILLED)]

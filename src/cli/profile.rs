@@ -56,8 +56,8 @@ pub struct Profile {
     #[arg(long, num_args = 1..=2, value_names = ["OLD", "NEW"])]
     compare: Vec<PathBuf>,
     /// Measure this in turn with what the other options say, and compare as --compare does: another echolume program, a folder of shaders
-    /// (as --glsl), or a device (as --device). Exit code 1 if it is slower. Each of some 12 blocks of volumes is a pair of processes with
-    /// its own --warm-up
+    /// (as --glsl), or a device (as --device). Exit code 1 if what is named here is slower. Each of some 12 blocks of volumes is a pair of
+    /// processes with its own --warm-up
     #[arg(long, value_name = "PROGRAM|DIR|DEVICE", conflicts_with_all = ["compare", "csv", "csv_samples", "trace"])]
     against: Option<Other>,
     /// In a process of --against: a volume for each line of standard input, and a line of answer

@@ -476,7 +476,8 @@ pub struct MakePhantom {
     /// Share by which the rate of the heart rises and falls within 8 s, 0..0.3
     #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
     heart_swing: f64,
-    /// Body head: fluid between the near uterine wall and the fetus where they are nearest, mm, 0 to 29.9; the wall is so much thicker [default: 29.9]
+    /// Body head: fluid between the near uterine wall and the fetus where they are nearest, mm, 0 to 29.9. The wall is
+    /// thicker by what this is below 29.9 [default: 29.9]
     #[arg(long, value_name = "MM")]
     gap: Option<f64>,
     /// Body head: level of clutter (reverberations and side lobes) everywhere, dB re full scale, -60 to 0 [default: none]

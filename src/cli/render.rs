@@ -71,7 +71,7 @@ pub struct Render {
     /// colours. For modes sr and mixed; echolume mesh writes closed surfaces
     #[arg(long, value_name = "FILE")]
     mesh: Option<PathBuf>,
-    /// Write the difference of every pixel from the picture of half the step as a map too; hatched where it exceeds
+    /// Draw the picture with half the step too, and write the difference of every pixel as a map; hatched where it exceeds
     /// --error-tolerance
     #[arg(long, value_name = "FILE")]
     error_map: Option<PathBuf>,
@@ -82,8 +82,9 @@ pub struct Render {
     /// 20s, which chooses N and prints it; further settings of the table still, such as seed=1 or extinction=4
     #[arg(long, value_name = "KEY=VALUE,...|TIME")]
     still: Option<String>,
-    /// Choose the rays and steps of every pixel by the error that they leave, such as 1level of the 255 of the finished picture, and print how many pixels keep it
-    /// by proof and by their own estimate; --error-map then shows the error that each states. For mode vr; the same as ray.tolerance
+    /// Choose the rays and steps of every pixel by the error that they leave, such as 1level of the 255 of the finished picture, and print the shares
+    /// of the pixels that keep it by proof (their error is surely 0) and by estimate; --error-map then shows the estimated error of every pixel.
+    /// For mode vr; the same as ray.tolerance
     #[arg(long, value_name = "LEVELS")]
     tolerance: Option<String>,
     /// Print the time of every pass

@@ -21,7 +21,7 @@ enum ReportKind {
     Bounds(Box<BoundsReport>),
     /// Compare the 2D filters of slices: noise, contrast, edges, error and time
     Filters(FilterReport),
-    /// Measure the thesis' tables of times in our reading of its conditions, and print them with its figures
+    /// Measure the thesis' tables of times, and print them with its figures
     Tables(ThesisTables),
 }
 

@@ -7,7 +7,7 @@ use crate::mesh::files::{Colours, MeshFile};
 use crate::probe::{Geometry, Grid, World};
 use crate::scene::depth_offset;
 use crate::segment::bodies::{Body, Found, OPENING, SMOOTHING, Search, find};
-use crate::segment::{Field, Scale, files, usual_grid};
+use crate::segment::{Field, Scale, cropped, files, usual_grid};
 use crate::source::segmentation;
 use crate::terminal::{Failure, failed, input, progress_bar, remark, say};
 use glam::DVec3;
@@ -16,8 +16,8 @@ use std::path::PathBuf;
 #[derive(clap::Args)]
 #[command(
     after_help = "A body is what is brighter (--dark: darker) than the echoes around it. Its volume is that of what lies deeper than the shell around \
-                  its surface, and of the shell the share that its mean echo says; the interval of 95 % is of speckle, the thickness of the shell and \
-                  the range of the log compression. Coordinates are mm: lateral, depth below the probe's face, elevation, as those of region.\n\n\
+                  its surface, plus a share of the shell: how far the shell's mean echo is from that outside towards that inside. The interval of 95 % \
+                  is of speckle, the thickness of the shell and the range of the log compression. Coordinates are mm: lateral, depth below the probe's face, elevation, as those of region.\n\n\
                   Examples:\n  \
                   echolume segment sweep.mha -o bodies.seg.nrrd\n  \
                   echolume segment ovary.mha -o follicles.seg.nrrd --dark --least 0.05 --csv follicles.csv\n  \
@@ -69,8 +69,6 @@ pub struct Segment {
     geometry: GeometryArgs,
 }
 
-/// Widest smoothing, voxels: its slices are kept in memory.
-const MAX_DEVIATION: f64 = 32.0;
 /// Colour of a mesh.
 const GREY: [u8; 3] = [128; 3];
 
@@ -103,10 +101,10 @@ impl Segment {
         let (range, world) = (recording.range(), recording.world_of(self.volume));
         let (geometry, volume, _) = read_volume(&mut *recording, &self.input, self.volume, |_, _| ())?;
         let grid = self.grid(&geometry)?;
-        let most = MAX_DEVIATION * grid.spacing.iter().copied().fold(f64::INFINITY, f64::min);
+        let most = Search::most(&grid);
         for (flag, value) in [("--smooth", self.smooth), ("--opening", opening)] {
             if value > most {
-                return Err(input(format!("{flag} {value}: at most {most} mm, {MAX_DEVIATION} voxels")));
+                return Err(input(format!("{flag} {value}: at most {most} mm, 32 voxels")));
             }
         }
         let world = match (&geometry, world) {
@@ -178,15 +176,10 @@ impl Segment {
             let axis = ["lateral", "depth", "elevation"].iter().position(|known| *known == name.trim());
             let [Ok(low), Ok(high)] = [low, high].map(|end| end.trim().parse::<f64>()) else { return Err(fault(FORM)) };
             let axis = axis.filter(|_| low < high).ok_or_else(|| fault(FORM))?;
-            let index = |at: f64| (at + face[axis] - grid.origin[axis]) / grid.spacing[axis];
-            // Saturates.
-            let (first, end) = (index(low).ceil().max(0.0) as usize, (index(high).floor() + 1.0).max(0.0) as usize);
-            let end = end.min(grid.size[axis]);
-            if first >= end {
-                return Err(fault(&format!("nothing of the volume lies within its {}", name.trim())));
-            }
-            grid.origin[axis] += first as f64 * grid.spacing[axis];
-            grid.size[axis] = end - first;
+            let mut corners = [DVec3::NEG_INFINITY, DVec3::INFINITY];
+            [corners[0][axis], corners[1][axis]] = [low, high].map(|end| end + face[axis]);
+            let empty = || fault(&format!("nothing of the volume lies within its {}", name.trim()));
+            grid = cropped(&grid, corners).ok_or_else(empty)?;
         }
         Ok(grid)
     }

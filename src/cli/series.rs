@@ -78,7 +78,7 @@ pub struct Job<'a> {
     pub options: RendererOptions,
     pub validate: bool,
     pub timings: bool,
-    /// True if the shaders come from a folder of the user.
+    /// True if the shaders come from a folder of the user. One that does not compile is then an error of the input.
     pub own_shaders: bool,
 }
 

@@ -28,8 +28,8 @@ const INTERVAL: Duration = Duration::from_secs(1);
 #[derive(clap::Args)]
 #[command(
     after_help = "One line per second: frames, volumes and pictures per second, dropped volumes, latency from the arrival of a frame to \
-                        the pixels that show it, and the mean time and number of pictures, of conversions of frames, and of copies on a \
-                        queue of their own; with --timings of every pass.\n\nExamples:\n  \
+                        the pixels that show it. For pictures, for conversions of frames, and for copies on a queue of their own it has \
+                        the mean time and the number; with --timings for every pass too.\n\nExamples:\n  \
                         echolume stream --null --volumes 20\n  \
                         echolume stream --source sweep.frames --real-time --out pictures\n  \
                         tools/pipe_frames.py | echolume stream --source - --null\n  \
@@ -45,7 +45,7 @@ pub struct Stream {
     scene: SceneArgs,
     #[command(flatten)]
     stream: StreamArgs,
-    /// Write each picture into this folder (PNG, named by volume number; with --update rolling by picture number)
+    /// Write each picture into this folder (PNG, named by volume number; with --update rolling by picture number). Needed without --null
     #[arg(long, value_name = "DIR", conflicts_with = "null", required_unless_present = "null")]
     out: Option<PathBuf>,
     /// Render the pictures without writing them

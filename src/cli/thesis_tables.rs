@@ -15,7 +15,7 @@ const WARM_UP: usize = 1;
 #[derive(clap::Args)]
 #[command(
     after_help = "Thesis Tables 3-6: time of a picture in surface mode over frames a volume, volume size, 3D filter and 2D \
-                        filter, each row under the conditions that the thesis states (4.5), in our reading: docs/experiments/thesis-tables.md. Pictures add Tables 7-9: how far the windows of the \
+                        filter, each row under the conditions that the thesis states (4.5). docs/experiments/thesis-tables.md says how they are read. Pictures add Tables 7-9: how far the windows of the \
                         enhanced sigma filter grow on them.\n\nExamples:\n  \
                         echolume report tables --markdown tables.md --csv tables.csv\n  \
                         echolume report tables scan.png --quick --repeat 3"

@@ -26,11 +26,11 @@ use std::time::{Duration, Instant};
 
 #[derive(clap::Args)]
 #[command(
-    after_help = "Exit codes: 0 all checks passed, 1 a check failed or a report could not be written, 2 usage or an input, 3 no device, 4 interrupted by a signal before all checks were run and none had failed, 125 with --bisect if the device cannot be started.\n\nExamples:\n  \
+    after_help = "Exit codes: 0 all checks passed, 1 a check failed or a report could not be written, 2 usage or an input, 3 no device, 4 a signal ended the run early and no check had failed, 125 with --bisect if the device cannot be started.\n\nExamples:\n  \
                         echolume verify                                         (some minutes on a CPU, less on a GPU)\n  \
                         echolume verify --full --json before.json               (before the driver is updated)\n  \
                         echolume verify --full --baseline before.json --html after.html\n  \
-                        echolume verify --self-test                             (do the checks detect injected faults?)"
+                        echolume verify --self-test                             (whether the checks detect injected faults)"
 )]
 pub struct Verify {
     /// Vulkan device, by number or part of its name (see `echolume devices`)
@@ -42,10 +42,10 @@ pub struct Verify {
     /// Run every input of every pass in every scene, and a stress test of some minutes
     #[arg(long)]
     full: bool,
-    /// Compare with an earlier run (its --json), also within tolerances; exit code 1 if anything became worse
+    /// Compare with an earlier run (its --json). Exit code 1 also if a pass is slower; an error that grew within its tolerance is only reported
     #[arg(long, value_name = "FILE")]
     baseline: Option<PathBuf>,
-    /// Ratio to the baseline's time that counts as a failure
+    /// Ratio to the baseline's time that counts as a failure. A time that is measured once fails above 3 times and 0.1 s more
     #[arg(long, value_name = "RATIO", default_value_t = 1.25, requires = "baseline")]
     threshold: f64,
     /// Write JUnit XML, for CI

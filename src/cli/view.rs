@@ -25,7 +25,7 @@ use std::time::Duration;
     after_help = "Drag rotates the view, the wheel zooms, H lists every key. Settings come in layers: defaults, --preset, --scene, then flags and \
                   --set, each overriding the one before.\n\nExamples:\n  \
                   echolume view\n  \
-                  echolume view echolume-20261123-2312-1.toml    (a workspace that was saved with Ctrl+S)\n  \
+                  echolume view echolume-20261123-231205-1.toml    (a workspace that was saved with Ctrl+S)\n  \
                   echolume view before.mha after.mha\n  \
                   echolume view --source sweep.frames --real-time --rounds 100\n  \
                   echolume view --source igtl://localhost:18944 --full-screen\n  \
@@ -100,7 +100,7 @@ pub struct View {
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
     /// Write metrics in Prometheus' text format every 15 s and at the end, for the textfile collector of its node exporter (name it
-    /// *.prom; before `prometheus` of the configuration)
+    /// *.prom); it overrides `prometheus` of the configuration
     #[arg(long, value_name = "FILE")]
     prometheus: Option<PathBuf>,
     /// Folder for saved pictures and loops

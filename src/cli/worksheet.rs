@@ -34,8 +34,8 @@ pub struct Worksheet {
     /// Report to write: .pdf, .html, .csv or .json by its ending
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// Make the report of this NAME.json again, and say whether its pictures are the same. The recording is where it was, beside the JSON, or the
-    /// one that is given
+    /// Make the report of this NAME.json again, and say whether its pictures are the same. The recording is INPUT if that is given, otherwise
+    /// the one that the JSON names, where it was or beside the JSON
     #[arg(long, value_name = "JSON", conflicts_with_all = SETTINGS)]
     from: Option<PathBuf>,
 }

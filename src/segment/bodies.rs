@@ -2,9 +2,11 @@
 
 use crate::distance::distances;
 use crate::field::Field;
+use crate::field::Scale;
 use crate::labels::Labels;
 use crate::lattice::{self, Region, voxel};
 use crate::probe::{Grid, World};
+use crate::source::convert::Volume;
 use crate::volume::{self, Measured};
 use glam::DVec3;
 
@@ -21,6 +23,8 @@ const BINS: usize = 512;
 /// The usual smoothing, and the opening with a seed, mm: what speckle leaves open in a wall is thinner.
 pub const SMOOTHING: f64 = 1.2;
 pub const OPENING: f64 = 1.0;
+/// Widest smoothing and opening, in the shortest edge of a voxel: slices within it are kept in memory.
+const MAX_REACH: f64 = 32.0;
 
 /// How connected bodies, such as cysts or follicles, are searched for in the echoes of a volume.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,6 +42,21 @@ pub struct Search {
     pub seed: Option<DVec3>,
     /// Smallest volume of a body, mm^3; smaller ones are ignored. Without effect if there is a seed.
     pub least: f64,
+}
+
+impl Search {
+    /// The usual search on a grid: smoothing by 1.2 mm, and with a seed an opening by 1 mm, or less where that would be more than
+    /// [`Search::most`]; any size.
+    pub fn usual(grid: &Grid, is_dark: bool, seed: Option<DVec3>) -> Search {
+        let most = Search::most(grid);
+        let opening = if seed.is_some() { OPENING.min(most) } else { 0.0 };
+        Search { is_dark, level: None, smoothing: SMOOTHING.min(most), opening, seed, least: 0.0 }
+    }
+
+    /// Largest smoothing and opening on a grid, mm: 32 times the shortest edge of a voxel.
+    pub fn most(grid: &Grid) -> f64 {
+        MAX_REACH * grid.spacing.iter().copied().fold(f64::INFINITY, f64::min)
+    }
 }
 
 /// A body that was found, and its volume.
@@ -63,6 +82,21 @@ pub struct Found {
     pub level: f64,
     /// Number of bodies that have no label because there are more than 255.
     pub left_out: usize,
+}
+
+/// Finds the largest body of a volume that is brighter than what is around it within a box, from the lowest to the highest corner in space, mm. Returns it with
+/// the echo at its surface as a share of the sample range. `range`: the stored values at both ends of the sample range.
+///
+/// # Errors
+/// One line: no voxel lies in the box, or as [`find`].
+pub fn largest_within(volume: &Volume, range: [f64; 2], corners: [DVec3; 2]) -> Result<(Body, f64), String> {
+    let grid = lattice::usual_grid(volume.geometry())?;
+    let grid = lattice::cropped(&grid, corners).ok_or("the region is empty")?;
+    let scale = Scale::by_speckle(volume, range);
+    let field = Field::of(volume, range, scale, grid, || ())?;
+    let found = find(&field, World::of(&grid), &Search::usual(&grid, false, None))?;
+    let body = found.bodies.into_iter().next().ok_or("there is no body")?;
+    Ok((body, scale.share(found.level)))
 }
 
 /// Finds, labels and measures bodies. `world`: map from the voxels of the grid to the world, for the labels. If the level is not given, the surface

@@ -5,8 +5,8 @@
 //! first and the last of parallel planes the last contour shrinks as the areas of the sections say, whose second difference is constant for
 //! an ellipsoid.
 
-use crate::labels::Labels;
 use crate::lattice::Region;
+use crate::probe::Grid;
 use crate::sections::{Arrangement, Plane, SAME_ANGLE, SAME_PLANE, arranged};
 use glam::{DMat3, DVec2, DVec3};
 use rayon::prelude::*;
@@ -15,25 +15,26 @@ use std::f64::consts::{PI, TAU};
 /// Most points of all contours.
 const MAX_POINTS: usize = 65_536;
 
-/// Sets a label in all voxels of the body that contours describe, mm in the coordinates of the labels' grid. Several contours in one plane bound
-/// the same section; one within another is a hole. Returns the number of voxels that did not have this label before.
+/// The numbers of the voxels whose centres lie in the body that contours describe, mm in the coordinates of the grid. Several contours in one
+/// plane bound the same section; one within another is a hole.
 ///
 /// # Errors
 /// One line: fewer than two planes, a contour without area, planes that are neither parallel nor share an axis, too many points.
-pub fn fill(labels: &mut Labels, label: u8, contours: &[Vec<DVec3>]) -> Result<usize, String> {
+pub fn voxels(grid: &Grid, contours: &[Vec<DVec3>]) -> Result<Vec<u32>, String> {
     let points = contours.iter().map(Vec::len).sum::<usize>();
     if points > MAX_POINTS {
         return Err(format!("{points} points of contours are too many: at most {MAX_POINTS}"));
     }
     let body = Body::of(contours)?;
-    let grid = *labels.grid();
-    let Some(region) = Region::within(&grid, body.bounds(contours)) else { return Ok(0) };
-    let places: Vec<(usize, DVec3)> = region.places(&grid).collect();
-    let inside: Vec<usize> =
-        places.into_par_iter().filter(|(_, place)| body.distance(*place) > 0.0).map(|(n, _)| n).collect();
-    let changed = inside.iter().filter(|n| labels.voxels()[**n] != label).count();
-    inside.into_iter().for_each(|n| labels.voxels_mut()[n] = label);
-    Ok(changed)
+    let Some(region) = Region::within(grid, body.bounds(contours)) else { return Ok(Vec::new()) };
+    let [low, size] = [region.low[2], region.size[2]];
+    let of_slice = |z| {
+        let slice = Region { low: [region.low[0], region.low[1], z], size: [region.size[0], region.size[1], 1] };
+        let places = slice.places(grid);
+        places.filter(|(_, place)| body.distance(*place) > 0.0).map(|(n, _)| n as u32).collect::<Vec<u32>>()
+    };
+    let inside: Vec<Vec<u32>> = (low..low + size).into_par_iter().map(of_slice).collect();
+    Ok(inside.concat())
 }
 
 /// Polygons in a plane.

@@ -21,6 +21,13 @@ pub fn usual_grid(geometry: &Geometry) -> Result<Grid, String> {
     }
 }
 
+/// The part of a grid whose voxels have their centres between two corners, mm in the coordinates of the grid; None if there are none.
+pub fn cropped(grid: &Grid, corners: [DVec3; 2]) -> Option<Grid> {
+    let Region { low, size } = Region::within(grid, corners)?;
+    let origin = place(grid, DVec3::from(low.map(|n| n as f64))).to_array();
+    Some(Grid { size, origin, ..*grid })
+}
+
 /// The number of voxels of a grid.
 ///
 /// # Errors

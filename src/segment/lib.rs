@@ -1,7 +1,7 @@
 //! Segmentation and registration without a device: label volumes, the volumes of what they label, and the motion between two volumes.
 //!
-//! - [`Labels`] is a label for each voxel of a lattice. A [`Brush`] edits it, [`contours`] fills it between drawn sections, [`files`] reads and
-//!   writes it.
+//! - [`Labels`] is a label for each voxel of a lattice. A [`Brush`] edits it, [`contours`] finds the voxels between drawn sections,
+//!   [`files`] reads and writes it.
 //! - [`Field`] holds linear echoes on the same lattice. [`bodies`] finds the bodies that are brighter or darker than what is around
 //!   them, by threshold or from a seed.
 //! - [`sections`] finds how the planes of drawn contours lie to each other.
@@ -27,4 +27,4 @@ use {echolume_probe as probe, echolume_source as source};
 
 pub use field::{Field, Scale};
 pub use labels::{Brush, Labels, Patch, Shape};
-pub use lattice::usual_grid;
+pub use lattice::{cropped, usual_grid};

@@ -143,8 +143,8 @@ pub enum Command {
     ExchangeLeftAndRight,
     /// Sets at which edge of the picture the probe's marker is drawn.
     ProbeMarker(ProbeMarker),
-    /// Measures the volume of the voxels of the region whose echo reaches the threshold.
-    CountVoxels,
+    /// Measures the volume of the largest bright body in the region.
+    MeasureBody,
     /// Copies the results of measurements to the clipboard as CSV.
     CopyMeasures,
     /// Saves the results of measurements as a CSV file.
@@ -167,7 +167,11 @@ pub enum Command {
     CompareView(CompareView),
     /// Moves the line of the wipe to this share of the picture's width.
     MoveWipe(f64),
-    /// Cuts or ties a link between the shown and the compared volume.
+    /// Compares with a further open recording.
+    CompareFurther,
+    /// Moves the compared volume with this index as a drag over its picture does, from a pixel of it to another one. The flag is true if it turns.
+    MoveCompared(usize, [[f64; 2]; 2], bool),
+    /// Cuts or ties a link between the shown and the compared volumes.
     ToggleLink(Link),
     /// Moves the compared volume rigidly onto the shown one, or leaves it where it is.
     Align,
@@ -444,7 +448,7 @@ pub const KEY_BINDINGS: &[Binding] = &[
     on(Char('o'), keys::TRACE, Command::Tool(Tool::Measure(MeasureKind::Trace))),
     on(Char('u'), keys::DISTANCE_ON_THE_SURFACE, Command::Tool(Tool::Measure(MeasureKind::Surface))),
     on(Char('w'), keys::VOLUME_BY_CONTOURS, Command::Tool(Tool::Measure(MeasureKind::Volume))),
-    on(Char('k'), keys::VOLUME_BY_THRESHOLD, Command::CountVoxels),
+    on(Char('k'), keys::AUTOMATIC_VOLUME, Command::MeasureBody),
     on(Char('i'), keys::TEXT, Command::Tool(Tool::Measure(MeasureKind::Text))),
     on(Char('y'), keys::ARROW, Command::Tool(Tool::Measure(MeasureKind::Arrow))),
     shift(Char('l'), keys::LABELS, Command::Tool(Tool::Labels)),

@@ -1,6 +1,7 @@
 //! Labels that the user edits: the label volume, its segments, and what a click or a drag does to it.
 
 use super::texts;
+use crate::probe::Grid;
 use crate::scene::{LabelVolume, SharedLabels};
 use crate::segment::{Brush, Labels, Patch, Shape, files};
 use crate::source::segmentation::Segment;
@@ -29,6 +30,8 @@ pub enum LabelCommand {
     Choose(u8),
     /// Adds a label, and chooses it.
     Add,
+    /// Labels the body of the volume by contours with this index in the list of measurements.
+    Fill(usize),
     /// Moves the brush to this pixel of the picture on the tile of planes with this index, or else on the rendering. The flag is true if it
     /// erases, whatever the effect is.
     Stroke([f64; 2], Option<usize>, bool),
@@ -85,6 +88,13 @@ impl Labelling {
         is_labelled.then(|| (self.labels.clone(), self.segments.clone()))
     }
 
+    /// The grid, and the map from space to its coordinates, both mm.
+    pub(super) fn grid(&self) -> (Grid, DAffine3) {
+        let grid = *self.labels.grid();
+        let of_index = DAffine3::from_translation(grid.origin.into()) * DAffine3::from_scale(grid.spacing.into());
+        (grid, of_index * self.to_space.inverse())
+    }
+
     /// The number of voxels along each axis, and the map from the index of a voxel to space, mm.
     pub(super) fn lattice(&self) -> ([usize; 3], DAffine3) {
         (self.labels.grid().size, self.to_space)
@@ -108,16 +118,13 @@ impl Labelling {
     /// Paints the chosen label along a straight line between two places in space, mm, or erases it. Other labels are painted over, but not
     /// erased. `plane`: unit normal of the plane that the brush moves on, if it moves on one.
     pub(super) fn paint(&mut self, [from, to]: [DVec3; 2], radius: f64, plane: Option<DVec3>, erases: bool) {
-        let grid = *self.labels.grid();
-        let spacing = DVec3::from(grid.spacing);
-        let to_index = self.to_space.inverse();
-        let to_grid = DAffine3::from_translation(grid.origin.into()) * DAffine3::from_scale(spacing) * to_index;
+        let (grid, to_grid) = self.grid();
         let shape = match plane.filter(|_| !self.is_ball) {
             None => Shape::Ball,
             Some(normal) => {
                 let normal = to_grid.transform_vector3(normal).normalize();
                 // Of every voxel that the plane goes through.
-                Shape::Disc { normal, thickness: normal.abs().dot(spacing) }
+                Shape::Disc { normal, thickness: normal.abs().dot(grid.spacing.into()) }
             }
         };
         let [from, to] = [from, to].map(|place| to_grid.transform_point3(place));

@@ -19,7 +19,7 @@ pub(crate) struct Entry {
 }
 
 /// What no key does.
-const WITHOUT_KEY: [(&str, &str, Command); 19] = [
+const WITHOUT_KEY: [(&str, &str, Command); 20] = [
     (texts::VIEW_3D, texts::VIEW_3D_HINT, Command::Rendering),
     (texts::EXCHANGE_LEFT_AND_RIGHT, texts::EXCHANGE_LEFT_AND_RIGHT_HINT, Command::ExchangeLeftAndRight),
     (texts::SAVE_RESULTS, texts::SAVE_RESULTS_HINT, Command::SaveMeasures),
@@ -37,6 +37,7 @@ const WITHOUT_KEY: [(&str, &str, Command); 19] = [
     (texts::FIND_TILES, texts::COMPARED_TILES_HINT, Command::CompareView(CompareView::Tiles)),
     (texts::FIND_DIFFERENCE, texts::COMPARED_DIFFERENCE_HINT, Command::CompareView(CompareView::Difference)),
     (texts::FIND_WIPE, texts::COMPARED_WIPE_HINT, Command::CompareView(CompareView::Wipe)),
+    (texts::FIND_FURTHER, texts::ADD_COMPARED_HINT, Command::CompareFurther),
     (texts::FIND_ALIGN, texts::ALIGN_HINT, Command::Align),
     (texts::FIND_LINK_LOOK, texts::LINK_LOOK_HINT, Command::ToggleLink(Link::Look)),
 ];

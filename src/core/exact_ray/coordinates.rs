@@ -42,7 +42,7 @@ impl Line<'_> {
         }
     }
 
-    /// True if the place at s is inside the insonified region, and always for a Cartesian volume.
+    /// True if the place at the distance `s` from `base`, mm, is inside the insonified region, and always for a Cartesian volume.
     pub fn is_inside(&self, s: f64) -> bool {
         crate::passes::raycast::ray::texel(self.scene, self.place(s)).is_some()
     }

@@ -56,7 +56,7 @@ pub static RULE: LazyLock<Rule> = LazyLock::new(|| {
 });
 
 impl Rule {
-    /// Integrals over -1..1 by the 15-point and by the 7-point rule, of a function with these values at the nodes.
+    /// Integrals over -1..1 by Kronrod's 15-point rule and by Gauss' 7-point rule, of a function with these values at the nodes.
     pub fn integrals(&self, values: &[f64; COUNT]) -> [f64; 2] {
         let sum = |weights: &[f64; COUNT]| weights.iter().zip(values).map(|(w, v)| w * v).sum();
         [sum(&self.kronrod), sum(&self.gauss)]

@@ -16,7 +16,7 @@ pub mod smooth;
 
 use glam::DVec3;
 
-/// A surface as triangles; vertices in mm.
+/// A surface as triangles, without colours; vertices in mm.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
     pub vertices: Vec<DVec3>,

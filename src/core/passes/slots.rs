@@ -92,7 +92,7 @@ pub struct Search {
 pub struct Found {
     /// Content of the slot, in its format.
     pub texels: Vec<u8>,
-    /// Where rendering starts, if the search was for that; else None.
+    /// The start surface, and whether fluid was recognised, if the search was for the render start; else None.
     pub unveiled: Option<Unveiled>,
 }
 

@@ -43,6 +43,9 @@ fn check(number: usize, measured: &Measurement) -> Result<(), SceneError> {
         let fault = format!("entry {number}: must be one line of at most {MAX_TEXT} characters, has {letters}");
         return refuse("measure.text", fault);
     }
+    if measured.interval.is_some_and(|[low, high]| low > high) {
+        return refuse("measure.interval", format!("entry {number}: the lower end is above the upper one"));
+    }
     for words in measured.made.iter().flat_map(|made| [&made.plane, &made.settings]) {
         let letters = words.chars().count();
         if letters > MAX_MADE || words.chars().any(char::is_control) {

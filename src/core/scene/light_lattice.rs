@@ -24,7 +24,7 @@ pub struct LightLattice {
     pub cell: f64,
     /// Number of cells along each axis; even.
     pub count: [u32; 3],
-    /// Size of the rendered box, mm. The cells reach beyond it by less than one cell, by the same length on both sides.
+    /// Size of the rendered box, mm. On each side of it the cells reach beyond it by the same length, which is less than one cell.
     pub extent: DVec3,
 }
 

@@ -462,6 +462,11 @@ impl Tile {
         std::array::from_fn(|a| f64::from(self.corner[a]) + f64::from(self.size[a]) / 2.0)
     }
 
+    /// True if a position on the picture, pixels, lies on the tile.
+    pub fn has(&self, pixel: [f64; 2]) -> bool {
+        (0..2).all(|a| (0.0..f64::from(self.size[a])).contains(&(pixel[a] - f64::from(self.corner[a]))))
+    }
+
     /// The columns of a curved plane's tile, from the left; None beyond the ends of its line. Empty for a plane.
     pub fn columns(&self) -> Vec<Option<Column>> {
         let Some(section) = &self.section else { return Vec::new() };

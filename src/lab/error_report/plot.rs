@@ -400,7 +400,7 @@ impl Axes {
         [left + share(x, self.x) * (right - left), bottom - share(y, self.y) * (bottom - top)]
     }
 
-    /// Draws grid, ticks and `across`, the title of the horizontal axis (time).
+    /// Draws the frame, the grid, the ticks with their values, and `across`, the title of the horizontal axis (time). The vertical axis has no title.
     pub fn draw<B: DrawingBackend>(&self, canvas: &Canvas<B>, across: &str) -> Drawn {
         let [left, top, right, bottom] = self.frame;
         for (value, named) in ticks(self.x) {

@@ -78,7 +78,7 @@ impl Conditions {
     }
 }
 
-/// GPU times, ns, one entry per repeat.
+/// GPU times of a row of a table. Each list has one entry per repeat.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Times {
     /// Stages 2-4 of one picture, which the thesis timed; ns, by repeat.

@@ -8,4 +8,3 @@ pub mod made;
 pub mod outcome;
 pub mod overlay;
 pub mod shapes;
-pub mod voxels;

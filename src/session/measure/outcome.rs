@@ -81,9 +81,15 @@ pub fn quantities(measured: &Measurement) -> Result<Vec<Quantity>, &'static str>
         }
         (MeasureKind::Threshold, _) => {
             let counted = measured.counted.ok_or("no voxels were counted")?;
-            let volume = Quantity::of("volume by threshold", counted / 1000.0, "cm3");
+            let volume = |name, mm3| Quantity::of(name, mm3 / 1000.0, "cm3");
+            let first = match measured.interval {
+                Some([low, high]) => {
+                    vec![volume("volume by echoes", counted), volume("95 % from", low), volume("95 % to", high)]
+                }
+                None => vec![volume("volume by threshold", counted)],
+            };
             let threshold = measured.threshold.map(|share| Quantity::of("threshold", share * 255.0, ""));
-            [volume].into_iter().chain(threshold).collect()
+            first.into_iter().chain(threshold).collect()
         }
         (MeasureKind::Text | MeasureKind::Arrow, _) => Vec::new(),
         _ => return Err("points are missing"),
@@ -164,6 +170,8 @@ mod tests {
         assert_eq!(shown(&volume), ["1.00 cm³"]);
         let counted = Measurement { counted: Some(1234.0), ..of(MeasureKind::Threshold, &points[..2]) };
         assert_eq!(shown(&counted), ["1.23 cm³"]);
+        let found = Measurement { interval: Some([1200.0, 1300.0]), threshold: Some(0.4), ..counted };
+        assert_eq!(shown(&found), ["1.23 cm³", "1.20 cm³", "1.30 cm³", "102"]);
         assert!(shown(&of(MeasureKind::Text, &points[..1])).is_empty());
         assert!(quantities(&of(MeasureKind::Angle, &points[..2])).is_err());
     }

@@ -4,7 +4,7 @@
 use super::outcome;
 use super::shapes::Ellipse;
 use crate::scene::picker::Picker;
-use crate::scene::planes::{Tile, Tiling};
+use crate::scene::planes::{Plane, Tile, Tiling};
 use crate::scene::{MeasureKind, Measurement, Scene};
 use glam::DVec3;
 
@@ -52,14 +52,17 @@ pub fn drawn(scene: &Scene, volume: Option<u32>, all: &[Measurement]) -> Vec<Dra
             let is_curved = tile.section.is_some();
             let fits = |kind| matches!(kind, MeasureKind::Surface | MeasureKind::Text | MeasureKind::Arrow);
             let drawn = drawn.filter(|(_, measured)| !is_curved || fits(measured.kind));
-            found.extend(drawn.filter_map(|(index, measured)| of(scene, index, measured, area, |p| view.project(p))));
+            let plane = Some(&tile.plane);
+            let of = |(index, measured)| of(scene, index, measured, area, plane, |p| view.project(p));
+            found.extend(drawn.filter_map(of));
         }
     }
     if !scene.is_flat() {
         let picker = Picker::of(scene);
         let drawn = all.iter().enumerate().filter(|(_, measured)| measured.on_surface);
         let area = [picker.corner(), picker.size()];
-        found.extend(drawn.filter_map(|(index, measured)| of(scene, index, measured, area, |p| picker.project(p))));
+        let of = |(index, measured)| of(scene, index, measured, area, None, |p| picker.project(p));
+        found.extend(drawn.filter_map(of));
     }
     for drawn in &mut found {
         if let Some(other) = all[drawn.index].other_volume(volume) {
@@ -151,12 +154,30 @@ impl OnTile<'_> {
     }
 }
 
-/// A measurement with a projection; none if a point that it needs is not shown there.
+/// The outline, in order, of the section of a box with a plane; empty if they do not meet. `corners`: the lowest and the highest.
+fn section([low, high]: [DVec3; 2], plane: &Plane) -> Vec<DVec3> {
+    let corner = |n: usize| DVec3::from([0, 1, 2].map(|a| if n >> a & 1 == 1 { high[a] } else { low[a] }));
+    let crossing = |(from, to): (DVec3, DVec3)| {
+        let [a, b] = [from, to].map(|end| (end - plane.at).dot(plane.normal));
+        ((a < 0.0) != (b < 0.0)).then(|| from.lerp(to, a / (a - b)))
+    };
+    let edges =
+        (0..8).flat_map(|n| (0..3).filter(move |a| n >> a & 1 == 0).map(move |a| (corner(n), corner(n | 1 << a))));
+    let mut points: Vec<DVec3> = edges.filter_map(crossing).collect();
+    let middle = points.iter().sum::<DVec3>() / points.len().max(1) as f64;
+    let (x, y) = plane.normal.any_orthonormal_pair();
+    let angle = |p: &DVec3| (*p - middle).dot(y).atan2((*p - middle).dot(x));
+    points.sort_by(|a, b| angle(a).total_cmp(&angle(b)));
+    points
+}
+
+/// A measurement with a projection; none if a point that it needs is not shown there. `plane`: what is drawn on, None for a rendering.
 fn of(
     scene: &Scene,
     index: usize,
     measured: &Measurement,
     tile: [[f64; 2]; 2],
+    plane: Option<&Plane>,
     project: impl Fn(DVec3) -> Option<[f64; 2]>,
 ) -> Option<Drawn> {
     let path = |points: &[[f64; 3]]| -> Option<Vec<[f64; 2]>> {
@@ -169,8 +190,12 @@ fn of(
     let mut head = None;
     let mut points = Vec::new();
     let lines = match measured.kind {
-        // A box is not in a plane.
-        MeasureKind::Threshold => return None,
+        MeasureKind::Threshold => {
+            let [a, b] = measured.points[..] else { return None };
+            let [a, b] = [a, b].map(|point| scene.place_of(point));
+            let outline = section([a.min(b), a.max(b)], plane?);
+            vec![closed(outline.into_iter().map(&project).collect::<Option<Vec<_>>>()?)]
+        }
         MeasureKind::Volume => {
             let shown: Vec<_> = measured.contours.iter().filter_map(|contour| path(contour)).map(closed).collect();
             if shown.is_empty() {

@@ -162,7 +162,7 @@ impl Block {
             text: measured.text.clone(),
             quantities: quantities.unwrap_or_default(),
             method: fault.or_else(|| method(measured)),
-            interval: is_volume.then(|| NO_INTERVAL.into()),
+            interval: is_volume.then(|| measured.interval.map_or(NO_INTERVAL.into(), interval)),
             volume: self.volume,
             time: made.time.or(time),
             plane: or(made.plane, &plane),
@@ -176,6 +176,11 @@ impl Block {
             },
         }
     }
+}
+
+/// An interval of a volume, mm^3, in words.
+fn interval([low, high]: [f64; 2]) -> String {
+    format!("95 %: {:.2} to {:.2} cm3", low / 1000.0, high / 1000.0)
 }
 
 /// How the volume of a body was found.
@@ -192,7 +197,10 @@ fn method(measured: &Measurement) -> Option<String> {
         }
         MeasureKind::Threshold => {
             let level = measured.threshold.map_or(String::new(), |share| format!(" {:.0} of 255", share * 255.0));
-            Some(format!("count of the voxels of a box whose echo reaches{level}"))
+            Some(match measured.interval {
+                Some(_) => format!("largest bright body in a box, by the echoes at its surface, where they are{level}"),
+                None => format!("count of the voxels of a box whose echo reaches{level}"),
+            })
         }
         _ => None,
     }

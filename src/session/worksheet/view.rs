@@ -35,13 +35,11 @@ pub(super) fn of(scene: &Scene, index: usize, volume: u32) -> Result<View, Strin
         }
         false => (planes(scene, measured), true),
     };
-    let is_box = measured.kind == MeasureKind::Threshold;
     let candidates = own.then(Vec::new).into_iter().chain(moved).chain([Vec::new()]);
     let mut last = None;
     for set in candidates {
         let view = with(scene, set, index, volume)?;
-        // A box is drawn nowhere: its picture is that of the first plane.
-        if view.is_drawn || (is_box && !view.set.is_empty()) {
+        if view.is_drawn {
             return Ok(view);
         }
         last = Some(view);

@@ -16,18 +16,21 @@ use std::time::Instant;
 const UNLIKE: f64 = 0.5;
 
 impl Console {
-    /// The pictures of the compared volume and of the difference, each None until it is drawn, and whether the compared volume is aligned. None without a
-    /// comparison.
-    pub fn compared(&self) -> Option<([Option<Arc<Picture>>; 2], bool)> {
-        let shown = self.comparison.as_ref()?.shown();
-        Some(([shown.picture.clone(), shown.difference.clone()], shown.is_aligned))
+    /// The pictures of the difference and of the compared volumes, each None until it is drawn; empty without a comparison.
+    pub fn compared(&self) -> Vec<Option<Arc<Picture>>> {
+        self.comparison.as_ref().map_or_else(Vec::new, |comparison| comparison.shown().pictures())
+    }
+
+    /// The length, mm, and the angle, degrees, by which the first compared volume is moved; None if it is where its recording says.
+    pub fn compared_is_moved(&self) -> Option<[f64; 2]> {
+        self.comparison.as_ref()?.shown().others[0].moved
     }
 
     /// Begins a comparison: with the next open recording, or else with the shown volume as it is now. Ends one that is there.
     pub(super) fn toggle_comparison(&mut self) {
         if self.comparison.take().is_none() {
             let (settings, wake) = (self.controls.settings().clone(), self.fixed.wake.clone());
-            let begun = match self.next_recording() {
+            let begun = match self.next_recording(1) {
                 Some(file) => Comparison::with_file(&self.context, &file, &settings, &wake),
                 None => {
                     self.shown_volume().ok_or_else(|| texts::WHY_NOTHING_TO_COMPARE.to_string()).and_then(|volume| {
@@ -47,10 +50,28 @@ impl Console {
         self.resize_picture();
     }
 
-    /// The open recording after the shown one, if there is another.
-    fn next_recording(&self) -> Option<PathBuf> {
-        let (file, is_shown) = self.opening.recording(self.opening.further(1)?)?;
-        (!is_shown && file.exists()).then_some(file)
+    /// Compares with the open recording after those that are compared.
+    pub(super) fn compare_further(&mut self) {
+        let Some(compared) = self.comparison.as_ref().map(|comparison| comparison.shown().others.len()) else {
+            return self.toggle_comparison();
+        };
+        let file = self.next_recording(compared as i32 + 1).ok_or_else(|| texts::WHY_NO_FURTHER.to_string());
+        let added = file.and_then(|file| match &mut self.comparison {
+            Some(comparison) => comparison.add_file(&self.context, &file),
+            None => Ok(()),
+        });
+        match added {
+            Ok(()) => self.resize_picture(),
+            Err(fault) => self.notify(&texts::not_compared(fault), true),
+        }
+    }
+
+    /// The open recording so many places after the shown one; None if there are not so many others.
+    fn next_recording(&self, by: i32) -> Option<PathBuf> {
+        let further = |by| self.opening.recording(self.opening.further(by)?);
+        // The list begins anew with the shown one.
+        let others = (1..=by).map_while(|by| further(by).filter(|(_, is_shown)| !is_shown)).collect::<Vec<_>>();
+        others.into_iter().nth(by as usize - 1).map(|(file, _)| file).filter(|file| file.exists())
     }
 
     fn shown_name(&self) -> String {
@@ -67,7 +88,15 @@ impl Console {
         Some((header, volume))
     }
 
-    /// Moves the compared volume onto the shown one, or back.
+    /// Moves a compared volume as a drag over its picture does.
+    pub(super) fn move_compared(&mut self, n: usize, pixels: [[f64; 2]; 2], turns: bool) {
+        if let Some((comparison, scene)) = self.comparison.as_mut().zip(self.stream.scene()) {
+            comparison.drag(n, pixels, turns, &scene.geometry);
+            self.presentation.redraw();
+        }
+    }
+
+    /// Moves the compared volumes onto the shown one, or back.
     pub(super) fn align_compared(&mut self) {
         let onto = self.shown_volume().map(|(_, volume)| volume);
         self.comparison.iter_mut().for_each(|comparison| comparison.align(onto.clone()));

@@ -9,8 +9,8 @@ use crate::passes::Texels;
 use crate::probe::{Geometry, World};
 use crate::scene::Scene;
 use crate::scene::planes::Tile;
-use crate::segment::bodies::{Body, OPENING, SMOOTHING, Search, find};
-use crate::segment::{Field, Labels, Scale, files, usual_grid};
+use crate::segment::bodies::{Body, Search, find};
+use crate::segment::{Field, Labels, Scale, contours, files, usual_grid};
 use crate::source::OpenOptions;
 use crate::source::convert::Volume;
 use crate::texts;
@@ -107,11 +107,8 @@ impl Console {
     fn place_of_brush(&mut self, pixel: [f64; 2], tile: Option<usize>) -> Result<Option<Place>, String> {
         if let Some(n) = tile {
             let Some(tiling) = self.presentation.shown().map(|shown| shown.scene.tiling()) else { return Ok(None) };
-            let is_on = |tile: &&Tile| {
-                (0..2).all(|a| (0.0..f64::from(tile.size[a])).contains(&(pixel[a] - f64::from(tile.corner[a]))))
-            };
             let place = |tile: &Tile| (tiling.point(tile, pixel), tile.section.is_none().then_some(tile.plane.normal));
-            return Ok(tiling.tiles.get(n).filter(is_on).map(place));
+            return Ok(tiling.tiles.get(n).filter(|tile| tile.has(pixel)).map(place));
         }
         if self.label_work.surface.is_none() {
             self.label_work.surface = Some(self.drawn_surface(texts::LABELS_NEED_SURFACE)?);
@@ -140,22 +137,44 @@ impl Console {
             return self.notify(texts::NO_VOLUME_YET, true);
         };
         let (lattice, label) = (labels.lattice(), labels.chosen);
-        let seed = Some(seed);
-        let search = Search { is_dark, level: None, smoothing: SMOOTHING, opening: OPENING, seed, least: 0.0 };
         self.work_on_labels(texts::GROWING, move || {
-            let grown = grown(&volume, header.range, &search, lattice);
+            let grown = grown(&volume, header.range, is_dark, seed, lattice);
             Box::new(move |console| match grown {
-                Ok((voxels, body)) => {
-                    // A stroke in progress is a step of its own.
-                    console.controls.end_edit_of_labels();
-                    console.controls.edit_labels(|labels| labels.set(&voxels, label));
-                    console.controls.end_edit_of_labels();
-                    console.activity.changes_settings(Instant::now());
-                    console.notify(&texts::grown(&body), false);
+                Ok((voxels, body)) => console.label_voxels(&voxels, label, &texts::grown(&body)),
+                Err(why) => console.notify(&texts::not_grown(why), true),
+            })
+        });
+    }
+
+    /// Labels the body of a volume by contours, by its index in the list of measurements.
+    pub(super) fn fill_labels(&mut self, n: usize) {
+        let (Some(labels), Some(scene)) = (self.controls.labelling(), self.stream.scene()) else { return };
+        let Some(measured) = self.controls.measures().get(n) else { return };
+        let (label, (grid, to_grid)) = (labels.chosen, labels.grid());
+        let place = |point: &[f64; 3]| to_grid.transform_point3(scene.place_of(*point));
+        let contours: Vec<Vec<DVec3>> =
+            measured.contours.iter().map(|contour| contour.iter().map(place).collect()).collect();
+        self.work_on_labels(texts::FILLING, move || {
+            let filled = contours::voxels(&grid, &contours);
+            Box::new(move |console| match filled {
+                Ok(voxels) if voxels.is_empty() => console.notify(&texts::not_grown(texts::WHY_NOTHING_TO_FILL), true),
+                Ok(voxels) => {
+                    let volume = voxels.len() as f64 * grid.spacing.iter().product::<f64>() / 1000.0;
+                    console.label_voxels(&voxels, label, &texts::filled(n + 1, volume));
                 }
                 Err(why) => console.notify(&texts::not_grown(why), true),
             })
         });
+    }
+
+    /// Gives voxels a label, as a step of undo, and says so.
+    fn label_voxels(&mut self, voxels: &[u32], label: u8, says: &str) {
+        // A stroke in progress is a step of its own.
+        self.controls.end_edit_of_labels();
+        self.controls.edit_labels(|labels| labels.set(voxels, label));
+        self.controls.end_edit_of_labels();
+        self.activity.changes_settings(Instant::now());
+        self.notify(says, false);
     }
 
     /// Takes what a thread has made of labels, and lets the picture show edits once it can be drawn anew.
@@ -192,17 +211,18 @@ fn begun(file: Option<&Path>, geometry: &Geometry, world: Option<World>) -> Resu
     Ok(Labelling::new(labels, segments, to_space))
 }
 
-/// The body that a search with a seed finds: the numbers of its voxels on a lattice, and what was measured of it. `range`: the stored values at
-/// both ends of the sample range; `lattice`: number of its voxels, and the map from their index to space, mm.
+/// The body that the usual search with a seed (in space, mm) finds: the numbers of its voxels on a lattice, and what was measured of it. `range`: the
+/// stored values at both ends of the sample range; `lattice`: number of its voxels, and the map from their index to space, mm.
 fn grown(
     volume: &Volume,
     range: [f64; 2],
-    search: &Search,
+    is_dark: bool,
+    seed: DVec3,
     lattice: ([usize; 3], DAffine3),
 ) -> Result<(Vec<u32>, Body), String> {
     let grid = usual_grid(volume.geometry())?;
     let field = Field::of(volume, range, Scale::by_speckle(volume, range), grid, || ())?;
-    let found = find(&field, World::of(&grid), search)?;
+    let found = find(&field, World::of(&grid), &Search::usual(&grid, is_dark, Some(seed)))?;
     let body = found.bodies.into_iter().next().ok_or(texts::WHY_NO_LABELS)?;
     Ok((found.labels.sampled(lattice.0, lattice.1), body))
 }

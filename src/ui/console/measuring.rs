@@ -1,27 +1,26 @@
-//! Measuring in the console: points on the rendered surface, counted voxels, typed texts, and export of results.
+//! Measuring in the console: points on the rendered surface, a measured body, typed texts, and export of results.
 
 use super::Console;
 use super::opening::ListKey;
 use super::surface::SurfaceMap;
+use super::survey::Surveyed;
 use crate::command::{Command, Tool};
+use crate::comparison::volume_of;
 use crate::export::Holds;
 use crate::files;
 use crate::input::{Input, Key};
-use crate::measure::{outcome, voxels};
+use crate::measure::outcome;
 use crate::recordings::Kept;
-use crate::scene::{MeasureKind, Measurement, Mode, Scene, insonified_box};
-use crate::source::Frame;
-use crate::source::convert::Volume;
+use crate::scene::{MeasureKind, Measurement, insonified_box};
+use crate::segment::bodies;
+use crate::segment::volume::Measured;
 use crate::texts;
 use crate::workspace::Origin;
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::time::Instant;
 
 /// The tool with which letters are a text.
 const TEXT: Tool = Tool::Measure(MeasureKind::Text);
-/// Edge of the voxels that are counted, mm.
-const VOXEL: f64 = 0.5;
 
 impl Console {
     /// Sets a point of the selected tool on the rendered surface under a pixel of the picture.
@@ -70,21 +69,21 @@ impl Console {
         Ok(Some(Measurement { kind, points, on_surface: true, ..Measurement::default() }))
     }
 
-    /// Starts to count, on a thread, the voxels of the region whose echo reaches the threshold of the mode.
-    pub(super) fn count_voxels(&mut self) {
-        match self.voxels_to_count() {
-            Ok(count) => match self.survey.count(count) {
-                Ok(()) => self.notify(texts::COUNTING_VOXELS, false),
-                Err(e) => self.notify(&texts::no_voxels_counted(e), true),
+    /// Starts to measure, on a thread, the largest bright body in the region.
+    pub(super) fn measure_body(&mut self) {
+        match self.body_to_measure() {
+            Ok(measure) => match self.survey.measure(measure) {
+                Ok(()) => self.notify(texts::MEASURING_BODY, false),
+                Err(e) => self.notify(&texts::no_body_measured(texts::why_no_thread(e)), true),
             },
             Err(why) => self.notify(why, true),
         }
     }
 
-    /// What counts the voxels of the volume that is shown.
-    fn voxels_to_count(&self) -> Result<impl FnOnce() -> Option<Measurement> + Send + 'static, &'static str> {
-        if self.survey.is_counting() {
-            return Err(texts::STILL_COUNTING_VOXELS);
+    /// What measures the body of the volume that is shown.
+    fn body_to_measure(&self) -> Result<impl FnOnce() -> Surveyed + Send + 'static, &'static str> {
+        if self.survey.is_measuring() {
+            return Err(texts::STILL_MEASURING_BODY);
         }
         let (Some(scene), Some(header)) = (self.stream.scene(), self.stream.header()) else {
             return Err(texts::NO_VOLUME_YET);
@@ -92,32 +91,43 @@ impl Console {
         let volumes = self.stream.cine().volumes();
         let shown = self.stream.cine_position().and_then(|at| volumes.get(at)).or(volumes.back());
         let shown = shown.ok_or(texts::NO_VOLUME_IN_LOOP)?;
-        let (frames, made) = (shown.frames.clone(), Some(self.made_on(shown.volume)));
-        let is_backward = frames.first().is_some_and(|frame| frame.backward);
-        let geometry = if is_backward { header.backward.clone() } else { header.forward.clone() };
-        let (stored, [low, high]) = (header.stored, header.range);
-        let found = self.controls.found_threshold();
-        let threshold = threshold(scene).or(found).ok_or(texts::THRESHOLD_IS_0)?;
+        let (header, frames, made) = (header.clone(), shown.frames.clone(), Some(self.made_on(shown.volume)));
         let (least, most) = insonified_box(&scene.geometry);
         let corners = [scene.low.max(least), scene.high.min(most)];
         let points = corners.map(|corner| scene.point_of(corner)).to_vec();
         Ok(move || {
-            let mut volume = Volume::new(geometry, stored);
-            frames.iter().for_each(|frame: &Arc<Frame>| volume.take((**frame).clone()));
-            let counted = voxels::count(&volume, corners, VOXEL, low + threshold * (high - low))?;
-            let (kind, counted) = (MeasureKind::Threshold, Some(counted.volume));
-            Some(Measurement { kind, points, threshold: Some(threshold), counted, made, ..Measurement::default() })
+            let volume = volume_of(&header, frames.iter().map(AsRef::as_ref));
+            let (body, threshold) = bodies::largest_within(&volume, header.range, corners)?;
+            let Measured { volume, low, high } = body.measured?;
+            let measured = Measurement {
+                kind: MeasureKind::Threshold,
+                points,
+                threshold: Some(threshold),
+                counted: Some(volume),
+                interval: Some([low, high]),
+                made,
+                ..Measurement::default()
+            };
+            Ok((measured, body.is_cut))
         })
     }
 
-    /// Adds the result of counting as a measurement, once it is there.
-    pub(super) fn poll_counting(&mut self) {
-        let Some(counted) = self.survey.poll() else { return };
+    /// Adds the measured body as a measurement, once it is there.
+    pub(super) fn poll_survey(&mut self) {
+        let Some(measured) = self.survey.poll() else { return };
         self.presentation.redraw();
-        match counted.map(|measured| self.controls.add_measure(measured)) {
-            Some(crate::controls::Change::Refused(why)) => self.notify(why, true),
-            Some(_) => self.activity.changes(Instant::now()),
-            None => self.notify(texts::REGION_IS_EMPTY, true),
+        let (measured, is_cut) = match measured {
+            Ok(found) => found,
+            Err(why) => return self.notify(&texts::no_body_measured(why), true),
+        };
+        match self.controls.add_measure(measured) {
+            crate::controls::Change::Refused(why) => self.notify(why, true),
+            _ => {
+                self.activity.changes(Instant::now());
+                if is_cut {
+                    self.notify(texts::BODY_IS_CUT, true);
+                }
+            }
         }
     }
 
@@ -277,15 +287,4 @@ impl Console {
     pub(super) fn shows_list(&self) -> bool {
         self.opening.is_shown() || self.visible.exports || self.presets.is_shown()
     }
-}
-
-/// The threshold of the mode, as a share of the sample range; none if there is none.
-fn threshold(scene: &Scene) -> Option<f64> {
-    let settings = &scene.settings;
-    let (share, [low, high]) = match settings.mode {
-        Mode::Surface => (settings.surface.threshold, settings.surface.window),
-        Mode::Volume | Mode::Mixed => (settings.volume.threshold, settings.volume.window),
-        _ => return None,
-    };
-    (share > 0.0).then(|| (low + share * (high - low)).clamp(0.0, 1.0))
 }

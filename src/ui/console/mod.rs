@@ -311,7 +311,7 @@ impl Console {
     fn room(&self) -> Room {
         let room = Room::of(self.presentation.size(), self.panels.scale(), self.visible.panels);
         let compared = self.comparison.as_ref().filter(|_| self.fixed.overlay);
-        compared.map_or(room, |comparison| room.divided(comparison.shown().view.tiles()))
+        compared.map_or(room, |comparison| room.divided(comparison.shown().tiles()))
     }
 
     /// Sets whether the panels are described to a screen reader.

@@ -56,8 +56,8 @@ impl Controls {
     /// Applies a command about labels. None if the command is about something else.
     pub(super) fn label(&mut self, command: &Command) -> Option<Change> {
         let Command::Labels(of_labels) = *command else { return None };
-        // The caller knows where the planes and the surface are.
-        if matches!(of_labels, LabelCommand::Stroke(..) | LabelCommand::EndStroke) {
+        // The caller knows where the planes and the surface are, and has threads.
+        if matches!(of_labels, LabelCommand::Stroke(..) | LabelCommand::EndStroke | LabelCommand::Fill(_)) {
             return Some(Change::Caller(*command));
         }
         let Some(labelling) = &mut self.labelling else { return Some(Change::Refused(texts::NO_LABELS_YET)) };

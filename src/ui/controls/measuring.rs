@@ -25,11 +25,6 @@ impl Controls {
         self.typing
     }
 
-    /// The threshold between the darker and brighter echoes of the source, as a share of the sample range; None before its first volume.
-    pub(crate) fn found_threshold(&self) -> Option<f64> {
-        self.defaults.as_ref()?.levels.as_ref().map(|levels| levels.threshold)
-    }
-
     /// Sets the volume and plane on which the next point of a measurement is set; `None`: they are not known.
     pub(crate) fn measure_on(&mut self, made: Option<Made>) {
         self.made = made;

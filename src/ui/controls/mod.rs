@@ -317,7 +317,7 @@ impl Controls {
             | Command::SaveAndExit
             | Command::Discard
             | Command::PickSurface(_)
-            | Command::CountVoxels
+            | Command::MeasureBody
             | Command::CopyMeasures
             | Command::SaveMeasures
             | Command::SaveWorkspace
@@ -333,6 +333,8 @@ impl Controls {
             | Command::MoveWipe(_)
             | Command::ToggleLink(_)
             | Command::Align
+            | Command::CompareFurther
+            | Command::MoveCompared(..)
             | Command::Exports
             | Command::Export(_)
             | Command::CancelExport

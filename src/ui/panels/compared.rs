@@ -1,16 +1,16 @@
-//! The compared volume: its picture beside that of the shown one or over it, their difference, and the buttons of the comparison.
+//! The compared volumes: their pictures beside that of the shown one or over it, the difference, and the buttons of the comparison.
 
 use super::colours::{BACKING, MARK, TEXT, UNCOLOURED, WEAK_TEXT};
 use super::names::{self, Tell};
 use super::{PanelState, ROW_HEIGHT, SMALL_TEXT, TOUCH_SIZE, picture_rect};
 use crate::command::Command;
-use crate::compare::{DIFFERENCE, tile_name};
+use crate::compare::{DIFFERENCE, MAX_TILES, tile_name};
 use crate::comparison::{CompareView, Link, Shown};
 use crate::texts;
 use egui::accesskit::Role;
 use egui::{
-    Align2, Area, Button, CursorIcon, FontId, Frame, Id, Margin, Order, Painter, Rect, RichText, Sense, Stroke,
-    TextureId, Ui, WidgetInfo, WidgetType, pos2, vec2,
+    Align2, Area, Button, CursorIcon, FontId, Frame, Id, Margin, Order, Painter, PointerButton, Rect, RichText, Sense,
+    Stroke, TextureId, Ui, WidgetInfo, WidgetType, pos2, vec2,
 };
 
 /// The views with their names and hints.
@@ -33,15 +33,15 @@ fn about(link: Link) -> (&'static str, &'static str) {
 /// Distance of names and buttons from the edges of a tile, points.
 const EDGE: f32 = 10.0;
 
-/// Paints the compared picture and the difference, below everything that is drawn over pictures. `textures`: of both, None while it is not drawn.
+/// Paints the compared pictures and the difference, below everything that is drawn over pictures. `textures`: as [`Shown::pictures`].
 pub(super) fn paint(ui: &Ui, state: &PanelState, textures: &[Option<TextureId>], scale: f32) {
     let Some(shown) = state.compared else { return };
     let painter = ui.painter();
-    let [second, difference] = [0, 1].map(|n| textures.get(n).copied().flatten());
+    let texture = |n: usize| textures.get(n).copied().flatten();
     if shown.view == CompareView::Wipe {
         let (area, share) = (picture_rect(state, scale), shown.wipe as f32);
         let right = area.with_min_x(area.left() + share * area.width());
-        if let Some(texture) = second {
+        if let Some(texture) = texture(1) {
             let part = Rect::from_min_max(pos2(share, 0.0), pos2(1.0, 1.0));
             painter.image(texture, right, part, UNCOLOURED);
         }
@@ -49,14 +49,17 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, textures: &[Option<TextureId>],
         return;
     }
     let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
-    match second {
-        Some(texture) => _ = painter.image(texture, tile(state, 1, scale), whole, UNCOLOURED),
-        None => {
-            let (at, font) = (tile(state, 1, scale).center(), FontId::proportional(SMALL_TEXT));
-            painter.text(at, Align2::CENTER_CENTER, texts::NOT_DRAWN_YET, font, WEAK_TEXT);
+    for n in 1..=shown.visible() {
+        let tile = tile(state, n as u32, scale);
+        match texture(n) {
+            Some(texture) => _ = painter.image(texture, tile, whole, UNCOLOURED),
+            None => {
+                let font = FontId::proportional(SMALL_TEXT);
+                painter.text(tile.center(), Align2::CENTER_CENTER, texts::NOT_DRAWN_YET, font, WEAK_TEXT);
+            }
         }
     }
-    if let Some(texture) = difference.filter(|_| shown.view == CompareView::Difference) {
+    if let Some(texture) = texture(0).filter(|_| shown.view == CompareView::Difference) {
         painter.image(texture, tile(state, 2, scale), whole, UNCOLOURED);
     }
 }
@@ -77,7 +80,15 @@ pub(super) fn show(ui: &Ui, state: &PanelState, scale: f32, execute: &mut dyn Fn
         true => first.with_min_x(first.left() + shown.wipe as f32 * first.width()),
         false => tile(state, 1, scale),
     };
-    name(painter, second, &tile_name('B', &shown.name, shown.is_synthetic), true);
+    for (n, other) in shown.others.iter().take(shown.visible()).enumerate() {
+        let area = if is_wipe { second } else { tile(state, n as u32 + 1, scale) };
+        let mut text = tile_name(char::from(b'B' + n as u8), &other.name, other.is_synthetic);
+        other.moved.iter().for_each(|moved| text += &texts::moved_by(*moved));
+        if !is_wipe {
+            hand(ui, n, area, scale, execute);
+        }
+        name(painter, area, &text, true);
+    }
     name(painter, first, &tile_name('A', &shown.first, false), !is_wipe);
     match shown.view {
         CompareView::Difference => name(painter, tile(state, 2, scale), DIFFERENCE, true),
@@ -98,6 +109,21 @@ fn name(painter: &Painter, tile: Rect, text: &str, is_alone: bool) {
     let painter = painter.with_clip_rect(tile.intersect(painter.clip_rect()));
     painter.rect_filled(Rect::from_min_size(at, galley_size).expand(4.0), 3.0, BACKING);
     painter.galley(at, galley, TEXT);
+}
+
+/// Lets drags over the picture of the n-th compared volume move it: with Shift or the right button they turn it.
+fn hand(ui: &Ui, n: usize, tile: Rect, scale: f32, execute: &mut dyn FnMut(Command)) {
+    let area = Area::new(Id::new((texts::COMPARISON, n))).order(Order::Background).fixed_pos(tile.min).constrain(false);
+    area.show(ui.ctx(), |ui| {
+        let (_, response) = ui.allocate_exact_size(tile.size(), Sense::DRAG);
+        let response = response.on_hover_cursor(CursorIcon::Move);
+        let (Some(to), by) = (response.interact_pointer_pos(), response.drag_delta()) else { return };
+        if response.dragged() && by != egui::Vec2::ZERO {
+            let pixels = [to - by, to].map(|at| [at.x - tile.left(), at.y - tile.top()].map(|n| f64::from(n * scale)));
+            let turns = response.dragged_by(PointerButton::Secondary) || ui.input(|input| input.modifiers.shift);
+            execute(Command::MoveCompared(n, pixels, turns));
+        }
+    });
 }
 
 /// Shows the handle on the line of the wipe, which is at `at` in an area.
@@ -151,14 +177,15 @@ fn buttons(ui: &Ui, shown: &Shown, over: Rect, execute: &mut dyn FnMut(Command))
                     let (name, hint) = about(link);
                     button(ui, name, (name, hint), is_on, Command::ToggleLink(link));
                 }
-                let align = if shown.is_aligning { texts::ALIGNING } else { texts::ALIGN };
-                button(
-                    ui,
-                    align,
-                    (texts::ALIGN, texts::ALIGN_HINT),
-                    shown.is_aligned || shown.is_aligning,
-                    Command::Align,
-                );
+                let visible = &shown.others[..shown.visible()];
+                let is_aligning = visible.iter().any(|other| other.is_aligning);
+                let is_on = is_aligning || visible.iter().all(|other| other.is_aligned);
+                let align = if is_aligning { texts::ALIGNING } else { texts::ALIGN };
+                button(ui, align, (texts::ALIGN, texts::ALIGN_HINT), is_on, Command::Align);
+                if shown.others.len() + 1 < MAX_TILES {
+                    let about = (texts::ADD_COMPARED, texts::ADD_COMPARED_HINT);
+                    button(ui, texts::ADD_COMPARED, about, false, Command::CompareFurther);
+                }
                 button(ui, texts::CLOSE, (texts::END_COMPARISON, texts::END_COMPARISON_HINT), false, Command::Compare);
             });
         });

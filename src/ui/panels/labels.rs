@@ -5,6 +5,7 @@ use super::names::{self, Tell};
 use super::widgets::{row_of, switch};
 use super::{PanelState, ROW_HEIGHT, TEXT_SIZE, tools};
 use crate::command::{Command, Effect, LabelCommand, Tool};
+use crate::scene::MeasureKind;
 use crate::texts;
 use egui::{Align2, Button, FontId, Rect, RichText, Stroke, StrokeKind, Ui, vec2};
 
@@ -51,6 +52,13 @@ pub(super) fn show(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dy
         }
         if ui.add_sized(size, Button::new(texts::ADD_LABEL)).tell(texts::ADD_LABEL_HINT).clicked() {
             execute(Command::Labels(LabelCommand::Add));
+        }
+        for (n, measured) in state.controls.measures().iter().enumerate() {
+            let name = texts::label_measured(n + 1);
+            let has_contours = measured.kind == MeasureKind::Volume;
+            if has_contours && ui.add_sized(size, Button::new(&name)).tell(texts::LABEL_MEASURED_HINT).clicked() {
+                execute(Command::Labels(LabelCommand::Fill(n)));
+            }
         }
     });
 }

@@ -22,7 +22,7 @@ const MEASURING: [(MeasureKind, &str); 7] = [
     (MeasureKind::Ellipse, texts::ELLIPSE),
     (MeasureKind::Trace, texts::TRACE),
     (MeasureKind::Volume, texts::CONTOURS),
-    (MeasureKind::Threshold, texts::VOLUME_BY_THRESHOLD),
+    (MeasureKind::Threshold, texts::AUTOMATIC_VOLUME),
 ];
 const MARKING: [(MeasureKind, &str); 2] = [(MeasureKind::Text, texts::TEXT), (MeasureKind::Arrow, texts::ARROW)];
 
@@ -71,7 +71,7 @@ fn kind_button(
     execute: &mut dyn FnMut(Command),
 ) {
     let (command, is_on) = match kind {
-        MeasureKind::Threshold => (Command::CountVoxels, false),
+        MeasureKind::Threshold => (Command::MeasureBody, false),
         kind => (Command::Tool(Tool::Measure(kind)), state.controls.tool() == Tool::Measure(kind)),
     };
     let button = Button::selectable(is_on, name).frame_when_inactive(true).min_size(size);
@@ -115,7 +115,7 @@ fn results(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(
             let main = found.first().map_or(String::new(), Quantity::shown);
             let name = match (measured.kind, measured.text.is_empty()) {
                 (_, false) => &measured.text,
-                (MeasureKind::Threshold, true) => texts::VOLUME_BY_THRESHOLD,
+                (MeasureKind::Threshold, true) => texts::AUTOMATIC_VOLUME,
                 (_, true) => measured.title(),
             };
             let typing = if state.controls.typing() == Some(n) { "_" } else { "" };

@@ -235,8 +235,7 @@ impl Panels {
         self.gets_focus &= self.has_pending_input();
         let pictures = |tiles: &[PresetTile]| tiles.iter().map(|tile| tile.picture.clone()).collect::<Vec<_>>();
         let listed = state.presets.as_ref().map_or(Vec::new(), |shown| pictures(&shown.tiles));
-        let compared =
-            state.compared.map(|shown| [shown.picture.clone(), shown.difference.clone()]).unwrap_or_default();
+        let compared = state.compared.map(Shown::pictures).unwrap_or_default();
         let [looks, thumbnails, of_loop, compared] =
             self.thumbnails.of(&self.context, [&pictures(&state.looks), &listed, state.loop_pictures, &compared]);
         // egui may lay out twice, to place what it sees for the first time: the inputs are in the first.
@@ -550,8 +549,10 @@ pub fn picture_area(size: [u32; 2], scale: f32, shows_panels: bool) -> ([u32; 2]
 pub(super) struct Room {
     /// Upper left corner and size of the picture, pixels of the window; of the first tile if there are several.
     pub(super) picture: ([u32; 2], [u32; 2]),
-    /// Distance from a tile to the next, pixels; 0 if there is only one.
+    /// Distance from a tile to the next of its row and of its column, pixels; 0 if there is only one.
     to_next: [u32; 2],
+    /// Tiles in a row.
+    columns: u32,
     /// True if there is a bar at the top.
     pub(super) has_top: bool,
     /// True if the inspector is a drawer over the picture, because there is no room beside it.
@@ -568,6 +569,7 @@ impl Room {
         Room {
             picture: picture_area(size, scale, shows_panels),
             to_next: [0; 2],
+            columns: 1,
             has_top: above > 0.0,
             has_drawer: right == 0.0 && below > 0.0,
             has_tools_tab: below > 0.0 && (left == 0.0 || !rail::has_all(points[1] - above - below)),
@@ -576,7 +578,7 @@ impl Room {
 }
 
 impl Room {
-    /// This room with its picture divided into up to three tiles in a row or a column.
+    /// This room with its picture divided into up to four tiles.
     pub(super) fn divided(self, tiles: usize) -> Room {
         if tiles < 2 {
             return self;
@@ -584,16 +586,14 @@ impl Room {
         let (corner, whole) = self.picture;
         let size = compare::tile_size(tiles, whole);
         let [columns, _] = compare::grid(tiles, whole);
-        let axis = usize::from(columns == 1);
-        let mut to_next = [0; 2];
-        to_next[axis] = size[axis] + compare::GAP;
-        Room { picture: (corner, size), to_next, ..self }
+        Room { picture: (corner, size), to_next: size.map(|edge| edge + compare::GAP), columns, ..self }
     }
 
     /// Upper left corner and size of a tile, pixels of the window; 0 is the picture.
     pub(super) fn tile(&self, n: u32) -> ([u32; 2], [u32; 2]) {
         let (corner, size) = self.picture;
-        ([0, 1].map(|a| corner[a] + n * self.to_next[a]), size)
+        let at = [n % self.columns, n / self.columns];
+        ([0, 1].map(|a| corner[a] + at[a] * self.to_next[a]), size)
     }
 }
 

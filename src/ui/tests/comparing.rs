@@ -17,12 +17,13 @@ fn compared(view: CompareView, size: [u32; 2]) -> Shown {
         wipe: 0.25,
         links: [true, false, true, false],
         first: "before.mha".into(),
-        name: "after.mha".into(),
-        is_synthetic: true,
-        picture: picture(),
+        others: vec![comparison::Other {
+            name: "after.mha".into(),
+            is_synthetic: true,
+            picture: picture(),
+            ..comparison::Other::default()
+        }],
         difference: picture(),
-        is_aligned: false,
-        is_aligning: false,
     });
     shown.settle();
     shown
@@ -42,6 +43,7 @@ fn every_button_of_a_comparison_gives_its_command() {
             (texts::LINK_LOOK, Command::ToggleLink(Link::Look)),
             (texts::LINK_VOLUME, Command::ToggleLink(Link::Volume)),
             (texts::ALIGN, Command::Align),
+            (texts::ADD_COMPARED, Command::CompareFurther),
             (texts::END_COMPARISON, Command::Compare),
         ] {
             let node = shown.find(texts::COMPARISON, Role::Button, name);
@@ -86,4 +88,51 @@ fn the_line_of_the_wipe_follows_the_pointer() {
         _ => None,
     });
     assert!(moved.is_some_and(|share| (share - 0.6).abs() < 0.01), "{commands:?}");
+}
+
+/// Four tiles are a square whose last tile ends where the room does; there is no button for a fifth.
+#[test]
+fn four_tiles_are_a_square() {
+    let mut shown = compared(CompareView::Tiles, [1600, 900]);
+    let others = shown.compared.as_mut().map(|shown| &mut shown.others).expect("a comparison");
+    others.extend([others[0].clone(), others[0].clone()]);
+    shown.settle();
+    shown.check("four tiles");
+    let (room, whole) = (shown.room(), crate::panels::picture_area([1600, 900], 1.0, true));
+    assert_eq!((room.tile(1).0[1], room.tile(2).0[0]), (whole.0[1], whole.0[0]), "rows of two");
+    for axis in 0..2 {
+        let (end, of_room) = (room.tile(3).0[axis] + room.tile(3).1[axis], whole.0[axis] + whole.1[axis]);
+        assert!(end <= of_room && of_room - end < 2, "{axis}");
+    }
+    assert!(shown.all(texts::COMPARISON, Role::Button, texts::ADD_COMPARED).is_empty());
+}
+
+/// A drag over B moves it, with Shift it turns, in pixels of its picture.
+#[test]
+fn a_drag_over_the_compared_picture_moves_its_volume() {
+    for turns in [false, true] {
+        let mut shown = compared(CompareView::Tiles, [1600, 900]);
+        let (corner, size) = shown.room().tile(1);
+        let at = |x: f64, y: f64| [0, 1].map(|a| f64::from(corner[a]) + [x, y][a] * f64::from(size[a]));
+        if turns {
+            shown.panels.input(&Input::Modifiers(Modifiers { shift: true, ..Modifiers::default() }));
+        }
+        shown.panels.input(&Input::Moved(at(0.4, 0.5)));
+        shown.lay_out();
+        shown.panels.input(&Input::Button { button: Button::Left, pressed: true });
+        shown.lay_out();
+        let mut ends: Vec<[[f64; 2]; 2]> = Vec::new();
+        for x in [0.5, 0.6] {
+            shown.panels.input(&Input::Moved(at(x, 0.5)));
+            for command in shown.lay_out() {
+                let Command::MoveCompared(0, pixels, turned) = command else { panic!("{command:?}") };
+                assert_eq!(turned, turns);
+                ends.push(pixels);
+            }
+        }
+        let [from, to] = [ends[0][0], ends[ends.len() - 1][1]];
+        let expected = [0.4, 0.6].map(|share| [share * f64::from(size[0]), 0.5 * f64::from(size[1])]);
+        let off = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
+        assert!(off(from, expected[0]) < 1.0 && off(to, expected[1]) < 1.0, "{from:?} {to:?}, not {expected:?}");
+    }
 }

@@ -21,11 +21,14 @@ impl Shown {
 
     /// The control of this role and name in the group of this name.
     pub(super) fn find(&self, group: &str, role: Role, name: &str) -> NodeId {
-        let all = self.groups();
-        let found: Vec<_> =
-            all.get(group).into_iter().flatten().filter(|id| is_named(&self.tree[id], role, name)).collect();
+        let found = self.all(group, role, name);
         assert_eq!(found.len(), 1, "{role:?} {name:?} in {group:?}: {:?}", self.names(group));
-        *found[0]
+        found[0]
+    }
+
+    /// The nodes of a group with this role and name.
+    pub(super) fn all(&self, group: &str, role: Role, name: &str) -> Vec<NodeId> {
+        self.groups().remove(group).into_iter().flatten().filter(|id| is_named(&self.tree[id], role, name)).collect()
     }
 
     fn names(&self, group: &str) -> Vec<String> {
@@ -194,7 +197,7 @@ fn the_tools_and_the_controls_in_front_are_found_by_role_and_name() {
     let advanced = &shown.tree[&shown.find("Look", Role::Button, "Advanced: Filters")];
     assert_eq!(advanced.is_expanded(), Some(false));
     shown.tab(InspectorTab::Measure);
-    for name in ["Caliper", "Tape", "Angle", "Ellipse", "Trace", "Contours", "Threshold volume"] {
+    for name in ["Caliper", "Tape", "Angle", "Ellipse", "Trace", "Contours", "Automatic volume"] {
         shown.find("Measure", Role::Button, name);
     }
     shown.tab(InspectorTab::Marks);

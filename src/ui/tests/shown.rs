@@ -172,7 +172,7 @@ impl Shown {
 
     pub(super) fn room(&self) -> Room {
         let room = Room::of(self.size, self.panels.scale(), self.visible.panels);
-        self.compared.as_ref().map_or(room, |shown| room.divided(shown.view.tiles()))
+        self.compared.as_ref().map_or(room, |shown| room.divided(shown.tiles()))
     }
 
     /// Lays the panels out, applies their commands, and returns these.

@@ -4,15 +4,16 @@ use std::fmt::Display;
 
 pub(crate) const COMPARISON: &str = "Comparison";
 pub(crate) const COMPARED_TILES: &str = "Tiles";
-pub(crate) const COMPARED_TILES_HINT: &str = "Both pictures beside each other.";
+pub(crate) const COMPARED_TILES_HINT: &str = "All pictures beside each other.";
 pub(crate) const COMPARED_DIFFERENCE: &str = "Difference";
 pub(crate) const COMPARED_DIFFERENCE_HINT: &str =
     "Also their difference in brightness: orange where A is brighter, blue where B is, in levels of 255.";
 pub(crate) const COMPARED_WIPE: &str = "Wipe";
 pub(crate) const COMPARED_WIPE_HINT: &str = "One picture over the other: drag the line between them.";
-pub(crate) const FIND_TILES: &str = "Compare: both pictures beside each other";
+pub(crate) const FIND_TILES: &str = "Compare: all pictures beside each other";
 pub(crate) const FIND_DIFFERENCE: &str = "Compare: show the difference";
 pub(crate) const FIND_WIPE: &str = "Compare: wipe from one picture to the other";
+pub(crate) const FIND_FURTHER: &str = "Compare: add the next open recording";
 pub(crate) const FIND_ALIGN: &str = "Compare: align both volumes";
 pub(crate) const FIND_LINK_LOOK: &str = "Compare: link windows, filters and light";
 pub(crate) const WIPE_LINE: &str = "Line of the wipe";
@@ -29,12 +30,20 @@ pub(crate) const LINK_LOOK_HINT: &str =
 pub(crate) const LINK_VOLUME: &str = "Loop";
 pub(crate) const LINK_VOLUME_HINT: &str = "B shows the volume at the same position in its loop as A.";
 pub(crate) const ALIGN: &str = "Align";
-pub(crate) const ALIGN_HINT: &str =
-    "Moves B rigidly onto A, by least squares of the echoes; again: leaves it where it is.";
+pub(crate) const ALIGN_HINT: &str = "Moves B rigidly onto A, by least squares of the echoes; again: leaves it where it is. A drag over B moves it by hand, with Shift or the right button it turns.";
 pub(crate) const ALIGNING: &str = "Aligning";
+pub(crate) const ADD_COMPARED: &str = "Add";
+pub(crate) const ADD_COMPARED_HINT: &str = "The next open recording beside the others: up to four tiles.";
+pub(crate) const WHY_NO_FURTHER: &str = "no further recording is open";
+pub(crate) fn why_no_more_tiles(most: usize) -> String {
+    format!("there are {most} tiles, which is as many as there can be")
+}
+pub(crate) fn moved_by([shift, angle]: [f64; 2]) -> String {
+    format!(" \u{b7} moved {shift:.1} mm, {angle:.1}°")
+}
 pub(crate) const END_COMPARISON: &str = "End the comparison";
 pub(crate) const END_COMPARISON_HINT: &str = "Shows A alone (P).";
-pub(crate) const NOT_DRAWN_YET: &str = "B is not drawn yet";
+pub(crate) const NOT_DRAWN_YET: &str = "Not drawn yet";
 pub(crate) const WHY_NOTHING_TO_COMPARE: &str = "there is no whole volume yet";
 pub(crate) fn compared_as_it_was(name: impl Display) -> String {
     format!("{name}, as it was")

@@ -79,7 +79,9 @@ pub(crate) fn of_measure(kind: MeasureKind) -> &'static str {
         MeasureKind::Volume => {
             "Volume in cm³: trace the outline, step or turn the plane, trace again; Enter ends it. (W)"
         }
-        MeasureKind::Threshold => "Volume of all echoes in the region from the threshold on, in cm³. (K)",
+        MeasureKind::Threshold => {
+            "Volume of the largest bright body in the region, in cm³, with its interval of 95 %. (K)"
+        }
         MeasureKind::Text => "Text: click its place and type, or type it at the pointer; Enter ends it. (I)",
         MeasureKind::Arrow => "Arrow: click what it points to, then its other end, then type. (Y)",
     }

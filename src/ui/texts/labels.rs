@@ -25,6 +25,16 @@ pub(crate) const CHOOSE_LABEL_HINT: &str =
     "Click: this label is painted. Its volume is that of its voxels; growing also says what the echoes measure.";
 pub(crate) const ADD_LABEL: &str = "Add a label";
 pub(crate) const ADD_LABEL_HINT: &str = "The new label is then painted.";
+pub(crate) fn label_measured(number: usize) -> String {
+    format!("Label volume {number}")
+}
+pub(crate) const LABEL_MEASURED_HINT: &str =
+    "The body between the contours of this measurement gets the label. Beyond the outermost contours it is closed.";
+pub(crate) const FILLING: &str = "Filling the body between the contours";
+pub(crate) const WHY_NOTHING_TO_FILL: &str = "the contours lie beside the labels";
+pub(crate) fn filled(number: usize, cm3: f64) -> String {
+    format!("Volume {number} is labelled: {} in voxels", volume_of_label(cm3))
+}
 pub(crate) const NO_LABELS_YET: &str = "The labels are being prepared: wait a moment";
 pub(crate) const TOO_MANY_LABELS: &str = "There are 255 labels, which is as many as a voxel can tell apart.";
 pub(crate) const LABELS_NEED_SURFACE: &str =

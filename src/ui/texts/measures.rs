@@ -9,7 +9,7 @@ pub(crate) const ELLIPSE: &str = "Ellipse";
 pub const TRACE: &str = "Trace";
 pub(crate) const TAPE: &str = "Tape";
 pub(crate) const CONTOURS: &str = "Contours";
-pub(crate) const VOLUME_BY_THRESHOLD: &str = "Threshold volume";
+pub(crate) const AUTOMATIC_VOLUME: &str = "Automatic volume";
 pub const TEXT: &str = "Text";
 pub(crate) const ARROW: &str = "Arrow";
 pub(crate) const MEASUREMENTS: &str = "Measurements";
@@ -52,15 +52,15 @@ pub(crate) const POINT_NEEDS_SURFACE: &str = "Points on a rendering need its sur
 pub(crate) const NO_PICTURE_TO_USE: &str = "There is no picture yet";
 pub(crate) const NO_SURFACE_HERE: &str = "There is no surface at this place";
 pub(crate) const FIRST_END_BEHIND_CAMERA: &str = "The first end is behind the camera: turn the view back";
-pub(crate) const COUNTING_VOXELS: &str = "Counting the voxels of the region";
-pub(crate) fn no_voxels_counted(e: impl Display) -> String {
-    format!("No voxels are counted: {e}")
+pub(crate) const MEASURING_BODY: &str = "Measuring the largest bright body in the region";
+pub(crate) fn no_body_measured(why: impl Display) -> String {
+    format!("No body is measured: {why}")
 }
-pub(crate) const STILL_COUNTING_VOXELS: &str = "Voxels are being counted: wait a moment";
+pub(crate) const STILL_MEASURING_BODY: &str = "A body is being measured: wait a moment";
+pub(crate) const BODY_IS_CUT: &str =
+    "The measured body reaches the border of the region or of the echoes: a part of it may be missing";
 pub(crate) const NO_VOLUME_YET: &str = "There is no volume yet";
 pub(crate) const NO_VOLUME_IN_LOOP: &str = "No volume is in the cine loop: --cine keeps some";
-pub(crate) const THRESHOLD_IS_0: &str = "The threshold is 0: choose Surface or Volume and raise it";
-pub(crate) const REGION_IS_EMPTY: &str = "The voxels cannot be counted: the region is empty";
 pub(crate) const NO_MEASUREMENTS_YET: &str = "There are no measurements yet";
 pub(crate) const RESULTS_COPIED: &str = "The results are copied as CSV";
 pub(crate) fn no_clipboard(fault: impl Display) -> String {

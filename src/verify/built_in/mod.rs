@@ -279,7 +279,7 @@ pub fn uneven(mut probe: Probe) -> Probe {
     probe
 }
 
-/// A linear array that is moved sideways.
+/// A linear array that is moved in elevation, so that its frames are parallel.
 pub fn linear() -> Probe {
     Probe {
         array: Array::Linear,

@@ -2,8 +2,8 @@
 
 use super::*;
 use echolume::low_level::probe::{Geometry, Grid};
-use echolume::low_level::scene::SharedLabels;
 use echolume::low_level::scene::picker::Picker;
+use echolume::low_level::scene::{MeasureKind, SharedLabels};
 use echolume::low_level::segment::{Labels, files};
 use echolume::low_level::source::recorder::Header;
 use echolume::low_level::source::{OpenOptions, StoredType};
@@ -43,7 +43,7 @@ fn ball() -> Vec<Frame> {
 
 impl Desk {
     /// A desk that shows the ball, by planes and as a surface.
-    fn of_ball(device: &Arc<Context>, folder: &Folder, labels: Option<(PathBuf, SharedLabels)>) -> Desk {
+    pub(super) fn of_ball(device: &Arc<Context>, folder: &Folder, labels: Option<(PathBuf, SharedLabels)>) -> Desk {
         let (file, shown) = labels.unzip();
         let mut settings =
             settings("mode = 'sr'\nlayout = 'four'\nsurface.threshold = 0.4\nplanes.position = [2, 23, -2]");
@@ -105,6 +105,24 @@ impl Desk {
 
     fn labels(&mut self, command: LabelCommand) {
         self.console.execute(&Command::Labels(command), Instant::now());
+    }
+
+    /// Measures the volume of the ball by contours on five planes.
+    fn measure_by_contours(&mut self) {
+        let now = Instant::now();
+        self.console.execute(&Command::Tool(Tool::Measure(MeasureKind::Volume)), now);
+        for z in [-9.0, -5.0, 0.0, 5.0, 9.0f64] {
+            let radius = (RADIUS * RADIUS - z * z).sqrt();
+            for step in 0..60 {
+                let (sin, cos) = (PI * f64::from(step) / 30.0).sin_cos();
+                let place = CENTRE + DVec3::new(radius * cos, radius * sin, z);
+                let point = self.console.stream().scene().expect("a scene").point_of(place);
+                self.console.execute(&Command::Point(point, false), now);
+            }
+            self.console.execute(&Command::EndMeasure, now);
+        }
+        self.console.execute(&Command::EndMeasure, now);
+        self.console.execute(&Command::Tool(Tool::Labels), now);
     }
 
     /// True if the user is asked whether to save before the program ends.
@@ -187,6 +205,14 @@ fn labels_are_painted_undone_grown_and_saved() {
     let place = read(beside).2;
     assert!(place.distance(front) < 1.0, "{place}, not {front}");
     desk.held(CONTROL, Key::Char('z'));
+    // The body between contours, and beyond the last ones.
+    desk.measure_by_contours();
+    desk.labels(LabelCommand::Fill(0));
+    desk.until("filled body", |desk| (desk.labelled() > 0.0).then_some(()));
+    let filled = desk.labelled();
+    assert!((filled / VOLUME - 1.0).abs() < 0.01, "{filled} of {VOLUME}");
+    desk.held(CONTROL, Key::Char('z'));
+    assert_eq!(desk.labelled(), 0.0);
     // All of the ball.
     desk.labels(LabelCommand::Effect(Effect::GrowBright));
     let inside = desk.on_tile(2, CENTRE + DVec3::new(4.0, 0.0, 3.0));

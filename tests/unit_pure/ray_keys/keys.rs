@@ -465,6 +465,12 @@ const ROWS: &[Row] = &[
     ("measure.text", Nothing, "", &["measure=[{kind='text',points=[[0,20,0]],text='here'}]"]),
     ("measure.threshold", Nothing, "", &["measure=[{kind='threshold',points=[[0,20,0],[5,22,1]],threshold=0.4}]"]),
     ("measure.counted", Nothing, "", &["measure=[{kind='threshold',points=[[0,20,0],[5,22,1]],counted=4.0}]"]),
+    (
+        "measure.interval",
+        Nothing,
+        "",
+        &["measure=[{kind='threshold',points=[[0,20,0],[5,22,1]],counted=4.0,interval=[3.5,4.5]}]"],
+    ),
     ("measure.made.volume", Nothing, "", &["measure=[{kind='distance',points=[[0,20,0],[5,22,1]],made={volume=3}}]"]),
     (
         "measure.made.time",

@@ -21,7 +21,7 @@ pub struct BodyMark {
     pub mirrored: bool,
     /// Its centre, as shares of the picture's width and height from the upper left corner. The whole mark stays on the picture.
     pub at: [f64; 2],
-    /// Its edge, as a share of the picture's shorter edge.
+    /// The edge of its square, as a share of the picture's shorter edge.
     pub size: f64,
     /// Where on the body the probe is: right and down from the centre of the mark; its edges are at -1 and 1.
     pub probe: [f64; 2],

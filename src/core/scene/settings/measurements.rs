@@ -25,7 +25,7 @@ pub struct Measurement {
     /// What is measured.
     pub kind: MeasureKind,
     /// Its points in mm: lateral, depth (from the probe's face), elevation. A distance and an arrow (tip first) have 2, an angle has 3 (its vertex is
-    /// the second), an ellipse has 3 (the ends of one axis and one of the other), a text has 1, a threshold volume has 2 corners of its box; a
+    /// the second), an ellipse has 3 (the ends of one axis and one of the other), a text has 1, an automatic volume has 2 corners of its box; a
     /// trace and a distance on the surface have 2 to 512.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub points: Vec<[f64; 3]>,
@@ -35,12 +35,16 @@ pub struct Measurement {
     /// Text beside it, at most 80 characters.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub text: String,
-    /// Of a threshold volume: the echo from which on a voxel counts, as a share of the sample range.
+    /// Of an automatic volume: the echo at the surface of the body, as a share of the sample range.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub threshold: Option<f64>,
-    /// Of a threshold volume: what was counted, mm^3. It belongs to the volume that was shown then.
+    /// Of an automatic volume: what was found, mm^3. It belongs to the volume that was shown then.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub counted: Option<f64>,
+    /// Of an automatic volume: both ends of its interval of 95 %, mm^3. Absent: it is a count of all voxels of the box whose echo reaches the threshold, as
+    /// former versions made it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub interval: Option<[f64; 2]>,
     /// Its points were picked on the rendered surface: it is drawn on renderings. Others are drawn on the planes that they lie in.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub on_surface: bool,
@@ -83,7 +87,7 @@ pub enum MeasureKind {
     Surface,
     /// Volume by contours: area times distance, or turned about an axis.
     Volume,
-    /// Volume of the voxels of a box whose echo reaches a threshold.
+    /// Automatic volume: of the largest body in a box that is brighter than what is around it.
     Threshold,
     /// A text at a point.
     Text,
@@ -111,6 +115,7 @@ impl Measurement {
     pub fn title(&self) -> &'static str {
         match (self.kind, self.on_surface) {
             (MeasureKind::Surface, false) => "Along a line",
+            (MeasureKind::Threshold, _) if self.interval.is_none() => "Threshold volume",
             (kind, _) => kind.title(),
         }
     }
@@ -139,7 +144,7 @@ impl MeasureKind {
             MeasureKind::Trace => "Trace",
             MeasureKind::Surface => "Surface",
             MeasureKind::Volume => "Volume",
-            MeasureKind::Threshold => "Threshold volume",
+            MeasureKind::Threshold => "Automatic volume",
             MeasureKind::Text => "Text",
             MeasureKind::Arrow => "Arrow",
         }
@@ -162,4 +167,5 @@ pub(super) const NUMBERS: &[Number] = &[
     number!(measure => threshold, "", SHARE),
     number!(measure => made => time, "s", Range(-1e15, 1e15)),
     number!(measure => counted, "mm^3", Range(0.0, 1e18)),
+    number!(measure => interval, "mm^3", Range(0.0, 1e18)),
 ];

@@ -224,15 +224,15 @@ pub struct Samples {
 }
 
 /// Region of interest: the box that is rendered, mm. Lateral counts from the middle, depth from the probe's face, elevation from the
-/// middle frame; a Cartesian volume uses its own axes. Absent: the whole volume.
+/// middle frame; a Cartesian volume uses its own axes. Where bounds are absent, the volume is whole along their axis.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Region {
-    /// Lateral bounds, mm.
+    /// Lower and upper lateral bound, mm.
     pub lateral: Option<[f64; 2]>,
-    /// Depth bounds, mm.
+    /// Lower and upper depth bound, mm.
     pub depth: Option<[f64; 2]>,
-    /// Elevation bounds, mm.
+    /// Lower and upper elevation bound, mm.
     pub elevation: Option<[f64; 2]>,
     /// Curved render start: 3 to 5 points [lateral, depth] of a line, mm, lateral ascending, by a hundred-thousandth of the line's width at least.
     /// What is nearer to the probe than the line is not rendered, at any elevation. The line is a monotone cubic: smooth, and between two points

@@ -357,7 +357,8 @@ pub struct Smooth {
     pub depth: f64,
     /// Standard deviation along elevation, slices.
     pub elevation: f64,
-    /// Standard deviation along elevation in mm at the middle of the region, in place of `elevation`: it follows the slice pitch. At most 32 slices.
+    /// Standard deviation along elevation in mm at the middle of the region, in place of `elevation`: it follows the slice pitch. It is limited to 32
+    /// slices.
     pub elevation_mm: Option<f64>,
     /// Taps along each axis, in place of the deviations above: a Gaussian in pixels, pixels and slices with the deviation
     /// sqrt(n - 1) / 2 of the binomial of n taps, cut off there.

@@ -14,8 +14,8 @@ use serde::{Deserialize, Serialize};
 pub struct Distance {
     /// Window size of the median filter, pixels of the distance map; odd, 0 for none.
     pub median: u32,
-    /// Window size of the median filter in mm at the middle of the region, in place of `median`: the nearest odd number of pixels, at most 63; less
-    /// than two are no filter.
+    /// Window size of the median filter in mm at the middle of the region, in place of `median`: the nearest odd number of pixels. It is limited to 63
+    /// pixels; below two pixels there is no filter.
     pub median_mm: Option<f64>,
     /// Bilateral filter.
     pub bilateral: Option<Bilateral>,
@@ -61,7 +61,8 @@ pub struct Bilateral {
     /// Standard deviation in the picture, pixels.
     #[serde(default)]
     pub pixels: f64,
-    /// Standard deviation in the picture in mm at the middle of the region, in place of `pixels`: at most 10 pixels; less than a tenth is no filter.
+    /// Standard deviation in the picture in mm at the middle of the region, in place of `pixels`. It is limited to 10 pixels; below a tenth of a pixel
+    /// there is no filter.
     #[serde(default)]
     pub mm: Option<f64>,
     /// Standard deviation of the distance, mm.
@@ -91,11 +92,11 @@ pub struct Light {
     pub follows: Follows,
     /// Position of a near (point) light, mm from the camera's target. Absent: the light is distant.
     pub position: Option<DVec3>,
-    /// Ambient coefficient of Blinn-Phong shading.
+    /// Ambient coefficient of Blinn-Phong shading; it may exceed 1.
     pub ambient: f64,
-    /// Diffuse coefficient.
+    /// Diffuse coefficient of Blinn-Phong shading; it may exceed 1.
     pub diffuse: f64,
-    /// Specular coefficient.
+    /// Specular coefficient of Blinn-Phong shading; it may exceed 1.
     pub specular: f64,
     /// Specular exponent.
     pub shininess: f64,
@@ -197,7 +198,7 @@ pub struct LightVolume {
 }
 
 /// A backdrop that is bright in the middle of the picture, a little above it, and falls off to its edges. Colours are linear light, like those of the
-/// transfer function.
+/// transfer function, and may exceed 1.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Ground {

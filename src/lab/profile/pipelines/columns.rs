@@ -44,7 +44,7 @@ pub struct Columns {
     /// Values that did not fit into registers, in the driver's unit.
     pub spills: Option<f64>,
     pub instructions: Option<f64>,
-    /// Shared memory of a workgroup, bytes.
+    /// Shared memory of a workgroup, bytes; of several executables the largest.
     pub shared: Option<f64>,
     /// Number of invocations in a subgroup. If the driver chooses it by the number of registers, a smaller number is a loss of occupancy.
     pub subgroup: Option<u32>,

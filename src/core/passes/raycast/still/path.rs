@@ -39,7 +39,7 @@ impl<'a> Medium<'a> {
         Medium { scene, volume, table, bricks, majorant, lights: scene.still_lights() }
     }
 
-    /// Albedo and extinction at a place in space, mm. Both are 0 outside the insonified region.
+    /// Albedo of red, green and blue, and extinction (1/mm), at a place in space, mm. All are 0 outside the insonified region.
     pub fn at(&self, place: DVec3) -> Matter {
         let Some(texel) = ray::texel(self.scene, place) else { return ([0.0; 3], 0.0) };
         let [low, high] = self.scene.volume_view().window;
