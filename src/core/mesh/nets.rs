@@ -263,16 +263,29 @@ pub(super) mod tests {
         }
     }
 
+    /// The 4,096 pairs lie apart in one lattice of 16 x 16 x 16 blocks.
     #[test]
     fn every_pair_of_cells_makes_a_closed_manifold() {
         for axis in 0..3 {
             let size = [0, 1, 2].map(|n| if n == axis { 3 } else { 2 });
-            for bits in 0..1u32 << 12 {
-                let at = |v: DVec3| (v.x as usize) + size[0] * (v.y as usize + size[1] * v.z as usize);
-                let mesh = net(size, 0.5, true, 1.0, |v| f64::from(bits >> at(v) & 1));
-                closed_manifold(&mesh);
-                assert!(mesh.open_edges == 0 && (bits == 0) == mesh.triangles.is_empty());
-            }
+            // The block that a place is in, and the voxel of it.
+            let block = |v: DVec3| {
+                let at = v.to_array().map(|i| (i + 0.75) as usize);
+                let [x, y, z] = [0, 1, 2].map(|n| (at[n] / (size[n] + 2), at[n] % (size[n] + 2)));
+                (x.0 + 16 * (y.0 + 16 * z.0), [x.1, y.1, z.1])
+            };
+            let value = |v: DVec3| {
+                let (bits, [x, y, z]) = block(v);
+                let is_within = x < size[0] && y < size[1] && z < size[2];
+                f64::from(u8::from(is_within && bits >> (x + size[0] * (y + size[1] * z)) & 1 == 1))
+            };
+            let mesh = net(size.map(|n| 16 * (n + 2)), 0.5, true, 1.0, value);
+            closed_manifold(&mesh);
+            assert_eq!(mesh.open_edges, 0);
+            let mut blocks = vec![0; 4096];
+            mesh.vertices.iter().for_each(|v| blocks[block(v.max(DVec3::ZERO)).0] += 1);
+            // Six at least: a voxel alone is an octahedron or more.
+            assert!(blocks.iter().enumerate().all(|(bits, vertices)| (bits > 0) == (*vertices >= 6)), "{blocks:?}");
         }
     }
 
