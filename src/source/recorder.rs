@@ -24,6 +24,7 @@ use super::frame::{POSE_BYTES, Source, read_pose, stored_pose};
 use crate::Frame;
 use crate::files::progress::CountedFile;
 use crate::files::{InputError, private, progress};
+use crate::frame::check_volume;
 use crate::probe::{Geometry, World};
 use crate::{SampleType, StoredType};
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
@@ -449,7 +450,8 @@ impl Source for Reader {
     }
 
     fn skip_to_volume(&mut self, volume: usize) -> Result<(), InputError> {
-        self.next = self.volumes.get(volume).copied().unwrap_or(self.index.len());
+        check_volume(&self.path, volume, self.volumes.len())?;
+        self.next = self.volumes[volume];
         Ok(())
     }
 

@@ -13,15 +13,25 @@ use echolume::low_level::verify::report::{Level, Verdict};
 use echolume::low_level::verify::{self, DeviceUnderTest, ExtraTolerance};
 use std::collections::HashSet;
 
-/// The pass checks of `echolume verify --full`: every input in every scene.
+/// The pass checks of `echolume verify`.
 #[test]
 fn every_pass_matches_its_reference() {
+    passes_match(Level::Quick);
+}
+
+/// The pass checks of `echolume verify --full`: every input in every scene.
+#[test]
+fn every_pass_matches_its_reference_with_every_input() {
+    passes_match(Level::Full);
+}
+
+fn passes_match(level: Level) {
     let device = Device::new();
     println!("device: {}", device.describe());
     let options =
         ContextOptions { device: chosen(), validation: true, specialize: Some(true), ..ContextOptions::default() };
-    let mut bench = DeviceUnderTest::new(&options, Level::Full).expect("bench");
-    let checks = verify::each_pass::checks(Level::Full);
+    let mut bench = DeviceUnderTest::new(&options, level).expect("bench");
+    let checks = verify::each_pass::checks(level);
     assert_eq!(checks.len(), PASSES.len());
     let mut group = None;
     let outcomes: Vec<_> = checks.iter().map(|check| check.run_after(&mut group, &mut bench)).collect();

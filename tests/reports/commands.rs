@@ -96,9 +96,25 @@ fn a_profile_is_written_compared_with_itself_and_refused_where_it_cannot_be() {
     refused(&[&["profile"], &SMALL[..], &["--json", "/no/such/folder/a.json"]].concat(), 1, &["/no/such/folder"]);
 }
 
-/// `--against` runs another program, and a folder of shaders: one that works a hundred times as long is found.
+/// How a comparison in turn is asked for.
+const IN_TURN: [&str; 4] = ["--repeat", "10", "--warm-up", "1"];
+
+/// Of the same program nothing is called slower, whatever the noise of this machine lets be said.
 #[test]
-fn what_is_measured_in_turn_is_another_program_or_a_folder_of_shaders() {
+fn the_same_program_measured_in_turn_is_not_slower() {
+    let _alone = alone();
+    let folder = Folder::new("same");
+    let json = folder.path("compared.json");
+    let ask = [&["profile"], &SMALL[..], &IN_TURN].concat();
+    let (code, out, err) = run(&[&ask[..], &["--against", PROGRAM, "--threshold", "3", "--json", &json]].concat());
+    assert!(matches!(code, Some(0 | 5)), "{out}{err}");
+    let compared: serde_json::Value = serde_json::from_str(&fs::read_to_string(&json).expect("json")).expect("json");
+    assert_eq!(compared["format"], "echolume-comparison-2");
+}
+
+/// `--against` runs a folder of shaders: one that works a hundred times as long is found.
+#[test]
+fn a_slow_shader_measured_in_turn_is_found_and_what_cannot_be_run_refused() {
     let _alone = alone();
     let folder = Folder::new("against");
     copy_tree(&repository("glsl"), &folder.join("slow"));
@@ -107,19 +123,12 @@ fn what_is_measured_in_turn_is_another_program_or_a_folder_of_shaders() {
     let slow = "void main() {\n    float spent = 0.5;\n    for (int n = 0; n < 3000; n++) spent = sin(spent + 0.1);\n    if (spent == 7.0) return;\n";
     assert!(text.contains("void main() {\n"), "the shader has another form: {text}");
     fs::write(&shader, text.replace("void main() {\n", slow)).expect("written");
-    let ask = [&["profile"], &SMALL[..], &["--repeat", "10", "--warm-up", "1"]].concat();
+    let ask = [&["profile"], &SMALL[..], &IN_TURN].concat();
     let (code, out, err) = run(&[&ask[..], &["--against", &folder.path("slow"), "--threshold", "3"]].concat());
     assert_eq!(code, Some(1), "{out}{err}");
     assert_eq!(err.lines().last(), Some("echolume: slower by more than the threshold: light"), "{out}{err}");
     assert!(out.contains("compared: CPU time of each pass") || !cfg!(target_os = "linux"), "{out}");
     assert!(out.contains("Wilcoxon's signed ranks"), "{out}");
-    // The same program: whatever the noise of this machine lets be said, it is no regression.
-    let json = folder.path("compared.json");
-    let (code, out, err) = run(&[&ask[..], &["--against", PROGRAM, "--threshold", "3", "--json", &json]].concat());
-    assert!(matches!(code, Some(0 | 5)), "{out}{err}");
-    let compared: serde_json::Value = serde_json::from_str(&fs::read_to_string(&json).expect("json")).expect("json");
-    assert_eq!(compared["format"], "echolume-comparison-2");
-
     refused(&[&ask[..], &["--against", &folder.path("none")]].concat(), 2, &["against/none", "No such file"]);
     refused(&[&ask[..], &["--against", "no such device"]].concat(), 3, &["no such device"]);
     refused(&[&ask[..], &["--against", BONE]].concat(), 2, &["bone.mha"]);

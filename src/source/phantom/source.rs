@@ -2,10 +2,11 @@
 
 use super::Phantom;
 use crate::files::InputError;
-use crate::frame::{Frame, Source};
+use crate::frame::{Frame, Source, check_volume};
 use crate::probe::Geometry;
 use crate::probe::StoredType;
 use std::collections::BTreeMap;
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 
@@ -85,6 +86,7 @@ impl Source for PhantomSource {
     }
 
     fn skip_to_volume(&mut self, volume: usize) -> Result<(), InputError> {
+        check_volume(Path::new("phantom"), volume, self.phantom.volumes())?;
         self.next = (volume, 0);
         Ok(())
     }

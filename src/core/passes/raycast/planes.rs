@@ -53,7 +53,7 @@ pub(crate) const TONED: Pass = Pass {
     constants: |s, _| [constants(s), postprocess::tone_constants(s)].concat(),
     tolerance: Tolerance::absolute(2.01 / 255.0).outliers(4e-3).because(
         "a value half-way between two levels may be stored as either, after an error of 1e-3 that contrast multiplies; \
-         samples at               the very border as without toning",
+         samples at the very border as without toning",
     ),
     reference: |scene, _, reads, writes| {
         let volume = reads.get("volume");
