@@ -30,7 +30,7 @@ fn rank(record: &Record) -> (bool, bool, &str) {
     (record.status == Status::Done, record.agreement.is_none(), &record.date)
 }
 
-/// The results of all shards, reduced to one for each unit.
+/// The results of all shards of a batch, reduced to one for each unit: a recording and what is done with it.
 #[derive(Default)]
 pub struct Merged<'a> {
     /// The result of each unit, by its input and work: the last success, where drawing it again for a comparison counts only if there is no other;

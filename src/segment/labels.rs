@@ -25,7 +25,7 @@ pub enum Shape {
 /// A stroke of a brush: a ball or disc whose centre moves along a straight line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Brush {
-    /// Where the centre starts, and in `to` where it ends, mm, in the coordinates of the grid.
+    /// Where the centre starts, and in `to` where it ends, mm, in the coordinates of the grid of [`Labels`].
     pub from: DVec3,
     pub to: DVec3,
     /// Radius of the ball or disc, mm.

@@ -12,7 +12,7 @@ const MAX_NODES: u32 = 200_000;
 /// What is read of a configuration file of the PLUS toolkit.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct PlusConfig {
-    /// The constant transforms of `CoordinateDefinitions`.
+    /// The constant transforms in the file's element `CoordinateDefinitions`.
     pub fixed: Vec<Calibration>,
     /// Name of the pictures' coordinate frame in `VolumeReconstructor`; `reference` is that of the volume. None if not stated.
     pub image: Option<String>,

@@ -108,7 +108,8 @@ impl Poses {
         }
     }
 
-    /// A row for users: by which transforms the pictures are tracked, and how to make a volume of them. None if they are not tracked.
+    /// A row of the description of a recording, title and text: by which transforms the pictures are tracked, and how to make a volume of them. None if
+    /// they are not tracked.
     pub fn remark(&self) -> Option<(String, String)> {
         let is_there = !self.by_name.is_empty();
         is_there.then(|| ("tracking".into(), format!("{}; for a freehand volume {HOW}", self.names())))

@@ -118,7 +118,8 @@ pub enum Command {
     Labels(LabelCommand),
     /// Removes all cuts.
     ClearCuts,
-    /// Sets a point of the line of a curved plane: the plane that it is drawn on, and the coordinates there, mm.
+    /// Appends a point to the line of a curved plane that is being drawn, or begins a line: the plane that it is drawn on, and the coordinates there, mm, as
+    /// in `planes.curve.points`.
     CurvePoint(PlaneName, [f64; 2]),
     /// Ends the line of a curved plane, and shows the section along it.
     EndCurve,

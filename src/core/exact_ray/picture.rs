@@ -11,7 +11,7 @@ use crate::passes::{Arrays, MISS, Texels, is_hit};
 use crate::scene::{Mode, Scene, SurfaceColour, View};
 use rayon::prelude::*;
 
-/// Largest difference that the 7-point and the 15-point rule may have on one piece of a ray; light is 0..1.
+/// A piece of a ray is halved until the 7-point Gauss rule and the 15-point Gauss-Kronrod rule differ by at most this on it; light is 0..1.
 pub const TOLERANCE: f64 = 1e-12;
 
 /// The cost of the exact rays of a picture, and their estimated error.

@@ -663,7 +663,8 @@ impl Slot {
         self.descriptor().crosses_queues
     }
 
-    /// True if the CPU makes or finds the slot's content and the content differs between these two scenes.
+    /// True if the CPU computes the slot's content, from the scene or by a search in the volume, and it differs between these two scenes. False for content
+    /// that passes or frames write.
     pub fn differs(self, old: &Scene, new: &Scene) -> bool {
         match (self.initializer(), self.descriptor().differs) {
             (Initializer::ByScene(make), ByContent) => make(old) != make(new),

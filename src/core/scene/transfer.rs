@@ -22,7 +22,7 @@ pub fn absorption(opacity: f64) -> f64 {
 /// though they interpolate between different values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Absorption {
-    /// Absorption where the opacity is 1, 1/mm; elsewhere in proportion to the opacity. None: opacities are those of one reference length.
+    /// Absorption where the opacity is 1, 1/mm; elsewhere in proportion to the opacity. None: opacities are those of one `reference_length`.
     pub extinction: Option<f64>,
     /// Reference length, mm.
     pub reference_length: f64,

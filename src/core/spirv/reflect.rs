@@ -137,7 +137,7 @@ struct Declarations {
 /// Reads the interface of a module.
 ///
 /// # Errors
-/// The module is invalid, or declares something that no pass uses.
+/// The module is invalid, or has a kind of binding, texel format or parameter that passes do not have.
 pub fn reflect(words: &[u32]) -> Result<Module, SpirvError> {
     let declared = scan(words)?;
     let mut module = Module { local_size: declared.local_size, ..Module::default() };

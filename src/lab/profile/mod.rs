@@ -121,7 +121,7 @@ pub struct PassProfile {
     pub invocations: Option<u64>,
 }
 
-/// The highest rate, per second, that the device reached in a micro-benchmark.
+/// The rate, per second, of a micro-benchmark, over its repeats. The rates of passes are compared with its median.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Ceiling {

@@ -17,7 +17,7 @@ pub(super) const PERIOD: Duration = Duration::from_millis(5);
 /// Most attempts of a repeatable request.
 const MAX_TRIES: usize = 3;
 
-/// Settings of the serial port. The default of TMCL modules is 9600 baud, no parity, one stop bit.
+/// Settings of the serial port. [`PortSettings::new`] has the default of TMCL modules (9600 baud, no parity, one stop bit) and a time-out of 500 ms.
 #[derive(Clone, Debug)]
 pub struct PortSettings {
     /// Name of the serial port, for example `/dev/ttyUSB0` or `COM3`.

@@ -105,9 +105,9 @@ impl Sweep {
         }
     }
 
-    /// Brings the volume up to date if its [`Schedule`] says that it is to be emitted. None if it is not, or without new pictures. Otherwise true
-    /// if a slice changed. A volume that was not placed yet is placed first, and what is refused then is passed to `refuse`. `at_once`: emit now,
-    /// because no more pictures follow.
+    /// Brings the volume up to date if its [`Schedule`] says that it is to be emitted, or `at_once`, because no more pictures follow. None if neither holds, or
+    /// without new pictures. Otherwise true if a slice changed. A volume that was not placed yet is placed around the first pictures. `refuse` is then
+    /// called for each of these that is not, or not wholly, in it, or once with [`Refusal::Volume`] if it cannot be placed.
     pub fn update(&mut self, at_once: bool, mut refuse: impl FnMut(Refusal)) -> Option<bool> {
         let waited = self.since?.elapsed();
         let is_placed = self.is_placed();

@@ -71,7 +71,7 @@ use crate::workspace::Origin;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// What an update of the console asks of the event loop.
+/// What [`Console::update`] asks of the event loop.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LoopRequest {
     /// Time of the next update if no event comes before; `None`: an event is awaited.
@@ -82,7 +82,7 @@ pub struct LoopRequest {
     pub restart: bool,
 }
 
-/// Why a console needs help from outside to continue.
+/// Why a [`Console`] cannot continue until its caller replaces the device or the screen.
 #[derive(Debug, thiserror::Error)]
 pub enum ConsoleError {
     /// The device is lost; [`Console::revive`] continues on another one.

@@ -477,7 +477,12 @@ impl SettingsPage<'_> {
                     let of = type_words(&key.of, types);
                     let mut about = if key.doc.is_empty() { type_summary(&key.of, types) } else { key.doc.clone() };
                     let row = numbers().find(|number| number.key == below.join("."));
-                    if let Some(allowed) = row.map(Number::allowed).filter(|allowed| !allowed.is_empty()) {
+                    // Not twice.
+                    let is_stated = |allowed: &str| {
+                        let range = allowed.split(' ').next().unwrap_or_default();
+                        about.split([' ', ',', ';']).any(|word| word.trim_end_matches('.') == range)
+                    };
+                    if let Some(allowed) = row.map(Number::allowed).filter(|allowed| !is_stated(allowed)) {
                         about += &format!(" Allowed: {allowed}.");
                     }
                     writeln!(self.text, "| `{}` | {of} | {} | {} |", key.name, cell(&value), cell(&about))
@@ -542,8 +547,10 @@ fn generated_settings_page_is_what_the_types_say() {
                 Lengths are in mm, angles in degrees, samples and opacities in 0..1 unless a key says otherwise. Settings come in layers: \
                 the\ndefaults below, presets, the scene file, flags, `--set`; each overrides the one before. `none` switches off what an \
                 earlier layer set\n(`--set light.shadow=none`). An unknown key is refused. A scene file may state its version,\n`version = 1`; a later one is \
-                refused. The presets are at the [end](#presets).\n\nWithout a preset, mode, \
-                windows, ramp and filters that nothing sets follow from the recording: `--explain` says which.\n\n\
+                refused. The presets are at the [end](#presets).\n\nWithout a preset, the recording \
+                determines the mode, grey windows, transfer function, light and filters that nothing sets, in place of the defaults below: \
+                `--explain` says which.\n\nThe thesis, whose sections, equations, figures and tables are named by their numbers, is that of the \
+                [glossary](architecture.md#glossary).\n\n\
                 ## Top level\n\n";
     let text = page.text.trim_end();
     hold("docs/settings.md", &format!("{head}{text}\n\n## Presets\n\nWhat `--preset NAME` sets.\n{presets}"));

@@ -18,8 +18,8 @@ pub struct Survey {
     pub insonified: usize,
     /// Smallest and largest of these samples, 0..1 before the grey window. None if there are none.
     pub values: Option<[f64; 2]>,
-    /// Modes surface and mixed: the largest difference of the means of two neighbouring stretches of a ray, each as long as `surface.edge` (longer on
-    /// rays of more than 1024 steps), after the grey window and with the sign of `surface.sign`. 0 in other modes.
+    /// Modes surface and mixed: the largest difference, on any surveyed ray, of the means of two neighbouring stretches of the ray. Each is as long as
+    /// `surface.edge` (longer on rays of more than 1024 steps); after the grey window and with the sign of `surface.sign`. 0 in other modes.
     pub edge: f64,
 }
 

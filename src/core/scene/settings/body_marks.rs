@@ -19,13 +19,14 @@ pub struct BodyMark {
     /// Left and right are exchanged: the left breast, a fetus whose back is on the other side.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub mirrored: bool,
-    /// Its centre, as shares of the picture's width and height from the upper left corner. The whole mark stays on the picture.
+    /// Its centre, as shares of the picture's width and height from the upper left corner. The whole mark stays on the picture. Absent: 0.12, 0.8.
     pub at: [f64; 2],
-    /// The edge of its square, as a share of the picture's shorter edge.
+    /// The edge of its square, as a share of the picture's shorter edge, 0.06..=0.5. Absent: 0.18.
     pub size: f64,
-    /// Where on the body the probe is: right and down from the centre of the mark; its edges are at -1 and 1.
+    /// Where on the body the probe is: right and down from the centre of the mark; its edges are at -1 and 1. Absent: the centre.
     pub probe: [f64; 2],
-    /// Where the marker of the probe points, degrees clockwise from up. The body is seen from the front: -90 is its right side.
+    /// Where the marker of the probe points, degrees clockwise from up. -90 is the right side of a body that is seen from the front, and the left side of the
+    /// head, which is seen from above. Absent: -90.
     pub angle: f64,
 }
 

@@ -12,7 +12,7 @@ pub struct Cine {
     pub first: Option<u32>,
     /// The last volume that is played. Absent: the last one.
     pub last: Option<u32>,
-    /// How fast the viewer plays it, as a multiple of the speed of the acquisition.
+    /// How fast the viewer plays it, as a multiple of the speed of the acquisition, 0.1..=8.
     pub speed: f64,
     /// The loop is played to its last volume and back, also in a film. Otherwise it begins again after the last volume.
     pub back_and_forth: bool,

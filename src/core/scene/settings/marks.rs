@@ -3,11 +3,11 @@
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-/// Marks beside and on the picture. The viewer shows the sides on every tile; `render` draws them only with `bar`.
+/// Marks beside and on the picture. The viewer shows the sides and the dot of the probe's marker on every tile; `render` draws them only with `bar`.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Marks {
-    /// The scan line at which the marker on the probe's housing is. A dot shows its side on every tile.
+    /// The scan line at which the marker on the probe's housing is. A dot on each tile shows its side.
     pub probe: ProbeMarker,
     /// The patient's sides from the first scan line (-lateral) to the last (+lateral). Two axes determine the third: sides that fit only a mirrored
     /// patient are refused.
@@ -16,7 +16,7 @@ pub struct Marks {
     pub depth: Sides,
     /// The patient's sides from the first slice (-elevation) to the last (+elevation).
     pub elevation: Sides,
-    /// `render` draws the sides on the tiles, and a bar below the picture: scale, depth, mode, time and "not a medical device". The picture becomes
+    /// `render` draws the sides and the dot on the tiles, and a bar below the picture: scale, depth, mode, time and "not a medical device". The picture becomes
     /// higher by the bar. The viewer has a switch of its own for saved pictures.
     pub bar: bool,
 }

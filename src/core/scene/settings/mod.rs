@@ -264,9 +264,9 @@ pub struct Clip {
 pub struct Cap {
     /// Show the echoes of cut faces.
     pub enabled: bool,
-    /// The echo from which on there is tissue, before any grey window: a mean over the length of an edge (`surface.edge`). Absent: what is
-    /// rendered as solid, from the surface's threshold on, or from the echo on from which all are opaque. Less fills darker tissue too, such as the brain
-    /// within a skull.
+    /// The echo from which on there is tissue, before any grey window: a mean over the length of an edge (`surface.edge`). Absent: of surfaces the echo at
+    /// `surface.threshold` within `surface.window`, of volume rendering the least echo from which on all are opaque. A lower level fills darker tissue, too,
+    /// such as the brain within a skull.
     pub level: Option<f64>,
 }
 

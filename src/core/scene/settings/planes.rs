@@ -29,7 +29,7 @@ pub struct Planes {
     pub thickness: f64,
     /// How the samples through the slab are combined.
     pub slab: Slab,
-    /// Zoom factor; 1 fits the region into a tile.
+    /// Zoom factor, 0.001..=1000; 1 fits the region into a tile.
     pub zoom: f64,
     /// The plane of mode plane and of tomography.
     pub plane: PlaneName,
@@ -47,7 +47,7 @@ pub struct Planes {
     /// thin grey lines between tiles.
     pub lines: bool,
     /// Layouts four and beside: Gaussian of a volume of their own that the planes are cut from. It is filtered by nothing else and has all of the
-    /// sector: region, clip planes and filters of the rendering are the rendering's. Absent: the planes are cut from what is rendered. It takes a
+    /// sector: region, clip planes and filters of the rendering do not apply to it. Absent: the planes are cut from what is rendered. It takes a
     /// second volume's memory, and scan conversion and this Gaussian once more for each frame.
     pub smooth: Option<Smooth>,
     /// A curved plane: the section along a line that is drawn on one of the planes, perpendicular to that plane, straightened. Mode orthogonal shows it in

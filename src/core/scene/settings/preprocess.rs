@@ -17,7 +17,7 @@ pub struct Conditioning {
     pub dynamic_range: Option<f64>,
     /// Dynamic range that 0..1 stands for in samples that are compressed already, dB. Scales the effect of a gain.
     pub compressed_range: f64,
-    /// Standard deviation of the Gaussian low pass along each line, samples; 0 for none. Absent: half the decimation factor if
+    /// Standard deviation of the Gaussian low pass along each line, 0..=32 samples; 0 for none. Absent: half the decimation factor if
     /// lines are decimated, else none.
     pub low_pass: Option<f64>,
     /// Standard deviation of the low pass in mm along the line, in place of `low_pass`; at most 32 samples.
@@ -87,7 +87,7 @@ pub struct Slices {
     pub median: bool,
     /// A local estimator, applied as a filter. Absent: none.
     pub estimator: Option<Estimator>,
-    /// Edge constant k of a Perona-Malik estimator, in sample values of 0..1: differences above it are preserved.
+    /// Edge constant k of a Perona-Malik estimator, at least 0, in sample values of 0..1: differences above it are preserved.
     pub estimator_edge: f64,
     /// Sigma filter.
     pub sigma: Option<Sigma>,
@@ -106,8 +106,8 @@ pub struct Slices {
     /// shown planes cross. The picture is the same; a region that grows or a plane that moves then needs no new frames. The viewer sets it
     /// while planes are shown.
     pub everything: bool,
-    /// The volume is rendered many times before it changes, which makes precomputed data worth its cost. The picture is the same except
-    /// for the last digit of its samples.
+    /// The volume is rendered many times before it changes, which makes precomputed data worth its cost. The picture is the same, except that samples
+    /// interpolated from `quads` may differ in their last digit.
     pub still: bool,
 }
 
@@ -215,7 +215,7 @@ pub struct EnhancedSigma {
     pub noise: Noise,
     /// Estimator of the centre. Absent: Perona-Malik in modes of planes, the median in all others (thesis 5.7).
     pub centre: Option<Estimator>,
-    /// Edge constant k of a Perona-Malik centre: differences above it are preserved. In 0..1 on slices and on the brightness of pictures, in
+    /// Edge constant k of a Perona-Malik centre, at least 0: differences above it are preserved. In 0..1 on slices and on the brightness of pictures, in
     /// millimetres on distances, also if the noise is multiplicative.
     pub edge: f64,
     /// Records by how many rings each pixel's window grew (thesis Tables 7-9). Slices only.
@@ -326,9 +326,9 @@ pub enum Scheme {
     /// Additive operator splitting (Weickert, ter Haar Romeny and Viergever 1998): semi-implicit, stable at any step, inaccurate at large ones; two
     /// or four dispatches per step, on a CPU four.
     Aos,
-    /// AOS with Richardson's extrapolation: twice the result of two half steps, less that of one step. Second order in the limit of short steps; on
-    /// smooth data 1.1 at steps of 4 to 1.7 at steps of 1/4. Stable, but values may leave the range of their neighbours. Slices only; six or twelve
-    /// dispatches per step, on a CPU twelve.
+    /// AOS with Richardson's extrapolation: twice the result of two half steps, less that of one step. Second order in the limit of short steps; the order
+    /// measured on smooth data is 1.1 at steps of 4 and 1.7 at steps of 1/4. Stable, but values may leave the range of their neighbours. Slices only; six or
+    /// twelve dispatches per step, on a CPU twelve.
     AosRichardson,
     /// Runge-Kutta-Legendre super time steps of first order (RKL1; Meyer, Balsara and Aslam 2014): explicit stages, as many as the step needs
     /// to be stable, about sqrt(8 step). Slices only; a dispatch per stage.
@@ -336,7 +336,7 @@ pub enum Scheme {
 }
 
 /// Conductance as a function of the difference g of two neighbours: the two of Perona and Malik (1990, section V), which the thesis takes
-/// over (5.4.2). What each favours is the paper's word.
+/// over (5.4.2). The paper says what each of them favours.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Conductance {
@@ -360,8 +360,8 @@ pub struct Smooth {
     /// Standard deviation along elevation in mm at the middle of the region, in place of `elevation`: it follows the slice pitch. It is limited to 32
     /// slices.
     pub elevation_mm: Option<f64>,
-    /// Taps along each axis, in place of the deviations above: a Gaussian in pixels, pixels and slices with the deviation
-    /// sqrt(n - 1) / 2 of the binomial of n taps, cut off there.
+    /// Taps along each axis, in place of the deviations above: n taps of a Gaussian with the standard deviation of their binomial, sqrt(n - 1) / 2 pixels
+    /// within slices and as many slices across them.
     pub kernel: Option<u32>,
 }
 

@@ -16,7 +16,7 @@ pub struct Camera {
     pub elevation: f64,
     /// Clockwise rotation of the picture, deg.
     pub roll: f64,
-    /// Zoom factor; 1 fits the region into the picture.
+    /// Zoom factor, 0.001..=1000; 1 fits the region into the picture.
     pub zoom: f64,
     /// Vertical field of view, deg; 0 is parallel projection.
     pub field_of_view: f64,
@@ -62,18 +62,18 @@ pub struct Ray {
     /// others. The picture is that of all rays within a level. In mode volume without first-hit shading and without cut faces; other pictures have all
     /// rays.
     pub adaptive: bool,
-    /// Largest error of a pixel that its rays and their steps may leave, in levels of 8 bits of the finished picture; 0 takes the same steps in all pixels. A ray
-    /// through every other pixel of every other row begins with `step`, at most a slice pixel, and takes shorter steps, down to a 32nd, where steps of twice the length differ by
-    /// more. The pixels between are means of these rays where the picture bends little from ray to ray, and have rays of their own elsewhere. Light is
-    /// integrated between samples whatever `volume.compositing` says. The error is an estimate; pixels whose rays meet only empty bricks have none. In
-    /// mode volume without first-hit shading.
+    /// Largest error of a pixel that its rays and their steps may leave, 0.01..=64 levels of 8 bits of the finished picture; 0 takes the same steps in all
+    /// pixels. A ray through every other pixel of every other row begins with `step`, at most a slice pixel. It takes shorter steps, down to a 32nd of that,
+    /// where its light differs by more than the tolerance from that of steps of twice the length. The pixels between are means of these rays where the
+    /// picture bends little from ray to ray, and have rays of their own elsewhere. Light is integrated between samples whatever `volume.compositing` says.
+    /// The error is an estimate; only of pixels whose rays meet nothing but empty bricks it is known to be 0. In mode volume without first-hit shading.
     pub tolerance: f64,
     /// Brick size of empty-space skipping, texels; 0 takes every sample. Rays skip bricks that cannot change the picture, so
-    /// that it stays the same bit for bit. Absent: 8; a CPU skips only where one picture of a volume saves more time than the ranges of
-    /// the bricks take, or with `slices.still`.
+    /// that it stays the same bit for bit. Absent: 8; a CPU skips only where this saves more time in one picture of a volume than computing
+    /// the ranges of the bricks takes, or with `slices.still`.
     pub brick: Option<u32>,
-    /// Pixels from ray to ray along each axis: 2 casts one ray for four pixels. The picture is enlarged, along the edges of surfaces, for a view
-    /// that moves. The filters of the distance map cover the same part of the picture with fewer rays per axis. Above 1 `rays` must be 1.
+    /// Pixels from ray to ray along each axis, for a view that moves: 2 casts one ray for four pixels. The pixels between are interpolated, but not across
+    /// the edges of surfaces. Windows of filters of the distance map have fewer rays, so that they cover the same part of the picture. Above 1 `rays` must be 1.
     pub subsampling: u32,
 }
 
@@ -151,7 +151,7 @@ pub enum Elevation {
     /// variance stays. Takes twice the loads, or four fetches of the device's filter instead of one.
     Bspline,
     /// Like `bspline`, of slices that were sharpened across elevation by (-1, 8, -1)/6, so that it nearly meets their values. The kernel
-    /// needs the next slice, so that the last one of a live sweep is one late. Not with smoothing across slices.
+    /// needs the next slice, so that the last slice of a live sweep is shown one frame late. Not with smoothing across slices.
     BsplineSharp,
 }
 
@@ -182,11 +182,11 @@ pub struct Volume {
     pub compositing: Compositing,
     /// Shading.
     pub shading: Shading,
-    /// Depth-coded shading: factor of the colours at the nearest point of the box.
+    /// Depth-coded shading: factor of the colours at the nearest point of the box, 0..=10.
     pub near_tint: [f64; 3],
-    /// Depth-coded shading: factor of the colours at the farthest point of the box.
+    /// Depth-coded shading: factor of the colours at the farthest point of the box, 0..=10.
     pub far_tint: [f64; 3],
-    /// First-hit shading: the accumulated opacity that counts as the hit.
+    /// First-hit shading: the accumulated opacity that counts as the hit, 0.001..=1.
     pub hit: f64,
     /// Mode mixed: opacity factor of the volume layer over the surface.
     pub veil: f64,
@@ -280,7 +280,7 @@ pub struct TransferPoint {
     pub at: f64,
     /// Colour, red, green and blue in 0..1.
     pub colour: [f64; 3],
-    /// Opacity of one voxel (one slice pixel), 0..1.
+    /// Opacity of one voxel (one slice pixel), 0..1; with `volume.extinction` the share of that instead.
     pub opacity: f64,
 }
 
@@ -294,18 +294,18 @@ pub struct Surface {
     pub start_depth: Option<f64>,
     /// Detection rule.
     pub detector: Detector,
-    /// Detectors `adaptive` and `lasting`: how many standard deviations of the noise in front of an edge its difference must exceed. A weaker edge
-    /// counts only if the ray has no other.
+    /// Detectors `adaptive` and `lasting`: how many standard deviations of the noise in front of an edge its difference must exceed, 0..=10. A weaker
+    /// edge counts only if the ray has no other.
     pub noise: f64,
     /// Length of an edge, mm: the difference is the mean echo over this length behind a place minus the mean echo over this length in front
     /// of it, at any step of the rays. The detector takes at least 4 and at most 256 samples of this length. `samples`: 4 steps of the
     /// rays, as in the thesis, so that the step decides which edges are found. Absent: 4 slice pixels.
     pub edge: Option<Edge>,
-    /// Detection threshold on the difference of the means of the newer and the older half of the ring of samples.
+    /// Detection threshold on the difference of the means of the newer and the older half of the ring of samples, 1e-6..=1.
     pub threshold: f64,
-    /// Threshold of the rough detector. Absent: that of the fine one.
+    /// Threshold of the rough detector, 1e-6..=1. Absent: that of the fine one.
     pub rough_threshold: Option<f64>,
-    /// Step of the rough detector in fine steps; 1 disables it. It passes over specks and some noise, and misses walls that are weak or
+    /// Step of the rough detector in fine steps, 1..=8; 1 disables it. It passes over specks and some noise, and misses walls that are weak or
     /// thinner than its ring. The thesis has one of 2.
     pub rough: u32,
     /// Sign of the edge.
@@ -385,11 +385,11 @@ pub enum Detector {
     /// shells before a wall), unless the ray has no other.
     Lasting,
     /// Of the two edges of each ray that are most likely a surface, the one on which neighbouring rays agree, or none: for speckle and noise that no filter
-    /// removes. Takes no rough search, and the outermost surface at the peak of its edge.
+    /// removes. `rough` and `number` must be 1, and `place` peak.
     Consistent,
 }
 
-/// Sign of the edge at a surface.
+/// Sign of the edge at a surface; the thesis lists it among the settings, too (4.4.2.1).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Sign {
@@ -398,7 +398,7 @@ pub enum Sign {
     Bright,
     /// A dark cavity in bright tissue.
     Dark,
-    /// Both: the size of the difference counts (4.4.2.1 takes the sign "also"). With the detector by a plain threshold only.
+    /// Both: the absolute value of the difference counts. With detector `threshold` only.
     Any,
 }
 
@@ -406,8 +406,8 @@ pub enum Sign {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Place {
-    /// The maximum of the difference, refined by a parabola. Independent of the edge's height. The difference is followed until it falls
-    /// below 0.7 of its maximum, over at most the edge's length times 1 or, if that is more, a quarter divided by the threshold.
+    /// The maximum of the difference, refined by a parabola: a place that does not depend on the edge's height. The difference is followed until it falls
+    /// below 0.7 of its maximum, over at most the edge's length times max(1, 0.25 / threshold).
     #[default]
     Peak,
     /// The middle between the two places where the difference is 0.7 of its maximum: more accurate for low edges in samples of 8 bits.

@@ -98,11 +98,11 @@ pub struct Light {
     pub diffuse: f64,
     /// Specular coefficient of Blinn-Phong shading; it may exceed 1.
     pub specular: f64,
-    /// Specular exponent.
+    /// Specular exponent, 0..=1e6.
     pub shininess: f64,
-    /// Colour of the light.
+    /// Colour of the light, 0..=10.
     pub colour: [f64; 3],
-    /// Colour of the surface.
+    /// Colour of the surface, 0..=10.
     pub surface_colour: [f64; 3],
     /// How much a weak echo at the surface darkens its colour: 0 not at all, 1 in proportion to the echo.
     pub texture: f64,
@@ -163,13 +163,13 @@ pub struct LightVolume {
     /// Edge of a cell, mm. Absent: half the standard deviation of the Gaussian that the volume is smoothed with (`slices.smooth`), and a slice pixel
     /// at least. Where there would be more cells than `cells` they are larger; `--explain` says what they are and why.
     pub cell: Option<f64>,
-    /// Most cells, nearly; also at most 1024 along an edge. A cell takes 44 bytes of the device's memory.
+    /// Most cells, but for rounding up to an even number along each edge; also at most 1024 along an edge. A cell takes 44 bytes of the device's memory.
     pub cells: u32,
     /// Samples along each edge of a cell.
     pub taps: u32,
     /// Depth of light: the path through the most opaque tissue, mm, after which 1/e of green light is left.
     pub depth: f64,
-    /// Warmth: how much deeper red light goes than green, and green than blue; 0 is grey.
+    /// Warmth, 0..=2: how much deeper red light goes than green, and green than blue; 0 is grey.
     pub warmth: f64,
     /// Standard deviation over which light has spread after 1 mm, mm; it grows with the square root of the path. The lattice spreads light
     /// over at least half a cell a layer.
@@ -185,13 +185,13 @@ pub struct LightVolume {
     pub relief: f64,
     /// How far the light wraps around to the side that faces away from it: 0 not at all, 1 fully.
     pub wrap: f64,
-    /// Coefficient of the back light.
+    /// Coefficient of the back light, 0..=10.
     pub back: f64,
     /// Direction from the tissue to the back light, in the same axes as `light.direction`.
     pub back_direction: DVec3,
-    /// Colour of the back light.
+    /// Colour of the back light, 0..=10.
     pub back_colour: [f64; 3],
-    /// Exposure: factor of the light before the response curve.
+    /// Exposure: factor of the light before the response curve, 0..=100.
     pub exposure: f64,
     /// The backdrop behind a volume that fills the picture. Absent: black.
     pub ground: Option<Ground>,
@@ -243,7 +243,7 @@ impl Default for LightVolume {
 pub struct Shadow {
     /// Shadow coefficient: the share of what it dims that a shadow removes.
     pub strength: f64,
-    /// Width of the shadow's edge per mm of distance to the obstacle; 0 is a hard edge.
+    /// Width of the shadow's edge per mm of distance to the obstacle, 0..=10; 0 is a hard edge.
     pub softness: f64,
     /// Maximum distance of an obstacle, mm.
     pub reach: f64,
@@ -278,7 +278,7 @@ impl Default for Shadow {
 pub struct Occlusion {
     /// Radius, mm.
     pub radius: f64,
-    /// Strength; 1 is the share of the hemisphere that is hidden.
+    /// Strength, 0..=4; 1 is the share of the hemisphere that is hidden.
     pub strength: f64,
 }
 
@@ -298,7 +298,7 @@ pub struct Skin {
     pub translucency: f64,
     /// Depth behind the surface over which echoes are averaged, mm.
     pub depth: f64,
-    /// Colour of the light that passes through tissue.
+    /// Colour of the light that passes through tissue, 0..=10.
     pub colour: [f64; 3],
 }
 
@@ -318,12 +318,12 @@ pub struct Post {
     pub enhanced_sigma: Option<EnhancedSigma>,
     /// Perona-Malik diffusion.
     pub perona_malik: Option<PeronaMalik>,
-    /// Antialiasing of surfaces, and of cut faces, that have one ray a pixel: pixels at outlines and folds mix what is near and what is far by the share that
-    /// each covers, by the edge's places in the distance map around them. Folds are steps of `light.cliff`.
+    /// Antialiasing of surfaces, and of cut faces, that have one ray a pixel. A pixel at an outline or a fold, a step in distance of `light.cliff`, mixes what is
+    /// near and what is far by the share of its area that each covers. The edge between them follows from the distances of the pixels around it.
     pub antialias: bool,
-    /// Added to the brightness, whose range is 0..1, after the contrast.
+    /// Added to the brightness, whose range is 0..1, after the contrast: -1..=1.
     pub brightness: f64,
-    /// Contrast factor about middle grey.
+    /// Contrast factor about middle grey, 0..=10.
     pub contrast: f64,
     /// Gamma: the exponent is 1 / gamma, so that values above 1 brighten dark parts.
     pub gamma: f64,

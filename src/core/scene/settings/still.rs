@@ -4,10 +4,10 @@ use crate::scene::number::Allowed::Range;
 use crate::scene::number::{Number, SHARE, number};
 use serde::{Deserialize, Serialize};
 
-/// A still: mode volume by paths of light that collide many times, without a denoiser. The transfer function is the medium: opacities are
-/// its extinction, colours those of a half-space of it. The key light is `light.diffuse` in `light.direction`, the back light that of `light.volume`, and
-/// light comes from all around with the radiance `light.ambient`. Exposure and ground are those of `light.volume`. Specular light, cut faces of clip
-/// planes and early ray termination have no place in it.
+/// A still: mode volume by paths of light that collide many times, without a denoiser. The transfer function describes the medium: its opacities give the
+/// extinction, and its colours are those that a half-space of the medium has under even light. The key light is `light.diffuse` in `light.direction`, and
+/// light comes from all around with the radiance `light.ambient`. Back light, exposure and ground are those of `light.volume`; without it there is no back
+/// light and no ground, and the exposure is 1. Specular light, cut faces of clip planes and early ray termination do not apply.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Still {
@@ -15,11 +15,11 @@ pub struct Still {
     pub samples: u32,
     /// Seed of the random numbers. The same seed and number of samples give the same picture.
     pub seed: u32,
-    /// Factor of the extinction.
+    /// Factor of the extinction, 0..=100.
     pub extinction: f64,
     /// Factor of the albedo.
     pub albedo: f64,
-    /// Anisotropy: the mean cosine of Henyey and Greenstein's phase function; 0 scatters evenly.
+    /// Anisotropy, -0.95..=0.95: the mean cosine of Henyey and Greenstein's phase function; 0 scatters evenly.
     pub anisotropy: f64,
     /// Most collisions of a path; what light would do after them is missing.
     pub events: u32,
