@@ -7,7 +7,7 @@ use echolume::low_level::scene::{MeasureKind, SharedLabels};
 use echolume::low_level::segment::{Labels, files};
 use echolume::low_level::source::recorder::Header;
 use echolume::low_level::source::{OpenOptions, StoredType};
-use echolume::low_level::ui::command::{Effect, LabelCommand};
+use echolume::low_level::ui::command::{Effect, Face, LabelCommand};
 use echolume::low_level::ui::panels::accesskit::Node;
 use echolume::low_level::workspace::{Origin, Workspace};
 use glam::DVec3;
@@ -257,4 +257,31 @@ fn labels_are_painted_undone_grown_and_saved() {
     desk.console.execute(&Command::Export(14), Instant::now());
     let file = desk.until("export", |_| files_of(&folder, "seg.nrrd").into_iter().find(|file| !known.contains(file)));
     assert_eq!(read(&file).1 as f64 / 1000.0, desk.labelled());
+}
+
+/// The automatic volume is that of the ball, with an interval, whatever threshold the mode has; the region that holds half of it is said to cut it.
+#[test]
+fn the_key_k_measures_the_largest_bright_body_of_the_region() {
+    let (device, folder) = (Device::new(), Folder::new("measured-body"));
+    let mut desk = Desk::of_ball(&device, &folder, None);
+    let measured = |desk: &mut Desk, n: usize| {
+        desk.press(Key::Char('k'));
+        desk.until("measurement", |desk| desk.console.controls().measures().get(n).cloned())
+    };
+    let whole = measured(&mut desk, 0);
+    let found = whole.counted.expect("a volume") / 1000.0;
+    assert!((found / VOLUME - 1.0).abs() < 0.01, "{found} of {VOLUME}");
+    let [low, high] = whole.interval.expect("an interval").map(|mm3| mm3 / 1000.0);
+    assert!(low < found && found < high && high - low < 0.2 * found, "{low} to {high}");
+    // From the far end to the middle of the ball.
+    let end = GRID.origin[2] + GRID.spacing[2] * (GRID.size[2] - 1) as f64;
+    desk.console.execute(&Command::MoveFace(Face { axis: 2, high: true }, CENTRE.z - end), Instant::now());
+    desk.rest();
+    let half = measured(&mut desk, 1).counted.expect("a volume") / 1000.0;
+    assert!((half / VOLUME - 0.5).abs() < 0.1, "{half} of {VOLUME}");
+    desk.until("warning", |desk| {
+        let nodes = desk.console.take_tree()?.nodes.into_iter();
+        let says = |node: Node| node.label().is_some_and(|said| said.contains("reaches the border of the region"));
+        nodes.map(|(_, node)| node).any(says).then_some(())
+    });
 }

@@ -83,7 +83,7 @@ pub(super) fn bladder(user: &mut User) -> String {
 }
 
 /// The voxels of the ball. Its edge is one sample and one slice wide, and half of a compressed echo lies at its outer side: 1.8 % too many.
-pub(super) fn bright_tissue(user: &mut User) -> String {
+pub(super) fn bright_body(user: &mut User) -> String {
     user.letter('k');
     user.until("result", |user| (!user.console.controls().measures().is_empty()).then_some(()));
     let volume = 4.0 / 3.0 * PI * user.ball.1.powi(3) / 1000.0;

@@ -48,7 +48,7 @@ const TASKS: &[(&str, Perform)] = &[
     ("the area of a shadow", shadow),
     ("the way along the cheek", cheek),
     ("the volume of the bladder", bladder),
-    ("the volume of all bright tissue in the region", bright_tissue),
+    ("the volume of a bright body in the region", bright_body),
     ("label a body by hand", hand_label),
     ("label all of a body", grown_label),
     ("name a structure", structure),
