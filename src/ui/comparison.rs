@@ -246,9 +246,6 @@ impl Comparison {
         for (other, is_linked) in Link::ALL.iter().zip(&mut self.shown.links) {
             *is_linked ^= *other == link;
         }
-        if link == Link::Volume {
-            self.compared.iter_mut().for_each(|compared| compared.asked = None);
-        }
     }
 
     /// Begins to move the visible volumes onto this one, or leaves them where they are if they are aligned or about to be.

@@ -239,6 +239,8 @@ fn of(
         MeasureKind::Text => points.first().map(|(_, at)| *at)?,
         // At the tail, away from what the tip shows.
         MeasureKind::Arrow => points.last().map(|(_, at)| *at)?,
+        // Low on the right: the tile has its name above.
+        MeasureKind::Threshold => shown.copied().reduce(|a, b| if b[0] + b[1] > a[0] + a[1] { b } else { a })?,
         _ => shown.copied().reduce(|a, b| if b[0] > a[0] { b } else { a })?,
     };
     Some(Drawn {

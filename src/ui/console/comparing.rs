@@ -3,6 +3,7 @@
 use super::{Console, ConsoleError};
 use crate::comparison::{Comparison, News, volume_of};
 use crate::live::StreamError;
+use crate::live::cine::CineVolume;
 use crate::picture::Picture;
 use crate::recordings::Named;
 use crate::source::convert::Volume;
@@ -81,11 +82,16 @@ impl Console {
 
     /// The volume on display, or else the newest one in the cine loop, with its header.
     pub(super) fn shown_volume(&self) -> Option<(Header, Volume)> {
-        let volumes = self.stream.cine().volumes();
-        let shown = self.stream.cine_position().and_then(|at| volumes.get(at)).or(volumes.back())?;
+        let shown = self.shown_in_loop()?;
         let header = self.stream.header()?.clone();
         let volume = volume_of(&header, shown.frames.iter().map(AsRef::as_ref));
         Some((header, volume))
+    }
+
+    /// The volume of the cine loop that is on display, or else its newest one.
+    pub(super) fn shown_in_loop(&self) -> Option<&CineVolume> {
+        let volumes = self.stream.cine().volumes();
+        self.stream.cine_position().and_then(|at| volumes.get(at)).or(volumes.back())
     }
 
     /// Moves a compared volume as a drag over its picture does.

@@ -40,7 +40,6 @@ impl Console {
         }
         self.poll_saved();
         self.poll_opening(now);
-        self.poll_survey();
         self.poll_labels(now);
         self.poll_thumbnails(now);
         let is_exported_further = self.exporter.look();

@@ -28,7 +28,7 @@ type Place = (DVec3, Option<DVec3>);
 /// What becomes of the work of a thread: it is done by the console.
 type Finish = Box<dyn FnOnce(&mut Console) + Send>;
 
-/// The work on labels that is in progress.
+/// The work in progress on labels, and on bodies that are measured.
 pub(super) struct LabelWork {
     wake: Wake,
     /// Receives the result of the thread that is at work, and what the window says meanwhile.
@@ -51,10 +51,10 @@ impl LabelWork {
 }
 
 impl Console {
-    /// Does something about labels on a thread, if none is at work. `says`: what the window says meanwhile.
-    fn work_on_labels(&mut self, says: &'static str, work: impl FnOnce() -> Finish + Send + 'static) {
+    /// Works on a volume or on labels on a thread, if none is at work. `says`: what the window says meanwhile.
+    pub(super) fn work(&mut self, says: &'static str, work: impl FnOnce() -> Finish + Send + 'static) {
         if self.label_work.at_work.is_some() {
-            return self.notify(texts::STILL_AT_WORK_ON_LABELS, true);
+            return self.notify(texts::STILL_AT_WORK, true);
         }
         let (sender, done) = channel();
         let wake = self.label_work.wake.clone();
@@ -63,9 +63,9 @@ impl Console {
             let _ = sender.send(work());
             wake();
         };
-        match std::thread::Builder::new().name("labels".into()).spawn(work) {
+        match std::thread::Builder::new().name("bodies".into()).spawn(work) {
             Ok(_) => self.label_work.at_work = Some((done, says)),
-            Err(why) => self.notify(&texts::no_labels(texts::why_no_thread(why)), true),
+            Err(why) => self.notify(&texts::why_no_thread(why), true),
         }
     }
 
@@ -76,7 +76,7 @@ impl Console {
         let has_labels = self.controls.settings().labels.volume.is_some();
         let file = self.fixed.origin.as_ref().and_then(|origin| origin.labels.clone()).filter(|_| has_labels);
         let world = self.fixed.world.clone();
-        self.work_on_labels(texts::NO_LABELS_YET, move || {
+        self.work(texts::NO_LABELS_YET, move || {
             let begun = begun(file.as_deref(), &geometry, world.and_then(|world| world()));
             Box::new(|console| match begun {
                 Ok(labels) => console.controls.begin_labels(labels),
@@ -134,10 +134,10 @@ impl Console {
 
     fn grow(&mut self, seed: DVec3, is_dark: bool) {
         let (Some((header, volume)), Some(labels)) = (self.shown_volume(), self.controls.labelling()) else {
-            return self.notify(texts::NO_VOLUME_YET, true);
+            return self.notify(texts::NO_VOLUME_IN_LOOP, true);
         };
         let (lattice, label) = (labels.lattice(), labels.chosen);
-        self.work_on_labels(texts::GROWING, move || {
+        self.work(texts::GROWING, move || {
             let grown = grown(&volume, header.range, is_dark, seed, lattice);
             Box::new(move |console| match grown {
                 Ok((voxels, body)) => console.label_voxels(&voxels, label, &texts::grown(&body)),
@@ -154,7 +154,7 @@ impl Console {
         let place = |point: &[f64; 3]| to_grid.transform_point3(scene.place_of(*point));
         let contours: Vec<Vec<DVec3>> =
             measured.contours.iter().map(|contour| contour.iter().map(place).collect()).collect();
-        self.work_on_labels(texts::FILLING, move || {
+        self.work(texts::FILLING, move || {
             let filled = contours::voxels(&grid, &contours);
             Box::new(move |console| match filled {
                 Ok(voxels) if voxels.is_empty() => console.notify(&texts::not_grown(texts::WHY_NOTHING_TO_FILL), true),

@@ -3,9 +3,7 @@
 use super::Console;
 use super::opening::ListKey;
 use super::surface::SurfaceMap;
-use super::survey::Surveyed;
 use crate::command::{Command, Tool};
-use crate::comparison::volume_of;
 use crate::export::Holds;
 use crate::files;
 use crate::input::{Input, Key};
@@ -69,66 +67,41 @@ impl Console {
         Ok(Some(Measurement { kind, points, on_surface: true, ..Measurement::default() }))
     }
 
-    /// Starts to measure, on a thread, the largest bright body in the region.
+    /// Measures the largest bright body in the region, on a thread.
     pub(super) fn measure_body(&mut self) {
-        match self.body_to_measure() {
-            Ok(measure) => match self.survey.measure(measure) {
-                Ok(()) => self.notify(texts::MEASURING_BODY, false),
-                Err(e) => self.notify(&texts::no_body_measured(texts::why_no_thread(e)), true),
-            },
-            Err(why) => self.notify(why, true),
-        }
-    }
-
-    /// What measures the body of the volume that is shown.
-    fn body_to_measure(&self) -> Result<impl FnOnce() -> Surveyed + Send + 'static, &'static str> {
-        if self.survey.is_measuring() {
-            return Err(texts::STILL_MEASURING_BODY);
-        }
-        let (Some(scene), Some(header)) = (self.stream.scene(), self.stream.header()) else {
-            return Err(texts::NO_VOLUME_YET);
+        let shown = self.shown_volume().zip(self.shown_in_loop().map(|kept| kept.volume));
+        let Some((((header, volume), number), scene)) = shown.zip(self.stream.scene()) else {
+            return self.notify(texts::NO_VOLUME_IN_LOOP, true);
         };
-        let volumes = self.stream.cine().volumes();
-        let shown = self.stream.cine_position().and_then(|at| volumes.get(at)).or(volumes.back());
-        let shown = shown.ok_or(texts::NO_VOLUME_IN_LOOP)?;
-        let (header, frames, made) = (header.clone(), shown.frames.clone(), Some(self.made_on(shown.volume)));
         let (least, most) = insonified_box(&scene.geometry);
         let corners = [scene.low.max(least), scene.high.min(most)];
         let points = corners.map(|corner| scene.point_of(corner)).to_vec();
-        Ok(move || {
-            let volume = volume_of(&header, frames.iter().map(AsRef::as_ref));
-            let (body, threshold) = bodies::largest_within(&volume, header.range, corners)?;
-            let Measured { volume, low, high } = body.measured?;
-            let measured = Measurement {
-                kind: MeasureKind::Threshold,
-                points,
-                threshold: Some(threshold),
-                counted: Some(volume),
-                interval: Some([low, high]),
-                made,
-                ..Measurement::default()
-            };
-            Ok((measured, body.is_cut))
-        })
-    }
-
-    /// Adds the measured body as a measurement, once it is there.
-    pub(super) fn poll_survey(&mut self) {
-        let Some(measured) = self.survey.poll() else { return };
-        self.presentation.redraw();
-        let (measured, is_cut) = match measured {
-            Ok(found) => found,
-            Err(why) => return self.notify(&texts::no_body_measured(why), true),
-        };
-        match self.controls.add_measure(measured) {
-            crate::controls::Change::Refused(why) => self.notify(why, true),
-            _ => {
-                self.activity.changes(Instant::now());
-                if is_cut {
-                    self.notify(texts::BODY_IS_CUT, true);
+        let made = Some(self.made_on(number));
+        self.work(texts::MEASURING_BODY, move || {
+            let found = bodies::largest_within(&volume, header.range, corners);
+            let found = found.and_then(|(body, threshold)| Ok((body.measured?, threshold, body.is_cut)));
+            Box::new(move |console| match found {
+                Ok((Measured { volume, low, high }, threshold, is_cut)) => {
+                    let measured = Measurement {
+                        kind: MeasureKind::Threshold,
+                        points,
+                        threshold: Some(threshold),
+                        counted: Some(volume),
+                        interval: Some([low, high]),
+                        made,
+                        ..Measurement::default()
+                    };
+                    if let crate::controls::Change::Refused(why) = console.controls.add_measure(measured) {
+                        return console.notify(why, true);
+                    }
+                    console.activity.changes(Instant::now());
+                    if is_cut {
+                        console.notify(texts::BODY_IS_CUT, true);
+                    }
                 }
-            }
-        }
+                Err(why) => console.notify(&texts::no_body_measured(why), true),
+            })
+        });
     }
 
     /// Copies the results of measurements to the clipboard as CSV.

@@ -215,7 +215,7 @@ impl Console {
             presets: Presets::new(options.presets, small_pictures, wake.clone()),
             reel: Reel::new(wake.clone()),
             replay: Replay::new(frozen),
-            survey: Survey::new(wake.clone()),
+            survey: Survey::default(),
             label_work: LabelWork::new(wake.clone()),
             turntable: Turntable::default(),
             render_start: RenderStart::default(),

@@ -40,7 +40,8 @@ pub(crate) const TOO_MANY_LABELS: &str = "There are 255 labels, which is as many
 pub(crate) const LABELS_NEED_SURFACE: &str =
     "Labels need planes or a surface: choose planes, or the mode Surface or Mixed";
 pub(crate) const GROWING: &str = "Growing from the place of the click";
-pub(crate) const STILL_AT_WORK_ON_LABELS: &str = "Labels are still being prepared or grown: wait a moment";
+pub(crate) const STILL_AT_WORK: &str =
+    "Labels are still being prepared, or a body is being searched for: wait a moment";
 pub(crate) const WHY_NO_LABELS: &str = "nothing is labelled with the tool Labels (Shift+L)";
 pub(crate) const WHY_THREAD_ENDED: &str = "the search ended early";
 pub(crate) fn no_labels(why: impl Display) -> String {

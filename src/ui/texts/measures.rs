@@ -56,7 +56,6 @@ pub(crate) const MEASURING_BODY: &str = "Measuring the largest bright body in th
 pub(crate) fn no_body_measured(why: impl Display) -> String {
     format!("No body is measured: {why}")
 }
-pub(crate) const STILL_MEASURING_BODY: &str = "A body is being measured: wait a moment";
 pub(crate) const BODY_IS_CUT: &str =
     "The measured body reaches the border of the region or of the echoes: a part of it may be missing";
 pub(crate) const NO_VOLUME_YET: &str = "There is no volume yet";
