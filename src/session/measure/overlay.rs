@@ -239,8 +239,12 @@ fn of(
         MeasureKind::Text => points.first().map(|(_, at)| *at)?,
         // At the tail, away from what the tip shows.
         MeasureKind::Arrow => points.last().map(|(_, at)| *at)?,
-        // Low on the right: the tile has its name above.
-        MeasureKind::Threshold => shown.copied().reduce(|a, b| if b[0] + b[1] > a[0] + a[1] { b } else { a })?,
+        // Beside the right edge: names and scales of the tile are in its corners.
+        MeasureKind::Threshold => {
+            let (count, ends) = (shown.clone().count() as f64, [f64::NEG_INFINITY, 0.0]);
+            let [right, sum] = shown.fold(ends, |[right, sum], at| [right.max(at[0]), sum + at[1]]);
+            [right, sum / count]
+        }
         _ => shown.copied().reduce(|a, b| if b[0] > a[0] { b } else { a })?,
     };
     Some(Drawn {

@@ -6,6 +6,7 @@ use echolume::low_level::scene::picker::Picker;
 use echolume::low_level::scene::planes::Tile;
 use echolume::low_level::scene::{Input as Samples, Scene};
 use echolume::low_level::source;
+use echolume::low_level::source::recorder::Writer;
 use echolume::low_level::ui::command::{CompareView, Link};
 use echolume::low_level::ui::recordings::Recordings;
 use std::path::Path;
@@ -106,6 +107,34 @@ fn other_recordings_are_drawn_with_the_same_settings() {
             desk.compared(n, |picture| *picture == expected);
         }
         assert_eq!(desk.console.compared().len(), 3, "the first recording is no further one");
+    }
+}
+
+/// Prevents a compared loop that jumps to its first volume when its link is cut.
+#[test]
+fn a_loop_whose_link_is_cut_keeps_its_volume() {
+    let (device, folder) = (Device::new(), Folder::new("cut-link"));
+    let file = folder.0.join("loop.frames");
+    let mut writer = Writer::create(&file, header(0.3)).expect("a file");
+    (0..2).flat_map(body).for_each(|frame| writer.frame(&frame, 0.0).expect("written"));
+    writer.finish().expect("finished");
+    let recordings = Arc::new(Mutex::new(Recordings::of(SourceKind::Recording, Path::new("shown"))));
+    assert!(recordings.lock().expect("a list").add(&file));
+    let opening = OpeningOptions { recordings, ..OpeningOptions::default() };
+    let mut desk = Desk::new(&device, ConsoleOptions { opening, ..options() });
+    desk.begin();
+    let first = desk.live(0);
+    assert!(desk.live(1).rgba != first.rgba, "the volumes differ");
+    desk.press(Key::Space);
+    desk.does(Command::Compare);
+    for turn in 0..4 {
+        if turn == 1 {
+            desk.does(Command::ToggleLink(Link::Volume));
+        }
+        desk.does(Command::Rotate([10.0, 0.0]));
+        desk.rest();
+        let newest = desk.picture();
+        desk.compared(1, |picture| picture.rgba == newest.rgba);
     }
 }
 
