@@ -193,7 +193,7 @@ fn of(
         MeasureKind::Threshold => {
             let [a, b] = measured.points[..] else { return None };
             let [a, b] = [a, b].map(|point| scene.place_of(point));
-            let outline = section([a.min(b), a.max(b)], plane?);
+            let outline = Some(section([a.min(b), a.max(b)], plane?)).filter(|outline| !outline.is_empty())?;
             vec![closed(outline.into_iter().map(&project).collect::<Option<Vec<_>>>()?)]
         }
         MeasureKind::Volume => {
@@ -370,5 +370,30 @@ mod tests {
         let on_rendering: Vec<usize> = found.iter().filter(|d| d.tile[0] == [100.0, 50.0]).map(|d| d.index).collect();
         assert_eq!(on_rendering, [0]);
         assert!(found.iter().filter(|d| d.tile[0] != [100.0, 50.0]).all(|d| d.index == 1) && found.len() > 1);
+    }
+
+    /// A box is a rectangle of its size on a plane through it, and nothing on another one.
+    #[test]
+    fn a_box_is_drawn_where_a_plane_goes_through_it() {
+        let found = Measurement {
+            kind: MeasureKind::Threshold,
+            points: vec![[-3.0, 4.0, -2.0], [5.0, 9.0, 6.0]],
+            counted: Some(1000.0),
+            ..Measurement::default()
+        };
+        for (elevation, is_there) in [(1.0, true), (5.9, true), (6.1, false), (-2.1, false)] {
+            let position = format!("planes.position=[0,5,{elevation}]");
+            let scene = scene(&["mode=plane", "planes.plane=a", &position]);
+            let drawn = drawn(&scene, None, std::slice::from_ref(&found));
+            assert_eq!(drawn.len(), usize::from(is_there), "{elevation}");
+            let Some(drawn) = drawn.first() else { continue };
+            let tiling = scene.tiling();
+            let line = &drawn.lines[0];
+            let edges = line.windows(2).map(|ends| (ends[1][0] - ends[0][0]).hypot(ends[1][1] - ends[0][1]));
+            let mut edges: Vec<f64> = edges.map(|pixels| pixels * tiling.tiles[0].pixel).collect();
+            edges.sort_by(f64::total_cmp);
+            let expected = [5.0, 5.0, 8.0, 8.0];
+            assert!(edges.len() == 4 && edges.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9), "{edges:?}");
+        }
     }
 }
