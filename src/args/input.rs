@@ -34,7 +34,7 @@ pub struct Opened {
     pub scene: Scene,
 }
 
-/// The arguments of every command that renders a recording.
+/// The command-line arguments that commands which render a recording have in common. Commands that render live have `SourceArgs` instead.
 #[derive(clap::Args)]
 pub struct InputArgs {
     #[arg(help = format!(
@@ -58,7 +58,8 @@ pub struct InputArgs {
 }
 
 impl InputArgs {
-    /// Opens the recording and builds the scene of the chosen volume. Settings that were not chosen are derived from the recording.
+    /// Opens the recording and builds the scene of the chosen volume. Without a recording it is the phantom. Settings that were not chosen are
+    /// derived from the recording.
     ///
     /// # Errors
     /// The recording or a setting is wrong, or there is no such volume.
@@ -66,8 +67,8 @@ impl InputArgs {
         self.open_with(&[])
     }
 
-    /// Opens the recording and builds the scene as [`InputArgs::open`] does. `chosen`: assignments of settings, each with the flag that messages
-    /// name, over which the other flags and `--set` take precedence.
+    /// Opens the recording and builds the scene as [`InputArgs::open`] does. `chosen`: further assignments of settings, each a pair of the flag that
+    /// messages name and `key.path=value`. Flags of these arguments and `--set` take precedence over them.
     ///
     /// # Errors
     /// The recording or a setting is wrong, or there is no such volume.
@@ -86,7 +87,8 @@ impl InputArgs {
     }
 
     /// Opens the recording and builds the scene as [`InputArgs::open_with`] does. The result can also be used for other scenes of the same volume.
-    /// `asked`: index of the volume, from 0, used in place of that of the arguments.
+    /// `asked`: index of the volume, from 0, used in place of that of the arguments; None: [`InputArgs::volume`]. `chosen`: as for
+    /// [`InputArgs::open_with`].
     ///
     /// # Errors
     /// The recording or a setting is wrong, or there is no such volume.
@@ -150,8 +152,8 @@ impl InputArgs {
         }
     }
 
-    /// Checks `--volumes`. It must not be given together with `--volume`, and must include the volume of the workspace, if there is one, because
-    /// its measurements belong to that volume. `is_among`: true for an index that `--volumes` includes.
+    /// Checks `--volumes`: an error if `--volume` is given too, or if `--volumes` leaves out the volume of the workspace, to which the measurements
+    /// of the workspace belong. `flag`: `--volumes` with its value, for the message. `is_among`: true for an index that `--volumes` includes.
     pub fn check_volumes(&self, flag: &str, is_among: impl Fn(usize) -> bool) -> Result<(), Failure> {
         if self.volume.is_some() {
             return Err(input("--volume and --volumes: give one of them"));
@@ -171,7 +173,7 @@ impl InputArgs {
         self.input.as_deref().is_some_and(|file| file.as_os_str() == STANDARD)
     }
 
-    /// The recording as the user typed it, `standard input` for `-`, or `phantom` if none was given.
+    /// Name of the recording or workspace for messages: its path as the user typed it, `standard input` for `-`, or `phantom` if none was given.
     pub fn name(&self) -> String {
         match self.stored.as_ref().map(|(file, _)| file).or(self.input.as_ref()) {
             None => "phantom".into(),
@@ -180,20 +182,21 @@ impl InputArgs {
         }
     }
 
-    /// Checks that the output files can be written, that none is named twice, and that none replaces an input: a file of the source or of the
-    /// settings.
+    /// Checks that the output files can be written, that none is standard output, that none is named twice, and that none replaces an input: a file
+    /// of the source or of the settings.
     pub fn check_outputs(&self, outputs: &[Output], source: &dyn Source) -> Result<(), Failure> {
         check_outputs(outputs, self.read_files(source).iter().map(PathBuf::as_path))
     }
 
-    /// Which pictures say that they are of the phantom: all pictures of a workspace, as in the viewer; otherwise those with something else drawn
-    /// over them. None if the volumes are not of the phantom.
+    /// Which pictures state that they are of the phantom and not of a patient. With a workspace, as in the viewer, every picture states it. Otherwise
+    /// a picture states it only if something else, such as a measurement, is drawn over it. None if the volumes are not of the phantom.
     pub fn demo(&self, source: &dyn Source) -> Option<Demo> {
         let is_workspace = self.stored.is_some() || self.input.as_deref().is_some_and(workspace::is_named);
         source.is_synthetic().then_some(if is_workspace { Demo::Always } else { Demo::WithOthers })
     }
 
-    /// All files that are read for the source and the settings.
+    /// All files that are read for the source and the settings, in any order. The value of `--transfer` is one of them, although it may be a built-in
+    /// name.
     pub fn read_files(&self, source: &dyn Source) -> Vec<PathBuf> {
         let mut read = source.files();
         read.extend(self.geometry.probe.clone());
@@ -209,24 +212,24 @@ impl InputArgs {
         self.scene.size.is_some()
     }
 
-    /// The recording as it was typed, if one was given.
+    /// Path of the recording or workspace as it was typed, `-` included; None if none was given.
     pub fn given(&self) -> Option<PathBuf> {
         self.input.clone()
     }
 
-    /// Takes a workspace that is a part of a file in place of the one that was typed.
+    /// Uses `workspace`, which was read from a part of `file`, in place of the recording or workspace that was typed.
     pub fn take_stored(&mut self, file: PathBuf, workspace: Workspace) {
         self.stored = Some((file, workspace));
     }
 
-    /// The file name of the workspace, if one was given.
+    /// File name, without the folder, of the workspace that was typed; None if a recording or nothing was typed.
     pub fn workspace_name(&self) -> Option<String> {
         let file = self.input.as_deref().filter(|file| workspace::is_named(file))?;
         Some(file.file_name()?.to_string_lossy().into_owned())
     }
 
     /// The recording with its geometry and the volume to use, as a workspace stores them. Paths are absolute. An error if the workspace that was
-    /// given cannot be read or names no recording.
+    /// given cannot be read, names no recording, or has a depth axis that is not valid.
     pub fn origin(&self) -> Result<Origin, Failure> {
         let (recording, geometry) = match (self.workspace()?, &self.input) {
             (Some((file, workspace)), _) => {
@@ -257,7 +260,7 @@ impl InputArgs {
         Ok(frames)
     }
 
-    /// The scene with the volume format and the way of sampling that the chosen device will use. If there is no device, the scene stays
+    /// The scene with the volume format and the way of sampling that the chosen device will use. If there is no such device, the scene stays
     /// unchanged. Opens no device.
     pub fn resolve_sampling(&self, scene: Scene) -> Scene {
         match self.candidate() {
@@ -266,7 +269,7 @@ impl InputArgs {
         }
     }
 
-    /// The scene with the volume format that the chosen device will use. If there is no device, the scene stays unchanged. Opens no device.
+    /// The scene with the volume format that the chosen device will use. If there is no such device, the scene stays unchanged. Opens no device.
     #[cfg(feature = "lab")]
     pub fn resolve_format(&self, scene: Scene) -> Scene {
         match self.candidate() {
@@ -283,7 +286,8 @@ impl InputArgs {
         Some(devices.swap_remove(chosen))
     }
 
-    /// Opens the chosen device and prints its name. `validation`: with the Vulkan validation layer.
+    /// Opens the chosen device and prints its name on one line. `validation`: with the Vulkan validation layer. Once a signal is deferred
+    /// ([`signals::received`]), waiting for the device ends.
     pub fn open_device(&self, validation: bool) -> Result<Arc<Context>, Failure> {
         self.scene.open_device(validation)
     }
@@ -316,7 +320,7 @@ impl InputArgs {
     }
 }
 
-/// The arguments that choose the settings of a scene, in layers, and the device.
+/// The arguments that choose the device and the settings of a scene. Settings are in layers, of which a later one overrides an earlier one.
 #[derive(clap::Args)]
 pub struct SceneArgs {
     /// vr or volume, sr or surface, mixed, mip, minip, xray or mean, mpr or plane, orthogonal, tomography, cube
@@ -358,8 +362,8 @@ pub struct SceneArgs {
 }
 
 impl SceneArgs {
-    /// The chosen settings as layers, before defaults are derived. `is_phantom`: the layers begin with the presets of the phantom. `chosen`:
-    /// assignments over which the flags and `--set` take precedence.
+    /// The chosen settings as layers, before defaults are derived from the recording. `is_phantom`: the layers begin with the presets of the phantom.
+    /// `chosen`: further assignments, as for [`InputArgs::open_with`].
     ///
     /// # Errors
     /// A preset, a file or a setting is wrong.
@@ -376,7 +380,8 @@ impl SceneArgs {
         self.layers_over(layers, chosen)
     }
 
-    /// Adds the chosen presets, files, assignments (`chosen`) and flags on top of `layers`.
+    /// Adds to `layers`, each over the ones before: the presets, the file of settings, the assignments (`chosen`, as for [`InputArgs::open_with`]),
+    /// the flags and `--set`.
     ///
     /// # Errors
     /// A preset, a file or a setting is wrong.
@@ -458,7 +463,8 @@ impl SceneArgs {
         }
     }
 
-    /// Opens the chosen device and prints its name. Once a signal is deferred ([`signals::received`]), waiting for the device ends.
+    /// Opens the chosen device and prints its name on one line. `validation`: with the Vulkan validation layer. Once a signal is deferred
+    /// ([`signals::received`]), waiting for the device ends.
     pub fn open_device(&self, validation: bool) -> Result<Arc<Context>, Failure> {
         let (device, deadline) = (self.device.clone().unwrap_or_default(), self.deadline()?);
         open(&ContextOptions {
@@ -492,12 +498,12 @@ pub fn frames_of(
     Ok(())
 }
 
-/// Makes a folder that files are written to, unless it is there.
+/// Makes a folder, and those above it, unless they exist.
 pub fn make_folder(folder: &Path) -> Result<(), Failure> {
     std::fs::create_dir_all(folder).map_err(|e| failed(format!("{}: cannot be written: {e}", folder.display())))
 }
 
-/// Fails if the validation layer has reported something.
+/// Fails with the first message of the validation layer, if it has reported any.
 pub fn check_messages(context: &Context) -> Result<(), Failure> {
     context.messages().first().map_or(Ok(()), |first| Err(failed(format!("validation: {first}"))))
 }
@@ -515,7 +521,8 @@ pub fn check_volume(
     }
 }
 
-/// What all scenes of a volume have in common: its geometry and sample format. The levels of its echoes are left empty.
+/// What all scenes of a volume have in common: its geometry and sample format. The levels of its echoes are None: the caller fills them in if
+/// defaults are derived from them.
 pub fn recorded(source: &dyn Source, volume: usize) -> Recorded {
     Recorded {
         geometry: source.geometry(volume),
@@ -629,7 +636,7 @@ pub fn device_failure(error: GpuError) -> Failure {
 /// The flag that names an output, and its path if the flag was given.
 pub type Output<'a> = (&'a str, Option<&'a Path>);
 
-/// Checks that outputs can be written, do not replace an input (`read`), and that none is written twice.
+/// Checks that the outputs can be written, that none is standard output, that none replaces an input (`read`), and that none is named twice.
 pub fn check_outputs<'a>(outputs: &[Output], read: impl IntoIterator<Item = &'a Path>) -> Result<(), Failure> {
     let read: Vec<&Path> = read.into_iter().collect();
     let outputs: Vec<(&str, &Path)> = outputs.iter().filter_map(|(flag, file)| Some((*flag, (*file)?))).collect();

@@ -8,7 +8,8 @@ use crate::source::OpenOptions;
 use crate::terminal::{Failure, input};
 use std::path::Path;
 
-/// Adds the labels of a file to the settings for a volume. `world`: where the volume is; None if that is not known.
+/// Adds the labels of a file to the settings for a volume. `geometry`: that of the volume. `world`: map from its voxels to world coordinates; None if
+/// that is not known.
 ///
 /// # Errors
 /// The file is no segmentation, or its labels lie beside the volume.

@@ -14,7 +14,7 @@ use std::time::Duration;
 /// Ratio of the motor's default sweep angle to the angle that the frames cover. The rest is for the turning points.
 const SWEEP_MARGIN: f64 = 1.05;
 
-/// A motor that sweeps the array while frames arrive.
+/// The arguments for a motor that sweeps the array while frames arrive.
 #[derive(Clone, clap::Args)]
 pub struct MotorArgs {
     /// Serial port of the motor that sweeps the array. Its position gives each frame its place. Needs a probe file with a [motor] table
@@ -58,11 +58,13 @@ impl MotorArgs {
         }
     }
 
-    /// The requested sweep; None without `--motor`. `recording`: path of the recording that is played, whose probe file is used if `probe` is None.
-    /// `fan`: angle between the first and the last frame, degrees, for which a sweep is planned; None: that of the probe file.
+    /// The requested sweep; None without `--motor`. `probe`: path of the probe file. `recording`: path of the recording that is played, whose probe
+    /// file is used if `probe` is None. `fan`: angle between the first and the last frame, degrees, from which the angle of the sweep follows unless
+    /// `--angle` states it; None: that of the probe file.
     ///
     /// # Errors
-    /// There is no probe file with a motor, or the sweep exceeds the limits of the motor.
+    /// `--delay` is out of range, there is no probe file with a motor, the angle of the sweep is not known, or the sweep exceeds the limits of the
+    /// motor.
     pub fn plan(
         &self,
         probe: Option<&Path>,
@@ -89,7 +91,7 @@ impl MotorArgs {
 }
 
 impl PlannedSweep<'_> {
-    /// Opens the port, and starts a thread that finds home and then sweeps.
+    /// Opens the port, and starts a thread that finds the home position (unless `--homed` is given) and then sweeps.
     pub fn start(&self) -> Result<BackgroundSweep, Failure> {
         let drive = Drive::open(&self.settings, &self.table).map_err(motor_failure)?;
         BackgroundSweep::start(drive, self.sweep, self.arguments.homed).map_err(failed)

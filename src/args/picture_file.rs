@@ -5,7 +5,7 @@ use crate::picture::PictureFormat;
 use crate::terminal::{self, Failure, failed, input, say};
 use std::path::Path;
 
-/// The path that stands for standard input or standard output.
+/// The path that stands for standard input where a file is read, and for standard output where one is written.
 pub const STANDARD: &str = "-";
 
 /// Where a picture is written.
@@ -45,7 +45,7 @@ impl<'a> PictureFile<'a> {
         self.path().map_or("standard output".into(), |path| path.display().to_string())
     }
 
-    /// Writes a picture and prints its path. `encode`: returns the picture as bytes of the given format.
+    /// Writes a picture, and prints the path if it is a file. `encode`: returns the picture as bytes of the given format.
     pub fn write(&self, encode: impl Fn(PictureFormat) -> Result<Vec<u8>, String>) -> Result<(), Failure> {
         let unwritable = |e: String| failed(format!("{}: cannot be written: {e}", self.name()));
         match self {

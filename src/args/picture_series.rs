@@ -25,8 +25,8 @@ impl SeriesTarget {
     /// `face-000000.png`.
     ///
     /// # Errors
-    /// One line: the name is that of a single picture, the pattern is not valid, the ending belongs to no known format, or nothing here encodes
-    /// films.
+    /// One line: the name is that of a single picture, the pattern is not valid, the ending belongs to no known format, or no encoder of films was
+    /// found.
     pub fn of(path: &Path, name: &str) -> Result<SeriesTarget, Failure> {
         let text = path.to_string_lossy();
         let refuse = |why: &str| Err(input(format!("-o {text}: {why}")));
@@ -69,7 +69,7 @@ impl SeriesTarget {
         Ok(SeriesTarget::Files { before, digits, after: after.into(), format, folder: None })
     }
 
-    /// Path of the file of the picture with this number; of a film that of the film.
+    /// Path of the file of the picture with this number. For a film it is the path of the film, whatever the number is.
     pub fn file(&self, number: usize) -> PathBuf {
         match self {
             SeriesTarget::Files { before, digits, after, .. } => {
@@ -96,7 +96,7 @@ impl SeriesTarget {
     }
 }
 
-/// A series of pictures that is being written. Each of its files is complete or does not exist.
+/// A series of pictures that is being written. Each of its files is either written completely or not at all.
 pub struct PictureSeries<'a> {
     target: &'a SeriesTarget,
     /// Pictures of a film in a second.

@@ -104,7 +104,7 @@ pub fn open_recording(path: &Path, options: OpenOptions) -> Result<Box<dyn Sourc
     Ok(source)
 }
 
-/// Prints on one line which probe file is used. Prints nothing if there is none, or if the previous line named the same one.
+/// Prints on one line which probe file is used. Prints nothing for None, or if the last call that printed named the same file.
 pub fn say_probe_file(file: Option<&Path>) {
     let mut said = SAID.lock().unwrap_or_else(|e| e.into_inner());
     if let Some(file) = file.filter(|file| said.as_deref() != Some(*file)) {

@@ -35,7 +35,7 @@ const PHANTOM_RATE: f64 = 1.0;
 /// Largest memory of a voxel of a freehand volume, bytes: its sums, and a sample of 32 bits.
 const VOXEL_BYTES: u64 = 12;
 
-/// The source of live frames.
+/// The arguments that choose the source of live frames.
 #[derive(Clone, clap::Args)]
 pub struct SourceArgs {
     #[arg(long, value_name = "SOURCE", default_value = "phantom", help = format!(
@@ -92,7 +92,7 @@ struct SourceParser {
 }
 
 impl SourceArgs {
-    /// The source that a configuration file selects. Error messages name the keys of the file.
+    /// The source that a configuration file of the kiosk selects. Error messages name the keys of the file.
     pub fn from_config(config: &Config) -> Result<SourceArgs, Failure> {
         let parsed = SourceParser::try_parse_from(config.source_arguments()).map_err(|error| {
             let text = error.to_string();
@@ -114,13 +114,13 @@ impl SourceArgs {
         self.motor.check()
     }
 
-    /// The same arguments for another recording; the geometry flags remain.
+    /// The same arguments for another recording; the flags of geometry and of freehand volumes remain.
     #[cfg(feature = "view")]
     pub fn at_file(&self, file: &Path) -> SourceArgs {
         SourceArgs { source: file.to_string_lossy().into_owned(), ..self.clone() }
     }
 
-    /// The same arguments for another recording, without the geometry flags.
+    /// The same arguments for another recording, without the flags of geometry and of freehand volumes.
     #[cfg(feature = "view")]
     pub fn of_file(&self, file: &Path) -> SourceArgs {
         let geometry = GeometryArgs::default();
@@ -135,7 +135,8 @@ impl SourceArgs {
         }
     }
 
-    /// The same arguments for the recording that a workspace names. `file`: path of the workspace.
+    /// The same arguments for the recording that a workspace names. The geometry of the workspace is used where these arguments state none. `file`:
+    /// path of the workspace.
     ///
     /// # Errors
     /// The workspace names no recording, or its depth axis is not valid.
@@ -145,7 +146,7 @@ impl SourceArgs {
         Ok(SourceArgs { source, geometry: self.geometry.or(&workspace.origin)?, ..self.clone() })
     }
 
-    /// The source and its geometry flags as a workspace stores them.
+    /// The source and its geometry flags as a workspace stores them; without a recording if the source is live.
     #[cfg(feature = "view")]
     pub fn origin(&self) -> Origin {
         match self.kind() {
@@ -155,10 +156,10 @@ impl SourceArgs {
         }
     }
 
-    /// Adds the labels of a segmentation of this source to the settings.
+    /// Adds the labels of a segmentation of the first volume of this source to the settings.
     ///
     /// # Errors
-    /// The file is no segmentation of it, or the source is live.
+    /// The file is no segmentation or its labels lie beside the volume, the recording cannot be opened, or the source is standard input or a network.
     #[cfg(feature = "view")]
     pub fn show_labels(&self, layers: &mut Layers, file: &Path) -> Result<(), Failure> {
         let source: Box<dyn Source> = match self.kind() {
@@ -173,7 +174,8 @@ impl SourceArgs {
         show_labels(layers, file, &source.geometry(0), source.world_of(0))
     }
 
-    /// Where the first volume of a recording is, if its file says so.
+    /// The map from voxels of the first volume of a recording to world coordinates. None if its file states none or cannot be opened, or if the
+    /// source is no recording.
     #[cfg(feature = "view")]
     pub fn world(&self) -> Option<crate::probe::World> {
         let recording = (self.kind() == SourceKind::Recording).then_some(self.path())?;
@@ -375,12 +377,12 @@ impl StreamArgs {
         }
     }
 
-    /// Which operations are timed on the device.
+    /// Which operations are timed on the device: each pass with `--timings`, otherwise only pictures and frames as a whole.
     pub fn time_stamps(&self) -> TimeStamps {
         if self.timings { TimeStamps::EachPass } else { TimeStamps::Ends }
     }
 
-    /// Number of device queues to use, as `--queues` says; None: all.
+    /// Number of device queues to use, as `--queues` says; None: one for each kind of work that the device has a queue for.
     pub fn queues(&self) -> Option<usize> {
         self.queues.map(usize::from)
     }

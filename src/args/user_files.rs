@@ -20,20 +20,20 @@ const PRESETS: Place =
 #[cfg(feature = "view")]
 const RECENT: Place = Place { variable: "ECHOLUME_RECENT", xdg: ("XDG_STATE_HOME", ".local/state"), name: "recent" };
 
-/// Path of the folder of compiled pipelines: `pipelines` in the user's cache folder, or the value of ECHOLUME_PIPELINE_CACHE. None if that is
-/// `none` or empty, or if the system has no such folder.
+/// Path of the folder of compiled pipelines: `echolume/pipelines` in the user's cache folder, or the value of ECHOLUME_PIPELINE_CACHE. None if that
+/// value is `none` or empty, or if the system has no such folder.
 pub fn pipeline_folder() -> Option<PathBuf> {
     PIPELINES.path(|name| std::env::var_os(name))
 }
 
-/// Path of the file with the user's presets: `presets.toml` in the user's configuration folder, or the value of ECHOLUME_PRESETS. None if that
-/// is `none` or empty, or if the system has no such folder.
+/// Path of the file with the user's presets: `echolume/presets.toml` in the user's configuration folder, or the value of ECHOLUME_PRESETS. None if
+/// that value is `none` or empty, or if the system has no such folder.
 pub fn presets_file() -> Option<PathBuf> {
     PRESETS.path(|name| std::env::var_os(name))
 }
 
-/// Path of the list of recent files: `recent` in the user's state folder, or the value of ECHOLUME_RECENT. None if that is `none` or empty, or
-/// if the system has no such folder.
+/// Path of the list of recent files: `echolume/recent` in the user's state folder, or the value of ECHOLUME_RECENT. None if that value is `none` or
+/// empty, or if the system has no such folder.
 #[cfg(feature = "view")]
 pub fn recent_list() -> Option<PathBuf> {
     RECENT.path(|name| std::env::var_os(name))

@@ -17,7 +17,8 @@ static IS_CLOSED: AtomicBool = AtomicBool::new(false);
 /// True once standard output carries data: lines then go to standard error.
 static IS_DATA: AtomicBool = AtomicBool::new(false);
 
-/// Prints one line on standard output. Takes the arguments of `format!`.
+/// Prints one line as `terminal::print` does: on standard output, or on standard error once standard output carries data. Takes the arguments of
+/// `format!`.
 #[macro_export]
 macro_rules! say {
     ($($word:tt)*) => { $crate::terminal::print(format_args!($($word)*)) };

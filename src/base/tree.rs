@@ -9,7 +9,7 @@ use std::ops::Range;
 use toml::Value;
 use toml::de::{DeTable, DeValue};
 
-/// A parsed value and the range of bytes of the text that it was parsed from.
+/// A value of TOML and, if it was parsed from a text, the range of bytes of that text.
 #[derive(Clone, Debug)]
 pub struct Node {
     span: Option<Range<usize>>,
@@ -64,7 +64,7 @@ impl NodeError {
         &self.message
     }
 
-    /// The faulty bytes of the text. None if the value comes from a table in memory.
+    /// The range of the faulty bytes of the text. None if the value comes from a table in memory.
     pub fn span(&self) -> Option<Range<usize>> {
         self.span.clone()
     }

@@ -30,7 +30,7 @@ const DECAY: f64 = 0.75;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Bands {
     /// By measured time. `losses`: how often the device was lost so far; each loss halves the time that a submission may take. With 0, dispatches on
-    /// a software device stay whole.
+    /// a software device stay whole, except for a renderer that is paced (`RendererOptions::paced`).
     Measured { losses: u32 },
     /// Into bands of about this many invocations, rounded up to complete rows of workgroups: for tests.
     Fixed(u64),
@@ -174,7 +174,7 @@ pub struct Work {
     pub invocations: u64,
 }
 
-/// Stores the measured time, ns, of a submission with this work. Of several dispatches, each gets the part of the time that was expected of it.
+/// Stores the measured time, ns, of a submission with this work. Several dispatches share the time in proportion to their expected times.
 pub fn measured(work: &[Work], ns: f64) {
     let expected: f64 = work.iter().map(|w| w.expected).sum();
     for w in work.iter().filter(|w| w.invocations > 0) {

@@ -14,7 +14,8 @@ use std::mem::MaybeUninit;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// A buffer and its memory, which stays mapped as long as it lives. Only readback buffers are read by the host.
+/// A buffer and its memory, which stays mapped as long as the buffer lives, except with [`Purpose::Groups`]. The host reads only
+/// [`Purpose::Readback`] buffers.
 pub struct Buffer {
     context: Arc<Context>,
     pub handle: vk::Buffer,

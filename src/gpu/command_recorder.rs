@@ -101,7 +101,7 @@ pub(crate) struct CommandRecorder {
 }
 
 impl CommandRecorder {
-    /// With `statistics`, the invocations of every timed dispatch are counted, if the device supports that.
+    /// With `statistics` and [`TimeStamps::EachPass`], the invocations of every dispatch are counted, if the device supports that.
     pub fn new(
         context: &Arc<Context>,
         queue: usize,
@@ -307,7 +307,8 @@ impl CommandRecorder {
         Ok(())
     }
 
-    /// Records a dispatch with the barrier that it needs. With `limit` it is divided into bands, each in a submission of its own.
+    /// Records a dispatch with the barrier that it needs. With `limit` it is divided into bands, each in a submission of its own; an indirect
+    /// dispatch stays whole.
     ///
     /// # Errors
     /// More parameters than one command buffer can hold; a device that fails.

@@ -36,7 +36,7 @@ const SOFTWARE_BLOCK: u64 = 8 << 20;
 pub struct ContextOptions {
     /// The device. The default is the best one.
     pub device: DeviceChoice,
-    /// Enables core and synchronization validation. Every message is kept in [`Context::messages`].
+    /// Enables core and synchronization validation, whose messages [`Context::messages`] returns.
     pub validation: bool,
     /// Time after which a device that does not finish a submission is given up.
     pub deadline: Deadline,
@@ -53,8 +53,8 @@ pub struct ContextOptions {
     /// instruction of each pipeline, so that the first picture takes less than half of the time; the compilers of some GPUs then use more
     /// registers.
     pub specialize: Option<bool>,
-    /// Number of compiled pipelines that are kept although no plan uses them, at least 1. A pipeline beyond that is compiled again when it is needed
-    /// again.
+    /// Largest number of compiled pipelines that are kept although no renderer's plan uses them, at least 1. A pipeline beyond that is compiled again
+    /// when it is needed again.
     pub max_unused_pipelines: usize,
 }
 
@@ -94,7 +94,7 @@ pub struct Context {
     pub(super) executables: Option<ash::khr::pipeline_executable_properties::Device>,
     /// True if shader modules have the values of their constants before the driver gets them ([`ContextOptions::specialize`]).
     pub(super) specializes: bool,
-    /// Number of compiled pipelines that are kept although no plan uses them.
+    /// Largest number of compiled pipelines that are kept although no renderer's plan uses them.
     pub(super) max_unused_pipelines: usize,
     pub(super) pipeline_cache: PipelineCache,
     /// The pipelines that the renderers of the device share, as long as one of them holds them. Their type is [`super::pipelines::Pipelines`], whose
@@ -138,7 +138,7 @@ pub(super) struct ClockReading {
     pub deviation: u64,
 }
 
-/// Counts of costly operations since the context was opened; they must not happen for every frame.
+/// Counts of operations since the context was opened. All except dispatches are costly and must not happen for every frame.
 #[derive(Debug, Default)]
 pub struct Counts {
     /// Number of allocations of device memory.
@@ -303,7 +303,7 @@ impl Context {
         Ok(context)
     }
 
-    /// All messages of the validation layer so far; empty without validation. A correct program has none.
+    /// All warnings and errors of the validation layer so far, without known false positives; empty without validation. A correct program has none.
     pub fn messages(&self) -> Vec<String> {
         self.messenger.as_ref().map(Messenger::messages).unwrap_or_default()
     }

@@ -55,7 +55,7 @@ pub enum GpuError {
 }
 
 impl GpuError {
-    /// True if the device was lost or was given up because it did not finish. Everything must then be made again from a new context.
+    /// True if the device was lost or given up ([`GpuError::is_given_up`]). Everything must then be made again from a new context.
     pub fn is_device_lost(&self) -> bool {
         matches!(self, GpuError::Vulkan { result: vk::Result::ERROR_DEVICE_LOST, .. } | GpuError::Lost { .. })
             || self.is_given_up()

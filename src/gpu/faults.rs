@@ -56,7 +56,7 @@ pub struct Poison {
 }
 
 impl Poison {
-    /// Two poisons that differ in every significant bit. A result that differs between them depends on uninitialized memory.
+    /// Two poisons that differ in every field. A result that differs between them depends on uninitialized memory.
     pub const BOTH: [Poison; 2] = [
         Poison { float: f32::NAN, normalized: 2.0 / 3.0, integer: 0xabab_abab, byte: 0xff },
         Poison { float: -999.5, normalized: 1.0 / 3.0, integer: 0x5555_5555, byte: 0x55 },
@@ -73,7 +73,8 @@ impl Poison {
     }
 }
 
-/// The injected faults of a context: at most one failing or hanging call, one slow pass, one poison, and one wrong result.
+/// The injected faults of a context: at most one each of a failing call, a hang, a slow pass, a poison, a loss report, a memory budget and a wrong
+/// result.
 #[derive(Default)]
 pub struct Faults {
     planned: Mutex<Option<(InjectionPoint, u32, vk::Result)>>,
@@ -153,7 +154,7 @@ impl Faults {
         self.holds_pictures.load(Ordering::Relaxed)
     }
 
-    /// Cancels a failure that was injected but has not happened yet.
+    /// Cancels a failure of [`Faults::inject`] that has not happened yet.
     pub fn forget(&self) {
         *self.planned.lock().unwrap_or_else(|e| e.into_inner()) = None;
     }
@@ -194,7 +195,8 @@ impl Faults {
         *self.poison.lock().unwrap_or_else(|e| e.into_inner())
     }
 
-    /// From now on each dispatch of the pass is recorded `times` times, with the same results. 0 leaves the dispatch out.
+    /// From now on each dispatch of the pass is recorded `times` times: results stay the same, and the time grows. 0 leaves the dispatch out. A later
+    /// call replaces an earlier one, also for another pass.
     pub fn slow_down(&self, pass: &'static str, times: u32) {
         *self.slow.lock().unwrap_or_else(|e| e.into_inner()) = Some((pass, times));
     }

@@ -94,9 +94,10 @@ fn features(context: &Context, slot: Slot, scene: &Scene) -> vk::FormatFeatureFl
 const FRAMES_IN_CACHE: u32 = 4;
 
 /// Sets the fields of a scene that depend on the device. `ray.sampling = "auto"` becomes the filter of the device, or packed neighbours with
-/// [`TexelAccess::Storage`]. It becomes eight single texels if the device cannot filter the volume's format, or if packed neighbours take more time than
-/// they save or exceed a limit of the device. The volume gets the format that the device stores best, the picture that of the window, and passes use
-/// shared memory on a GPU. On a CPU few frames go through stage 1 at once, so that the slots of stage 1 stay in the caches.
+/// [`TexelAccess::Storage`]. It becomes [`Sampling::Exact`] (eight single texels) if the device cannot filter the volume's format, or if packed
+/// neighbours take more time than they save or exceed a limit of the device. The volume gets the format that the device stores best, the picture that
+/// of the window, and passes use shared memory on a GPU. On a CPU few frames go through stage 1 at once, so that the slots of stage 1 stay in the
+/// caches.
 pub fn adapt_scene(context: &Context, texel_access: TexelAccess, mut scene: Scene) -> Scene {
     scene.truncates_halves = context.candidate.truncates_halves();
     let filters = filters(context, Slot::Volume.format(&scene));
@@ -216,7 +217,7 @@ pub struct FormatSupport {
     pub max_extent: [u32; 3],
 }
 
-/// Support for every format that slots have, with every use that slots make of it.
+/// The support of the device for every image format that slots have: for each format, which of the uses that slots make of images it allows.
 pub fn format_support(context: &Context) -> Vec<FormatSupport> {
     let formats = [
         Format::R8,

@@ -17,8 +17,8 @@ impl Losses {
         self.0 <= MAX_LOSSES
     }
 
-    /// Counts the loss that `error` reports, and logs it. False if the work must not be tried again: the error is not a loss, the device
-    /// did not finish (it would not the next time), or it was lost too often.
+    /// Counts the loss of the device that `error` reports. True if the work may be tried again; the error is then logged. False if the error is no
+    /// loss, the device did not finish (as it would not the next time), or it was lost too often.
     pub fn allow_after(&mut self, error: &GpuError) -> bool {
         let allowed = error.is_device_lost() && !error.is_given_up() && self.allow_another();
         if allowed {

@@ -23,7 +23,7 @@ pub struct LossReport {
 pub struct FaultAddress {
     pub kind: &'static str,
     pub address: u64,
-    /// The fault lies within this many bytes around the address, a power of two; 1 means exactly there.
+    /// The fault lies in the aligned block of this many bytes, a power of two, that contains the address; 1 means exactly there.
     pub precision: u64,
 }
 

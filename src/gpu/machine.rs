@@ -18,7 +18,7 @@ pub struct Device {
     pub is_software: bool,
     /// Period of the device's clock, ns per tick.
     pub timestamp_period_ns: f64,
-    /// Number of valid bits of a time stamp. 0 if the queue has none; then no pass has times.
+    /// Number of valid bits of a time stamp. 0 if the rendering queue has none; then no pass has times.
     pub valid_bits: u32,
     /// True if the device's clock can be related to the host's, so that both can be drawn on one axis.
     pub calibrated: bool,
@@ -63,7 +63,7 @@ impl Device {
     }
 }
 
-/// The current time, RFC 3339.
+/// The current time, UTC, in whole seconds (RFC 3339).
 pub fn date() -> String {
     humantime::format_rfc3339_seconds(SystemTime::now()).to_string()
 }
@@ -118,7 +118,8 @@ impl CpuTime {
         (!threads.is_empty()).then_some(CpuTime(threads))
     }
 
-    /// CPU time of all threads since `then`, ns. Time of threads that have ended since then is lost; drivers keep their threads alive.
+    /// CPU time of all threads from the reading `then` to this later reading, ns. Time of threads that have ended since then is lost; drivers keep
+    /// their threads alive.
     pub fn since(&self, then: &CpuTime) -> f64 {
         let of = |(name, now): (&String, &u64)| now.saturating_sub(then.0.get(name).copied().unwrap_or(0));
         self.0.iter().map(of).sum::<u64>() as f64

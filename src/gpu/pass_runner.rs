@@ -24,7 +24,7 @@ pub struct PassRunner {
 }
 
 impl PassRunner {
-    /// Makes a runner with the device's fast way to read texels.
+    /// Makes a runner with the device's faster way to read texels ([`TexelAccess::for_device`]).
     ///
     /// # Errors
     /// The device fails.
@@ -171,9 +171,9 @@ pub struct PassTimer {
 }
 
 impl PassTimer {
-    /// Allocates the slots and runs the pass once, because drivers compile at the first run. `contents`: content of images before that run, for the
-    /// volume all of it. Tables that the CPU computes from the scene are filled; all other slots hold zeros. A pass over frames works on layer 0 and
-    /// the middle slice, a pass over volumes on all visible slices.
+    /// Allocates the slots and runs the pass once, because drivers compile at the first run. `contents`: texels of image slots before that run; for
+    /// the volume they are those of all slices, of which the device may store only a part. Tables that the CPU computes from the scene are filled;
+    /// all other slots hold zeros. A pass over frames works on layer 0 and the middle slice, a pass over volumes on all visible slices.
     ///
     /// # Errors
     /// The device cannot hold a slot, or a shader does not compile; the error names it.

@@ -119,7 +119,8 @@ impl AsyncPipelineCompiler {
         Ok(AsyncPipelineCompiler { shared, pipelines: pipelines.clone(), held: Vec::new(), thread: Some(thread) })
     }
 
-    /// True if every pipeline of a plan is compiled; otherwise requests the missing ones.
+    /// True if every pipeline of a plan is compiled; otherwise requests the missing ones. Also true if the thread has died, because missing pipelines
+    /// are then compiled at their first use.
     ///
     /// # Errors
     /// A pipeline could not be compiled.

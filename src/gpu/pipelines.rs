@@ -56,7 +56,7 @@ pub struct Compile {
     pub flags: vk::PipelineCreateFlags,
 }
 
-/// A function that returns the SPIR-V words of a shader, given its path below glsl/ with the variant.
+/// A function that returns the SPIR-V words of a shader, given its name: its path below glsl/ and its variant, such as `filter/sigma.slice`.
 pub type Shaders = dyn Fn(&str) -> Result<Vec<u32>, String> + Send + Sync;
 
 /// A pipeline that was compiled just now.
@@ -94,8 +94,8 @@ pub(crate) fn descriptor_type(kind: Kind) -> vk::DescriptorType {
 }
 
 impl Pipelines {
-    /// The pipelines of these shaders. Those of the embedded shaders are shared by all renderers of a context, so that a second renderer of a scene
-    /// compiles nothing.
+    /// The pipelines of these shaders. Those of the embedded shaders are shared by all renderers of a context with the same `texel_access`, so that a
+    /// second renderer of a scene compiles nothing.
     ///
     /// # Errors
     /// The device fails.
@@ -179,7 +179,7 @@ impl Pipelines {
     /// The pipeline for a dispatch of a pass in a scene; it is compiled at its first use.
     ///
     /// # Errors
-    /// The shader does not exist, or disagrees with the declaration of the pass.
+    /// The shader does not exist, disagrees with the declaration of the pass, or is refused by the driver.
     pub fn get(&self, pass: &Pass, scene: &Scene, args: &DispatchArgs) -> Result<Arc<Pipeline>, GpuError> {
         let key = self.key(pass, scene, args);
         if let Some(pipeline) = self.cached(&key) {

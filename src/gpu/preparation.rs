@@ -87,7 +87,7 @@ impl Preparation {
         Ok(Some(Preparation { progress, thread: Some(thread) }))
     }
 
-    /// Number of pipelines that are compiled, and of all. Both are 0 until the number is known.
+    /// Number of pipelines that this preparation has compiled so far, and the number that it has to compile. Both are 0 until the second is known.
     pub fn progress(&self) -> [usize; 2] {
         [&self.progress.done, &self.progress.count].map(|count| count.load(Ordering::Relaxed))
     }
@@ -102,7 +102,8 @@ impl Preparation {
         self.progress.is_cancelled.store(true, Ordering::Relaxed);
     }
 
-    /// Waits until all are compiled. None if the thread panicked: the renderer then compiles the pipelines itself and reports the fault.
+    /// Waits until the thread has ended: after [`Preparation::cancel`] the result holds only the pipelines so far. None if the thread panicked: the
+    /// renderer then compiles the pipelines itself and reports the fault.
     ///
     /// # Errors
     /// The error with which a renderer of the scene would fail.

@@ -100,7 +100,7 @@ impl ShaderFolder {
         made
     }
 
-    /// Why the present sources are not in use: the first fault, in several lines. None if there is no fault.
+    /// Why the present sources are not all in use: the first fault, which may have several lines. None if there is no fault.
     pub fn fault(&self) -> Option<String> {
         let state = self.state();
         state
@@ -112,8 +112,8 @@ impl ShaderFolder {
             .cloned()
     }
 
-    /// The shaders that were compiled again since the last call, whose pipelines are thus out of date. None if there are none. Refused shaders are
-    /// among them until pipelines of them are accepted.
+    /// The shaders whose source changed and was compiled since the last call, so that pipelines of them are out of date. None if there are none.
+    /// Otherwise refused shaders ([`ShaderFolder::refuse`]) are included until [`ShaderFolder::accept`].
     pub fn take_changed(&self) -> Option<HashSet<String>> {
         let mut state = self.state();
         let mut changed = std::mem::take(&mut state.changed);

@@ -229,7 +229,7 @@ impl Timelines {
         self.0.iter().try_for_each(|timeline| timeline.release(timeline.submitted))
     }
 
-    /// True if submissions are held back.
+    /// True if submissions are held back when there is enough work: [`Timelines::pace`] was called, and there is one queue.
     pub(super) fn is_paced(&self) -> bool {
         self.0.iter().any(|timeline| timeline.paced.is_some())
     }

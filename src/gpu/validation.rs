@@ -13,7 +13,8 @@ const KNOWS_TIMELINES: u32 = vk::make_api_version(0, 1, 3, 297);
 #[derive(Clone, Copy, Debug)]
 pub struct Layer {
     version: u32,
-    /// True if the layer takes its settings from the program that creates the instance (VK_EXT_layer_settings), as it does since January 2024.
+    /// True if the layer gets [`settings`] (VK_EXT_layer_settings) instead of [`FEATURES`]: it takes settings and is at least version 1.3.297, since
+    /// earlier ones do not know every setting.
     pub(crate) has_settings: bool,
 }
 
@@ -98,7 +99,7 @@ impl Messenger {
         Ok(Messenger { layer, unseen_waits: AtomicU64::new(1), debug, handle, messages })
     }
 
-    /// All messages so far.
+    /// All warnings and errors so far, without known false positives.
     pub fn messages(&self) -> Vec<String> {
         self.messages.lock().unwrap_or_else(|e| e.into_inner()).clone()
     }

@@ -132,8 +132,8 @@ impl Watchdog {
         }
     }
 
-    /// Waits by calling `attempt` repeatedly. It gets a time-out in ns, and returns [`vk::Result::TIMEOUT`] if that passes. `since` returns since
-    /// when the device has been busy without any progress.
+    /// Waits by calling `attempt` repeatedly. `attempt` gets a time-out in ns, and returns [`vk::Result::TIMEOUT`] if that passes. `since` returns
+    /// since when the device has been busy without any progress.
     ///
     /// # Errors
     /// The device is given up, because it is late or a stop was requested, or `attempt` fails.
@@ -164,7 +164,7 @@ impl Watchdog {
     }
 }
 
-/// Keeps track of since when a queue has been busy without progress. Submissions finish in their order.
+/// Tracks since when a queue has been busy without progress. Submissions have ascending numbers and finish in that order.
 #[derive(Debug, Default)]
 pub struct Progress {
     /// The number of each submission that was not seen done, and when it was made.

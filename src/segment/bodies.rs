@@ -20,8 +20,9 @@ const MAX_SAMPLES: usize = 1 << 21;
 /// Bins of the histogram of the first threshold.
 const BINS: usize = 512;
 
-/// The usual smoothing, and the opening with a seed, mm: what speckle leaves open in a wall is thinner.
+/// The usual [`Search::smoothing`], mm.
 pub const SMOOTHING: f64 = 1.2;
+/// The usual [`Search::opening`] with a seed, mm: gaps that speckle leaves in a wall are narrower than twice this radius.
 pub const OPENING: f64 = 1.0;
 /// Widest smoothing and opening, in the shortest edge of a voxel: slices within it are kept in memory.
 const MAX_REACH: f64 = 32.0;
@@ -84,8 +85,9 @@ pub struct Found {
     pub left_out: usize,
 }
 
-/// Finds the largest body of a volume that is brighter than what is around it within a box, from the lowest to the highest corner in space, mm. Returns it with
-/// the echo at its surface as a share of the sample range. `range`: the stored values at both ends of the sample range.
+/// Finds, within a box, the largest body that is brighter than what is around it. `corners`: the lowest and the highest corner of the box, mm in the
+/// space of the volume. Returns the body, and the level at its surface as a share of the sample range, 0..=1. `range`: the stored values at both ends
+/// of the sample range.
 ///
 /// # Errors
 /// One line: no voxel lies in the box, or as [`find`].

@@ -15,8 +15,8 @@ use std::f64::consts::{PI, TAU};
 /// Most points of all contours.
 const MAX_POINTS: usize = 65_536;
 
-/// The numbers of the voxels whose centres lie in the body that contours describe, mm in the coordinates of the grid. Several contours in one
-/// plane bound the same section; one within another is a hole.
+/// Linear indices (x is the fastest axis) of the voxels of `grid` whose centres lie in the body between contours. A contour is a closed polygon in a
+/// plane, its points in mm in the coordinates of the grid. Several contours in one plane bound the same section; one within another is a hole.
 ///
 /// # Errors
 /// One line: fewer than two planes, a contour without area, planes that are neither parallel nor share an axis, too many points.

@@ -98,7 +98,7 @@ impl Scale {
     }
 }
 
-/// The quantity that bodies are searched in ([`Scale::searched`]), 0..=1, at each voxel of a grid; unknown outside the insonified region.
+/// The quantity that bodies are searched in ([`Scale::searched`]), 0..=1, at each voxel of a grid; NaN outside the insonified region.
 #[derive(Clone, Debug)]
 pub struct Field {
     grid: Grid,

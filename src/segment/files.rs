@@ -1,4 +1,4 @@
-//! Labels in files: segmentations of 3D Slicer (`.seg.nrrd`), and meshes of labels.
+//! Labels in files: segmentations of 3D Slicer (`.seg.nrrd`), segmentations in DICOM (`.seg.dcm`, written only), and meshes of labels.
 
 use crate::base_files::InputError;
 use crate::labels::Labels;
@@ -22,10 +22,11 @@ const COLOURS: [[f64; 3]; 6] =
 /// Bins of the histogram by which the level of a surface is found.
 const BINS: usize = 1024;
 
-/// Writes labels as a segmentation of 3D Slicer. Each label becomes a segment with a colour and the name that `name` gives.
+/// Writes labels as a segmentation: in DICOM if the name of the file ends in `.seg.dcm`, otherwise in the NRRD format of 3D Slicer. Each label that a
+/// voxel has becomes a segment with a colour and the name that `name` gives.
 ///
 /// # Errors
-/// The file cannot be written. A file that exists is complete.
+/// The file cannot be written, or DICOM cannot hold the labels: too many voxels, or none with a label. No incomplete file is left.
 pub fn write(labels: &Labels, path: &Path, name: impl Fn(u8) -> String) -> Result<(), InputError> {
     let there: BTreeSet<u8> = labels.voxels().iter().copied().filter(|label| *label > 0).collect();
     let segments: Vec<Segment> = there.into_iter().map(|label| segment(label, name(label))).collect();
@@ -37,7 +38,7 @@ pub fn segment(label: u8, name: String) -> Segment {
     Segment { label, name: name.into(), colour: COLOURS[(usize::from(label) + COLOURS.len() - 1) % COLOURS.len()] }
 }
 
-/// As [`write`], with these segments.
+/// Writes labels as a segmentation in the formats of [`write`], with these segments.
 ///
 /// # Errors
 /// As for [`write`].
@@ -47,8 +48,8 @@ pub fn write_segments(labels: &Labels, path: &Path, segments: &[Segment]) -> Res
     segmentation::write(path, labels.grid(), labels.world(), segments, label, || ())
 }
 
-/// Reads a segmentation: its labels and its segments. The axes of the grid are chosen by the orientation of the file and by `options`, as those of a
-/// recording are.
+/// Reads an NRRD segmentation: its labels and its segments. The axes of the grid are chosen by the orientation of the file and by `options`, as those
+/// of a recording are.
 ///
 /// # Errors
 /// The file is no segmentation, is no volume of one layer of bytes, or cannot be read.
@@ -77,8 +78,8 @@ pub fn read(path: &Path, options: OpenOptions) -> Result<(Labels, Vec<Segment>),
     Ok((Labels::of(grid, world, voxels).map_err(fault)?, segments))
 }
 
-/// The labels as a scene of a volume shows them, in the colours of their segments. `world`: where the volume is, if it says so; otherwise world
-/// coordinates of the labels are taken as coordinates of the volume.
+/// The labels as a scene of a volume shows them, in the colours of their segments. `geometry`, `world`: those of the volume. If `world` is None or
+/// the volume is a sweep, world coordinates of the labels are taken as coordinates of the volume.
 ///
 /// # Errors
 /// One line: there are none, too many, or all of them are beside the volume.
@@ -109,7 +110,7 @@ pub fn to_space(labels: &Labels, geometry: &Geometry, world: Option<World>) -> D
     }
 }
 
-/// The closed surface around the voxels of a label, in the world, mm. A Gaussian of one voxel smooths the steps; the surface encloses as many
+/// The closed surface around the voxels of a label, in world coordinates, mm. A Gaussian of one voxel smooths the steps; the surface encloses as many
 /// voxels as have the label, so that small bodies do not shrink.
 ///
 /// # Errors

@@ -41,7 +41,7 @@ pub struct Patch {
 }
 
 impl Patch {
-    /// Number of its voxels, a byte each.
+    /// Memory of the patch, bytes: one for each voxel of the box.
     pub fn bytes(&self) -> usize {
         self.voxels.len()
     }
@@ -103,13 +103,13 @@ impl Labels {
         changed
     }
 
-    /// Sets the label of the voxels with these numbers.
+    /// Sets the label of the voxels with these linear indices; x is the fastest axis.
     pub fn set(&mut self, voxels: &[u32], label: u8) {
         voxels.iter().for_each(|n| self.voxels[*n as usize] = label);
     }
 
-    /// The numbers of the voxels of another lattice, of `size` voxels, whose centres lie in a labelled voxel of this one. `to_place`: from the
-    /// index of a voxel of the other to its place in the coordinates of this grid, mm.
+    /// Linear indices (x is the fastest axis) of those voxels of another lattice, of `size` voxels, whose centres lie in a labelled voxel of this
+    /// one. `to_place`: map from the index (x, y, z) of a voxel of the other lattice to its place in the coordinates of this grid, mm.
     pub fn sampled(&self, size: [usize; 3], to_place: DAffine3) -> Vec<u32> {
         let Grid { size: own, spacing, origin } = self.grid;
         let to_index =
@@ -124,7 +124,8 @@ impl Labels {
         (0..size.iter().product()).filter(is_labelled).map(|n| n as u32).collect()
     }
 
-    /// These labels in the smallest box of all voxels that have another one in `after`, which lies on the same grid; None if none has.
+    /// The labels of `self` in the smallest box around all voxels whose label is another one in `after`, which must have the same grid. None if no
+    /// label differs.
     pub fn before(&self, after: &Labels) -> Option<Patch> {
         let width = self.grid.size[0];
         let rows = self.voxels.chunks_exact(width).zip(after.voxels.chunks_exact(width)).enumerate();
@@ -138,7 +139,7 @@ impl Labels {
         Some(Patch { region, voxels: region.indices(self.grid.size).map(|n| self.voxels[n]).collect() })
     }
 
-    /// Exchanges the labels of a box with those of a patch, so that the next exchange brings them back.
+    /// Exchanges the labels in the box of a patch with those that the patch holds, so that a second exchange restores the labels.
     pub fn exchange(&mut self, patch: &mut Patch) {
         let there = patch.region.indices(self.grid.size);
         there.zip(&mut patch.voxels).for_each(|(n, voxel)| std::mem::swap(&mut self.voxels[n], voxel));

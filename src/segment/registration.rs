@@ -81,7 +81,7 @@ pub fn register(fixed: &Volume, moving: &Volume) -> Result<Registered, String> {
     Ok(Registered { motion, correlation: fit.sums.correlation(), overlap: fit.overlap })
 }
 
-/// The middle of the box around the insonified region of a volume, mm. Motions onto a fixed volume turn about that of the fixed volume.
+/// The middle of the box around the insonified region of a volume, mm. A motion of [`register`] turns about the centre of the fixed volume.
 pub fn centre(geometry: &Geometry) -> DVec3 {
     let (low, high) = match geometry {
         Geometry::Sweep(probe) => probe.bounds(),

@@ -92,7 +92,7 @@ pub fn vector_area(contour: &[DVec3]) -> DVec3 {
     rest.windows(2).map(|ends| (ends[0] - first).cross(ends[1] - first)).sum::<DVec3>() / 2.0
 }
 
-/// The mean of the points.
+/// The mean of the points; 0 without points.
 pub fn centroid(points: &[DVec3]) -> DVec3 {
     points.iter().sum::<DVec3>() / points.len().max(1) as f64
 }

@@ -14,7 +14,7 @@ pub struct Lock {
 }
 
 impl Lock {
-    /// False if nothing is locked, because no lock file can be made there, for example in a missing folder.
+    /// False if nothing is locked: the place is a device or a pipe, or no lock file can be made there, for example because the folder is missing.
     pub fn is_held(&self) -> bool {
         self.held.is_some()
     }
@@ -23,7 +23,7 @@ impl Lock {
     /// writing there reports the fault.
     ///
     /// # Errors
-    /// Another process holds the lock: one line with the path, and with the process if it is known.
+    /// Another [`Lock`], usually of another process, holds the lock: one line with the path, and with the process if it is known.
     pub fn take(place: &Path) -> Result<Lock, String> {
         let Some(path) = file_of(place) else { return Ok(Lock { held: None }) };
         loop {

@@ -61,8 +61,8 @@ enum Readers {
 /// The files of this process follow the umask.
 static FOLLOWS_UMASK: AtomicBool = AtomicBool::new(false);
 
-/// From now on the umask alone decides who may read the files that this process creates. Otherwise files that may hold patients' frames are for
-/// their owner only.
+/// From now on the umask decides who may read files that may hold patients' frames and that this process creates. Without this call only their owner
+/// may read them.
 pub fn follow_umask() {
     FOLLOWS_UMASK.store(true, Ordering::Relaxed);
 }

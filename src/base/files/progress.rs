@@ -34,7 +34,7 @@ pub enum Share {
     Unknown,
     /// `done` of `count` headers of the files of a folder were read.
     Files { done: u64, count: u64 },
-    /// Share of the data that was read, per cent.
+    /// Share of the announced data ([`expect_bytes`]) that was read, 0 to 100 per cent.
     Percent(u8),
 }
 
@@ -56,7 +56,7 @@ impl Progress {
         work()
     }
 
-    /// Cancels the reading: every later read within [`Progress::during`] fails.
+    /// Cancels the reading: every later read from a [`CountedFile`] that was opened within [`Progress::during`] fails, and so does [`add_bytes`].
     pub fn cancel(&self) {
         self.0.is_cancelled.store(true, Ordering::Relaxed);
     }
@@ -93,8 +93,8 @@ fn of_thread() -> Option<Progress> {
     OF_THREAD.with_borrow(Clone::clone)
 }
 
-/// Announces that this thread will read `bytes` bytes of input, to which progress is counted from now on. Ignored if at least as many announced
-/// bytes are still to be read: then this reading is a part of what was announced. Does nothing outside [`Progress::during`].
+/// Announces that this thread will read `bytes` bytes of input; [`Share::Percent`] counts from 0 to them from now on. Ignored if at least as many
+/// bytes of an earlier announcement are still to be read, because this reading is then a part of that. Does nothing outside [`Progress::during`].
 pub fn expect_bytes(bytes: u64) {
     if let Some(Progress(counts)) = of_thread() {
         let done = counts.bytes.load(Ordering::Relaxed) - counts.before.load(Ordering::Relaxed);

@@ -128,8 +128,8 @@ pub fn received() -> Option<&'static str> {
     handlers().signal().map(|(_, name)| name)
 }
 
-/// While a value of this type exists, SIGINT, SIGTERM and SIGHUP do not end the process ([`Held::first`]: not the first time);
-/// [`Held::signal`] reports them.
+/// While a value of this type exists, SIGINT, SIGTERM and SIGHUP do not end the process ([`Held::first`]: not the first time); [`Held::signal`]
+/// reports them. Dropping the value does not raise them again.
 #[derive(Debug)]
 pub struct Held {
     patient: bool,

@@ -6,8 +6,8 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 /// The style of all pages.
 const STYLE: &str = include_str!("style.css");
 
-/// A complete page. `title`: any text; it is escaped. `style`: CSS in addition to the common one. Pictures may only be `data:` URIs: a browser
-/// that opens the page loads nothing.
+/// A complete HTML page as text. `title`: any text; it is escaped. `style`: CSS in addition to the common one. Pictures may only be `data:` URIs: a
+/// browser that opens the page loads nothing.
 pub fn page(title: &str, style: &str, body: &Markup) -> String {
     let page = html! {
         (DOCTYPE)

@@ -49,7 +49,7 @@ impl Textfile {
     }
 
     /// Has the thread replace the content of the file by this text, and returns at once. A text that still waits to be written is discarded for a
-    /// newer one. A write error is reported once, until a write succeeds again.
+    /// newer one. A write error is logged as a warning; further errors are only counted until a write succeeds again.
     pub fn put(&self, text: String) {
         self.shared.lock().text = Some(text);
         self.shared.changed.notify_all();

@@ -72,7 +72,7 @@ impl FilmWriter {
         pipe.write_all(&picture.rgba).map_err(|e| self.said(&e.to_string()))
     }
 
-    /// Puts the complete file in its place.
+    /// Completes the film and renames it to the path that [`FilmWriter::create`] got.
     ///
     /// # Errors
     /// One line: what ffmpeg says, or a full disk.

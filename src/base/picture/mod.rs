@@ -41,7 +41,8 @@ impl Picture {
         brightness::<4, u8>(&self.rgba)
     }
 
-    /// Copies a picture to a place in this one, pixels. What is beyond its edges is left out.
+    /// Copies another picture into this one, with its upper left corner at pixel `[left, top]`. What would lie beyond the right and lower edges of
+    /// this picture is left out.
     pub fn paste(&mut self, other: &Picture, [left, top]: [u32; 2]) {
         let columns = other.width.min(self.width.saturating_sub(left)) as usize;
         let rows = other.height.min(self.height.saturating_sub(top)) as usize;
@@ -52,7 +53,7 @@ impl Picture {
         }
     }
 
-    /// Encodes an opaque PNG; with one channel if all pixels are grey.
+    /// Encodes a PNG without the alpha channel: with one channel if all pixels are grey, otherwise with three.
     ///
     /// # Errors
     /// One line: there are no pixels, or their number does not match the size.
@@ -60,7 +61,7 @@ impl Picture {
         self.encoded(PictureFormat::Png)
     }
 
-    /// Encodes an opaque picture; with one channel if all pixels are grey.
+    /// Encodes the picture without its alpha channel: with one channel if all pixels are grey, otherwise with three.
     ///
     /// # Errors
     /// One line: there are no pixels, or their number does not match the size.
@@ -158,7 +159,7 @@ impl Grey {
         self.values.iter().map(|v| f64::from(*v) / self.white()).collect()
     }
 
-    /// A picture of this one's size and depth from other pixel values in 0..1, each rounded to the nearest sample.
+    /// A picture of this one's size and depth with the pixel values `shares`, clamped to 0..1, each rounded to the nearest sample.
     pub fn with(&self, shares: &[f64]) -> Grey {
         let values = shares.iter().map(|v| (v.clamp(0.0, 1.0) * self.white()).round() as u16).collect();
         Grey { values, ..*self }

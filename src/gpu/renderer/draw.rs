@@ -10,7 +10,7 @@ use crate::plan::Work;
 use crate::window::screen::{Drawn, Panels, PresentOutcome, Screen};
 
 impl Renderer {
-    /// Selects volume image `image` for the next picture. All of its visible frames must have been sent.
+    /// Selects the volume image with index `image`, from 0, for the next picture and later ones. All of its visible frames must have been sent.
     ///
     /// # Errors
     /// The image does not exist, or the device fails.
@@ -53,13 +53,13 @@ impl Renderer {
         self.drawing.is_drawing(&self.queues)
     }
 
-    /// Number of submissions, such as bands, that are held back.
+    /// Number of submissions, such as bands, that are held back at present; 0 unless [`Renderer::is_paced`].
     pub fn held_back(&self) -> usize {
         self.queues.timelines.held()
     }
 
-    /// True if bands of a picture in flight are held back (`RendererOptions::paced`), so that other work that is submitted now begins before the
-    /// picture is done.
+    /// True if this renderer holds back bands of its pictures ([`RendererOptions::paced`], on a single queue). Other work that is submitted during a
+    /// picture then begins before the picture is done. True also while no picture is in flight.
     pub fn is_paced(&self) -> bool {
         self.queues.timelines.is_paced()
     }
@@ -169,8 +169,8 @@ impl Renderer {
 }
 
 impl Renderer {
-    /// The start surface that the CPU last found in the volume that is shown. None if it has not searched that volume yet, or if the scene asks for
-    /// no search (`unveil`).
+    /// The start surface, at which rendering starts (setting `unveil`), that the CPU last found in the volume that is shown. None if the CPU has not
+    /// searched that volume yet, or if the scene asks for no search.
     pub fn unveiled(&self) -> Option<&Unveiled> {
         self.volumes.unveiled().filter(|_| self.program.scene.unveils())
     }

@@ -35,11 +35,13 @@ use volumes::Volumes;
 /// How a [`Renderer`] works.
 #[derive(Clone)]
 pub struct RendererOptions {
-    /// Number of volume images: 1 for a still picture, 2 or 3 (double or triple buffering) while frames arrive during rendering.
+    /// Number of volume images, copies of the volume on the device: 1 for a still picture, 2 or 3 (double or triple buffering) while frames arrive
+    /// during rendering.
     pub volume_images: u32,
     /// Source of the SPIR-V of a shader. The default is the embedded shaders.
     pub shaders: Arc<Shaders>,
-    /// Records a span of time for each operation of host and device. If each pass is timed, shader invocations are counted, too.
+    /// Records the span of time (begin and end) of each operation of host and device ([`Renderer::take_spans`]). If each pass is timed, shader
+    /// invocations are counted, too.
     pub spans: bool,
     /// On a device that is the CPU, measures the CPU time of each pass ([`Renderer::take_cpu_times`]). Each pass is then submitted alone
     /// and waited for.
@@ -53,7 +55,8 @@ pub struct RendererOptions {
     pub paced: bool,
     /// How single texels are read. `None` selects the faster way on the device.
     pub texel_access: Option<TexelAccess>,
-    /// Largest number of frames that go through stage 1 at once, at least 1. `None` selects the best number for the device.
+    /// Largest number of frames that go through stage 1 (the conversion of frames into the volume) at once, at least 1. `None` selects the best
+    /// number for the device.
     pub frames_at_once: Option<u32>,
     /// Number of queues, 1..=3. `None` uses all queues of the device. If the device has fewer queues, several roles share one.
     pub queues: Option<usize>,
@@ -242,7 +245,7 @@ impl Renderer {
     /// Sends the frames of a volume to volume image 0, which the next picture shows.
     ///
     /// # Errors
-    /// As of [`Renderer::frame`].
+    /// Those of [`Renderer::frame`] and [`Renderer::show`].
     pub fn volume<'a>(&mut self, frames: impl IntoIterator<Item = &'a Frame>) -> Result<(), GpuError> {
         for frame in frames {
             self.frame(frame.slice as u32, &frame.bytes, 0)?;
@@ -250,8 +253,9 @@ impl Renderer {
         self.show(0)
     }
 
-    /// Sends one frame to stage 1, which writes slice `slice` of volume image `image`. `bytes` are samples of the stored type, line by line. Returns
-    /// when the bytes are copied, and waits only if all staging buffers are in use. A frame that is not visible in this scene is skipped and counted.
+    /// Sends one frame to stage 1, which converts it into slice `slice` of the volume image with index `image`, both from 0. `bytes` are samples of
+    /// the stored type, line by line. Returns when the bytes are copied, and waits only if all staging buffers are in use. A frame that is not
+    /// visible in this scene is skipped and counted.
     ///
     /// Consecutive slices, up or down, go through stage 1 together. A frame waits for its successors until the batch is full, no visible
     /// slice can follow, another slice arrives, [`Renderer::submit_frames`] is called, the volume is read, or the scene changes.
@@ -464,8 +468,8 @@ impl Renderer {
 }
 
 impl Renderer {
-    /// Reads back the current content of an image slot. A volume is returned as a whole, with zeros where the device stores nothing. `None` for a
-    /// slot that is not in the plan, and for a lookup table in a buffer.
+    /// Reads back the current content of an image slot; of a slot with a copy for each volume image, the copy that is shown. A volume is returned as
+    /// a whole, with zeros where the device stores nothing. `None` for a slot that is not in the plan, and for a lookup table in a buffer.
     ///
     /// # Errors
     /// The device fails, or the last change of the scene failed.
@@ -494,7 +498,8 @@ impl Renderer {
         Ok(self.queues.timings.take_times())
     }
 
-    /// Number of passes and copies since the last call that could not be timed, because too many frames arrived while a picture was drawn.
+    /// Number of passes and copies since the last call that could not be timed, because too many frames arrived while a picture was drawn, or because
+    /// one recording needed more time stamps than its queries hold.
     pub fn take_untimed(&mut self) -> u64 {
         self.queues.timings.take_untimed()
     }

@@ -103,11 +103,13 @@ impl Target {
 /// Which monitor to present on, and in which display mode.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MonitorChoice {
-    /// A part of the monitor's name, ignoring case; the first monitor that has it and any mode is used. `None` for the first monitor.
+    /// A part of the monitor's name, ignoring case. The first monitor whose name contains it and that has a display mode is used. `None` for the
+    /// first monitor that has a mode.
     pub monitor: Option<String>,
     /// Width and height, pixels, which a mode must have. `None` for the monitor's native resolution, or the largest mode if none has that.
     pub size: Option<[u32; 2]>,
-    /// Refresh rate, Hz, to which the nearest at that resolution is used; `None` for the highest one.
+    /// Refresh rate, Hz: of the modes with the chosen resolution, the one with the nearest rate is used. `None` for the highest rate. Without effect
+    /// where the largest mode replaces the native resolution.
     pub refresh: Option<f64>,
 }
 
