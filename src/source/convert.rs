@@ -23,7 +23,8 @@ pub struct Target {
     /// Map from voxels to the world (LPS).
     pub world: World,
     pub sample: SampleType,
-    /// Value of voxels outside the insonified region, in the units of the original file's values.
+    /// Value that is written for voxels outside the insonified region: in the units of the original file's values, or 0 to 255 for a secondary
+    /// capture.
     pub outside: f64,
     /// None: a volume with the values of the original file is written. Some: a DICOM secondary capture of 8 bits, with the stored values that
     /// become 0 and 255.
@@ -53,8 +54,9 @@ impl Target {
     /// Checks, before any work is done, that the file of this name can hold the volume.
     ///
     /// # Errors
-    /// The extension is no format, an axis is too long for the format, the type of the samples does not have the value outside, or a secondary
-    /// capture is to be written to another file than `.dcm`.
+    /// The extension is of no format that is written, an axis is too long for the format, or DICOM cannot hold the type of the samples or so many
+    /// bytes. Other errors: the type of the samples does not have the value `outside`, or a secondary capture is to be written to another file than
+    /// `.dcm`.
     pub fn check(&self, path: &Path) -> Result<(), InputError> {
         self.check_as(self.format(path)?, path)
     }
@@ -82,8 +84,8 @@ impl Target {
     }
 }
 
-/// The grid with a voxel spacing of `spacing` mm over the insonified region of a geometry. Its axes are lateral, depth (Y of the probe) and
-/// elevation.
+/// The grid with a voxel spacing of `spacing` mm over a box that contains the insonified region of a geometry. Its axes are lateral, depth (Y of the
+/// probe) and elevation.
 ///
 /// # Errors
 /// One line without the file's name: the spacing is no length above 0, or makes too many voxels.
@@ -130,10 +132,10 @@ impl Volume {
     }
 
     /// Reads the volume with this number, from 0, of a recording. Returns it and the number of its frames that are there: a `.frames` file may lack
-    /// some. `each` sees every frame before it is kept.
+    /// some. `each` is called with every frame before the volume takes it.
     ///
     /// # Errors
-    /// The recording cannot be read, or reports that it has no volume with this number. A `.frames` file has 0 frames of it instead.
+    /// The recording cannot be read, or has no volume with this number.
     pub fn read(
         source: &mut dyn Source,
         number: usize,
@@ -153,7 +155,7 @@ impl Volume {
         Ok((volume, there))
     }
 
-    /// Stores a frame as the slice that it states. A frame with a wrong slice or size is ignored.
+    /// Stores a frame at its [`Frame::slice`]. A frame of another size, or of a slice that the volume does not have, is ignored.
     pub fn take(&mut self, frame: Frame) {
         let bytes = self.size[0] * self.size[1] * self.stored.bytes();
         if let Some(place) = self.frames.get_mut(frame.slice).filter(|_| frame.bytes.len() == bytes) {
@@ -185,7 +187,7 @@ impl Volume {
         self.frames[at[2]].get(n..n + self.stored.bytes()).map_or(0.0, |bytes| self.stored.value(bytes))
     }
 
-    /// The stored value at a point in space, mm, interpolated trilinearly; None outside the insonified region.
+    /// The stored value at a position in the coordinates of the geometry, mm, interpolated trilinearly; None outside the insonified region.
     pub fn at(&self, place: DVec3) -> Option<f64> {
         let index = match &self.geometry {
             Geometry::Sweep(probe) => self.indices(probe, place),
@@ -213,8 +215,9 @@ impl Volume {
         Some(sum)
     }
 
-    /// The volume of a moved body, as a sweep or lattice of another geometry would hold it. `back` maps a position in that geometry, mm, to the
-    /// position in this volume whose stored value is taken; `outside`: the stored value where that is outside the insonified region.
+    /// Resamples this volume at the samples of `geometry`, for a body that has moved. `back` maps the position of a sample of `geometry`, mm, to the
+    /// position in this volume whose stored value is taken. `outside`: the stored value of samples for which that position is outside the insonified
+    /// region of this volume.
     pub fn moved_onto(&self, geometry: &Geometry, back: impl Fn(DVec3) -> DVec3 + Sync, outside: f64) -> Volume {
         let mut moved = Volume::new(geometry.clone(), self.stored);
         let [samples, lines, slices] = moved.size;
@@ -270,8 +273,8 @@ impl Volume {
         [at.sample, at.line, at.slice]
     }
 
-    /// Writes the volume, resampled on the grid of `target`. `target.sample` is the type of the original file, in whose values it is written.
-    /// `each` is called after every slice.
+    /// Writes the volume, resampled on the grid of `target`. The values are those of the original file, whose sample type must be `target.sample`, or
+    /// 0 to 255 for a secondary capture. `each` is called after every slice.
     ///
     /// # Errors
     /// The file cannot hold the volume ([`Target::check`]), or the disk is full. No file is left then.
@@ -304,8 +307,8 @@ impl Volume {
 }
 
 impl Volume {
-    /// Writes a segmentation on the grid of `target`: label 1, "tissue", in voxels with a stored value of at least `threshold`, otherwise 0.
-    /// It is DICOM if the file's name ends in `.seg.dcm`, otherwise NRRD. `each` is called after every slice.
+    /// Writes a segmentation on the grid of `target`: label 1, "tissue", in voxels with a stored value of at least `threshold`, otherwise 0. It is
+    /// DICOM if the file's name ends in `.seg.dcm`, otherwise NRRD. `each` is called once for each slice.
     ///
     /// # Errors
     /// The format cannot hold the segmentation, or the disk is full.
@@ -335,7 +338,7 @@ pub(super) fn write_labels(
     segmentation::write(path, grid, &World::of(grid), segments, |voxel| label(place_of(grid, voxel)), || ())
 }
 
-/// The sample value, in a source's own units, that stands for no echo: the low end of the displayed range, such as -60 dB.
+/// The sample value, in the units of the source's file, that stands for no echo: the low end of the displayed range, such as -60 dB.
 pub fn no_echo(source: &dyn Source) -> f64 {
     source.range()[0] - source.sample_type().shift()
 }

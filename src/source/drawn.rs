@@ -69,8 +69,8 @@ impl Drawn {
         self.order == AxisOrder::STORED
     }
 
-    /// A stored frame with its pixels in drawn order, and the index of the drawn slice that it is, for an order that keeps frames
-    /// ([`AxisOrder::keeps_frames`]). `number`: its index in the stored volume; `width`: bytes of a sample.
+    /// A stored frame with its pixels in drawn order, and the index of the slice that it becomes in the drawn volume. The order must keep frames
+    /// ([`AxisOrder::keeps_frames`]). `number`: index of the frame in the stored volume. `width`: bytes of a sample.
     pub fn frame(&self, bytes: &[u8], number: usize, width: usize) -> (Vec<u8>, usize) {
         let [columns, rows, slices] = self.stored;
         let slice = if self.order.reversed[2] { slices - 1 - number } else { number };

@@ -48,7 +48,7 @@ pub(super) enum Reads {
     Uff,
 }
 
-/// Every format of recordings that can be read.
+/// Every file format of recordings that can be read, in the order in which a file is tested for them. Stacks of pictures are not listed.
 pub static FORMATS: [Format; 8] = [
     // First: 128 bytes of anything come before its mark.
     Format {
@@ -119,7 +119,7 @@ pub static FORMATS: [Format; 8] = [
 ];
 
 impl Format {
-    /// How the reader treats each key of the format. Empty if it reads everything that a file can state.
+    /// How the reader treats each key of the format. Empty if the reader uses everything that a file can state, or if this build lacks the reader.
     #[must_use]
     pub fn keys(&self) -> Vec<Row> {
         (self.keys)()
@@ -153,7 +153,7 @@ pub fn described() -> String {
     format!("{}, each also as .{PACKED}, {}", of(true), of(false))
 }
 
-/// The names of the formats that have file name endings, separated by commas. If the name is the ending, it has its dot.
+/// The names of the formats that have file name endings, separated by commas. A name that is also the ending has a dot before it, as `.frames`.
 pub fn names() -> String {
     let named = FORMATS.iter().filter(|format| !format.endings.is_empty());
     let dot = |format: &Format| if format.endings.contains(&format.name) { "." } else { "" };

@@ -43,7 +43,7 @@ pub struct Header {
     /// True if frames may have poses.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub posed: bool,
-    /// True if the frames are of the phantom, not of a patient. A `.frames` file stores this with its frames.
+    /// True if the frames are of the phantom, not of a patient. A `.frames` file stores this in the flags of its frames, not in its header.
     #[serde(skip)]
     pub synthetic: bool,
 }
@@ -132,19 +132,19 @@ pub trait Source: Send {
     fn geometry(&self, volume: usize) -> Geometry;
     /// Type of the samples in [`Frame::bytes`].
     fn stored_type(&self) -> StoredType;
-    /// Type of the samples in the file.
+    /// Type of the samples in the file, or of the stored ones for a source without a file.
     fn sample_type(&self) -> SampleType {
         self.stored_type().into()
     }
     /// Stored values that are displayed as 0 and 1.
     fn range(&self) -> [f64; 2];
-    /// Number of complete volumes.
+    /// Number of volumes. All are complete, except that volumes of a `.frames` file may lack frames.
     fn volumes(&self) -> usize;
     fn frames_per_volume(&self) -> usize;
     /// Moves forwards or back, so that the next frame is the first of this volume.
     ///
     /// # Errors
-    /// The data cannot be read, or the volume does not exist; some sources then have no next frame instead.
+    /// The data cannot be read, or the volume does not exist.
     fn skip_to_volume(&mut self, volume: usize) -> Result<(), InputError>;
     /// The next frame; None after the last.
     ///
@@ -158,8 +158,8 @@ pub trait Source: Send {
     fn prepare(&mut self) -> Result<(), InputError> {
         Ok(())
     }
-    /// True if the first volume is swept backwards. A source that does not know it tells by the motor's travel during the frames: false if there is
-    /// none.
+    /// True if the first volume is swept backwards. Unless a source states it, this is told by the motor's travel: true if the motor travels back
+    /// during a frame of that volume.
     fn goes_back(&self) -> bool {
         travels_back(&self.geometry(0))
     }
@@ -180,8 +180,8 @@ pub trait Source: Send {
     fn world_of(&self, _volume: usize) -> Option<World> {
         self.world()
     }
-    /// The pose of all frames that have none of their own. None for sweeps, if the axes of the volume are those of the world, and if each frame
-    /// states whether it has a pose.
+    /// The pose of all frames that have none of their own. None for sweeps, if [`Source::world`] is None or its axes are those of the volume, and if
+    /// each frame states its own pose or that it has none.
     fn pose(&self) -> Option<DAffine3> {
         let Geometry::Cartesian(grid) = self.geometry(0) else { return None };
         let world = self.world().filter(|world| *world != World::of(&grid))?;

@@ -99,7 +99,7 @@ fn is_neutral(value: &str, neutral: &[&str]) -> bool {
     words.all(|word| neutral.iter().any(|other| same(word, other)))
 }
 
-/// Names of the keys that a file states and its reader did not use. Names that differ only in numbers are counted as one, such as
+/// Names of the keys that a file states and its reader did not use. Names in text headers that differ only in numbers are counted as one, such as
 /// `Seq_FrameN_FrameNumber`.
 #[derive(Clone, Debug, Default)]
 pub struct Unused {
@@ -129,7 +129,8 @@ impl Unused {
         }
     }
 
-    /// The names, one line each, with their number if it is above 1.
+    /// The names, one line each, with the number of keys that a name stands for if it is above 1. If there were too many names, the last line says
+    /// how many more keys there are.
     #[must_use]
     pub fn lines(&self) -> Vec<String> {
         let line = |(pattern, (name, count)): (&String, &(String, usize))| match count {

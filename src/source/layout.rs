@@ -83,7 +83,7 @@ impl Layout {
     /// Checks that a file of this length can hold the frames, so that a false header never causes a large allocation.
     ///
     /// # Errors
-    /// One line with the field `size_field` (that of the file in which the size is stated) or "data": a frame is too large, or the file too short.
+    /// One line that names `size_field`, the field of the file that states the size, or "data": a frame is too large, or the file too short.
     pub fn check(&self, file: &Path, size_field: &str) -> Result<(), InputError> {
         let fault = |field: &str, fault: String| Err(InputError::new(file, field, fault));
         if self.frame_bytes() > MAX_FRAME_BYTES {

@@ -72,16 +72,18 @@ use std::path::Path;
 pub struct OpenOptions<'a> {
     /// Path of the probe file. None: the probe file that belongs to the recording, if there is one.
     pub probe: Option<&'a Path>,
-    /// The stored axis of a Cartesian volume that is drawn as depth. None: the one that the file states, otherwise y.
+    /// The axis of a Cartesian volume that is drawn as depth. Axes count in the order that the file states for drawing, otherwise as they are stored.
+    /// None: y, the second of them.
     pub depth_axis: Option<DepthAxis>,
-    /// Distance between the voxels of a stack of pictures, mm: from column to column, row to row, picture to picture. None: that of the files.
+    /// Distance between the voxels of pictures (a stack, or DICOM) that do not state it, mm: from column to column, row to row, picture to picture.
+    /// It is an error for other recordings. None: that of the files.
     pub voxel_spacing: Option<[f64; 3]>,
     /// Path of a configuration of the PLUS toolkit (XML), by which tracked pictures become a freehand volume.
     pub plus_config: Option<&'a Path>,
     /// Constant transforms for tracked pictures. They take precedence over those of the PLUS configuration.
     pub calibration: &'a [Calibration],
-    /// Name of the coordinate frame in which tracked pictures become a volume. None: that of the PLUS configuration, otherwise Reference,
-    /// Tracker or World.
+    /// Name of the coordinate frame in which tracked pictures become a volume. None: that of the PLUS configuration, otherwise the first of
+    /// Reference, Tracker and World to which transforms lead.
     pub reference: Option<&'a str>,
     /// Options for pictures with poses, which become a freehand volume.
     pub freehand: freehand::FreehandArguments,
@@ -101,7 +103,8 @@ pub fn is_dicom(path: &Path) -> bool {
     dicom::is_dicom(path)
 }
 
-/// Opens a recording of any format, which its content decides, among them `.frames` files and saved streams of frames. `-` is standard input.
+/// Opens a recording of any format, among them `.frames` files and saved streams of frames. The content of a file decides its format. The path `-` is
+/// standard input.
 ///
 /// # Errors
 /// One line that names the file: it cannot be read, is of no known format, is damaged, its volume is too large, or an option does not fit it.

@@ -9,7 +9,7 @@ use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// File name endings of pictures; a folder of pictures is a recording.
+/// File name endings of the pictures of a stack, in lower case without the dot. A folder of such pictures is a recording.
 pub const ENDINGS: [&str; 7] = ["png", "jpg", "jpeg", "bmp", "pgm", "ppm", "pnm"];
 
 /// The picture files of a stack, in their order.

@@ -50,8 +50,8 @@ const MAX_WAITING_FRAMES: usize = 4;
 
 /// A stream of frames, such as from standard input, as a live source.
 ///
-/// Memory: up to four queued frames of at most 256 MiB in total (or a single one), and the one that is being read, of at most 1 GiB; twice of
-/// version 3. Before the first complete frame, no more than twice the bytes that arrived.
+/// Memory: up to four queued frames of at most 256 MiB in total (or a single one), and the one that is being read, of at most 1 GiB (2 GiB in version
+/// 3 of the format). Before the first complete frame, no more than twice the bytes that arrived.
 pub struct Piped {
     queue: Arc<Queue>,
     compounding: CompoundingOptions,

@@ -41,7 +41,7 @@ impl PipedFile {
     /// Opens a file and reads its first line. `probe`: path of the probe file to use instead of the probe in the stream.
     ///
     /// # Errors
-    /// The file cannot be read, its first line is not a header, or it has not one complete volume.
+    /// The file or the probe file cannot be read, the first line of the file is not a header, or the file has not one complete volume.
     pub fn open(path: &Path, probe: Option<&Path>) -> Result<PipedFile, InputError> {
         let unreadable = |e: std::io::Error| InputError::unreadable(path, &e);
         let file = CountedFile::open(path).map_err(unreadable)?;

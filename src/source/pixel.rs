@@ -124,7 +124,7 @@ impl PixelFormat {
         (!parts.is_empty()).then(|| parts.join("; "))
     }
 
-    /// Converts the complete pixels of a file to stored samples. Counts the samples that 0 replaces.
+    /// Converts complete pixels, as the file has them, to stored samples. The second result counts the samples that were replaced by 0.
     pub fn convert(&self, mut bytes: Vec<u8>) -> (Vec<u8>, Replaced) {
         let sample = self.sample();
         let is_stored = matches!(self.number, Number::U8 | Number::U16 | Number::I16 | Number::F32);

@@ -27,7 +27,7 @@ impl PlusConfig {
     /// Reads a configuration file.
     ///
     /// # Errors
-    /// The file cannot be read or is no XML, or a transform has a wrong name or matrix.
+    /// The file cannot be read or is no XML, a transform has a wrong name or matrix, or `VolumeReconstructor` has a wrong clip rectangle or spacing.
     pub fn read(path: &Path) -> Result<PlusConfig, InputError> {
         let text = files::read_text(path, MAX_BYTES, "configuration").map_err(|e| InputError::new(path, "file", e))?;
         PlusConfig::parse(path, &text)

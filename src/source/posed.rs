@@ -99,9 +99,9 @@ impl Posed {
     }
 
     /// Processes an event of the source; returns the events that take its place. The header and the frames of posed pictures are taken into the
-    /// volume, any other event is returned. Before it come the events of the volume if it has changed and is due by its [`Schedule`], or at once
-    /// before another header and the end: a header if its grid is new, and a frame for each slice. What was left out is returned as faults, at most
-    /// once a second and at the end.
+    /// volume. Any other event is returned, after those of the volume. The volume is emitted if it has changed and is due by its [`Schedule`], or at
+    /// once before another header and before the end. Its events are a header if its grid is new, and a frame for each slice. What was left out is
+    /// returned as faults, at most once a second, before another header and at the end.
     pub fn take(&mut self, event: Event) -> Vec<Event> {
         let mut events = Vec::new();
         match event {

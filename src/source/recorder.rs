@@ -304,7 +304,7 @@ impl Reader {
         self.damaged
     }
 
-    /// Number of bytes at the end of the file that are not a complete frame.
+    /// Number of bytes at the end of the file that were not read as frames when the index was rebuilt. 0 if the stored index is used.
     pub fn lost(&self) -> u64 {
         self.lost
     }
@@ -551,7 +551,7 @@ impl Reader {
     /// A description of the file for users: pairs of title and value. Reads all frames once to check them.
     ///
     /// # Errors
-    /// Errors of the operating system.
+    /// The file has no frames, or cannot be read.
     pub fn description(mut self) -> Result<Vec<(String, String)>, InputError> {
         let summary = self.summarize()?;
         let mut rows = Vec::new();

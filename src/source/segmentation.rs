@@ -53,8 +53,8 @@ pub fn segments(path: &Path) -> Result<Vec<Segment>, InputError> {
     Ok(nrrd::segments(path)?.into_iter().map(segment).collect())
 }
 
-/// Writes a segmentation on a grid: DICOM if the file's name ends in `.seg.dcm`, otherwise NRRD. `label` gives the label of a voxel index; 0 is in
-/// no segment. `each` is called after every slice.
+/// Writes a segmentation on a grid: DICOM if the file's name ends in `.seg.dcm`, otherwise NRRD. `label` gives the label of a voxel index; 0 is in no
+/// segment. `each` is called once for each slice: after it, or for DICOM after the whole file.
 ///
 /// # Errors
 /// The disk is full, the folder cannot be written, or DICOM cannot hold the segmentation: it has too many voxels, or none in any segment.

@@ -24,7 +24,7 @@ pub struct Sequence {
     probe: String,
 }
 
-/// The path of the probe file that belongs to a sequence.
+/// The path of the probe file that belongs to a sequence: `sweep.probe.toml` beside `sweep.mha`.
 pub fn probe_file_path(path: &Path) -> PathBuf {
     let mut name = path.file_stem().unwrap_or_default().to_os_string();
     name.push(".probe.toml");
@@ -35,7 +35,8 @@ impl Sequence {
     /// Reads a source once to find its complete volumes, whose number goes into the header. `path`: that of the source, for messages.
     ///
     /// # Errors
-    /// The source is not a sweep or has no complete volume, there are too many frames, or no probe file can describe the probe.
+    /// The source is not a sweep or has no complete volume, there are more than 20000 frames or too many time stamps for a header of 1 MiB, or no
+    /// probe file can describe the probe.
     pub fn of(source: &mut dyn Source, path: &Path) -> Result<Sequence, InputError> {
         let fault = |field: &str, fault: String| InputError::new(path, field, fault);
         let (kept, left_out) = choose(source, path)?;
@@ -80,10 +81,11 @@ impl Sequence {
         self.left_out
     }
 
-    /// Writes the frames of the source that was given to [`Sequence::of`], in order of acquisition. `each` is called after every volume.
+    /// Writes the frames of the source that was given to [`Sequence::of`], in order of acquisition, and the probe file beside them
+    /// ([`probe_file_path`]). `each` is called after every volume.
     ///
     /// # Errors
-    /// The source can no longer be read, the extension is not .mha, or the disk is full. No file is left then.
+    /// The source can no longer be read, the extension is not .mha, or the disk is full. No sequence is left then.
     pub fn write(&self, source: &mut dyn Source, path: &Path, each: impl Fn()) -> Result<(), InputError> {
         write_both(path, &self.header, &self.probe, |file| {
             for volume in &self.kept {

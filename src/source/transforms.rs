@@ -40,7 +40,8 @@ impl std::fmt::Display for TransformName {
     }
 }
 
-/// A constant transform, such as the calibration of a probe. Its matrix maps positions in the frame `from` of its name to the frame `to`.
+/// A constant transform, such as the calibration of a probe. Its matrix maps positions in the frame `from` of its name to the frame `to`. Positions
+/// are in mm, in the frame of pictures in pixels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Calibration {
     pub name: TransformName,

@@ -39,7 +39,7 @@ pub(super) struct Measured {
     /// Number of samples outside of `range`; `of` is the number of all samples. Both are 0 if samples are not f32.
     pub beyond: u64,
     pub of: u64,
-    /// Smallest and largest sample of the file, outliers included.
+    /// Smallest and largest sample of the file, outliers included. If they are equal, the second value is made larger.
     pub full: [f64; 2],
 }
 

@@ -30,7 +30,7 @@ impl VolumeFile {
     /// The format that the extension of a file name stands for.
     ///
     /// # Errors
-    /// The extension belongs to no format.
+    /// The extension belongs to no format, or the name ends in `.seq.nrrd`, which is a sequence of volumes.
     pub fn of(path: &Path) -> Result<VolumeFile, InputError> {
         let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
         let formats = [

@@ -15,15 +15,15 @@ const USUAL: usize = 20;
 /// How many volumes and slices a sweep over a beating heart is sorted into.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CycleOptions {
-    /// Number of volumes of one cycle, 2..=1024. None: as many as frames were acquired in a cycle, but at most 20, the length of the viewer's
+    /// Number of volumes of one cycle, 2..=1024. None: as many as frames were acquired in a mean cycle, but at most 20, the length of the viewer's
     /// cine loop.
     pub phases: Option<usize>,
-    /// Slices of a volume, 2..=1024. None: one less than the number of cycles, the number of positions of the sweep at which every phase was
-    /// acquired.
+    /// Slices of a volume, 2..=1024. None: the number of cycles of the sweep minus 1, rounded. Every phase was acquired at about so many positions of
+    /// the sweep.
     pub slices: Option<usize>,
 }
 
-/// A slow sweep over a beating heart, sorted into the volumes of one cycle (STIC).
+/// A slow sweep over a beating heart, sorted into the volumes of one cycle (spatio-temporal image correlation, STIC).
 pub struct Cycle {
     /// Geometry of the volumes: the part of the sweep in which every phase was acquired.
     pub probe: Probe,
@@ -43,7 +43,8 @@ impl Cycle {
     /// Sorts the frames of one slow sweep, given in order of acquisition, `rate` frames a second. `rhythm`: the phases of these frames.
     ///
     /// # Errors
-    /// One line: fewer than four cycles, another number of phases than frames, or numbers of volumes or slices out of their range.
+    /// One line: fewer than four cycles, another number of phases than frames, numbers of volumes or slices out of their range, or slices without a
+    /// valid geometry, as of a sweep that stands still.
     pub fn new(
         probe: &Probe,
         stored: StoredType,

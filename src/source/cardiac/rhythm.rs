@@ -202,9 +202,10 @@ pub struct Rhythm {
     /// For each frame the number of heart cycles, rising and fractional, since the first frame or, if R waves were given, since the first of them
     /// (negative before it).
     pub phases: Vec<f64>,
-    /// Mean heart rate, cycles a frame: over the frames that show a heart, or over all if R waves were given.
+    /// Mean heart rate, cycles a frame. Frames count by how clearly they show a heart, or all alike if R waves were given.
     pub mean: f64,
-    /// Height of the heart rate's peak above the spectrum around it, dB. None if the times of R waves were given.
+    /// Height of the peak at the heart rate in the power spectrum of the blocks of [`Motion`], above the spectrum around it, dB. None if the times of
+    /// R waves were given.
     pub height: Option<f64>,
 }
 
@@ -213,7 +214,7 @@ impl Rhythm {
     /// cycles a minute.
     ///
     /// # Errors
-    /// One line: too few frames for such a rate, or nothing that repeats.
+    /// One line: too few frames a second or too few frames in all for `heart_rate`, or nothing that repeats at such a rate.
     pub fn find(motion: &Motion, rate: f64, heart_rate: [f64; 2]) -> Result<Rhythm, String> {
         let frames = motion.means.len() as f64;
         let [least, most] = heart_rate;

@@ -167,10 +167,10 @@ pub(in super::super) fn is_one(start: &[u8]) -> bool {
 }
 
 impl Elements {
-    /// Reads all data elements of a file except its pixels.
+    /// Reads the data elements of [`WANTED`] from a file, and finds where its pixels are without reading them.
     ///
     /// # Errors
-    /// The file cannot be read, is cut short, has elements that contradict each other, or a compressed data set.
+    /// The file cannot be read or is cut short, its elements contradict each other, it states no transfer syntax, or its data set is compressed.
     pub fn read(file: &InputFile) -> Result<Elements, InputError> {
         let input = file.open().map_err(|e| InputError::unreadable(file.path, &e))?;
         let mut walk = Walk {

@@ -39,7 +39,8 @@ pub(super) struct Image {
 }
 
 impl Image {
-    /// Reads how the pixels of a file are stored. `slices`: number of pictures that one stated frame may consist of, one after another.
+    /// Reads how the pixels of a file are stored. `slices`: number of pictures, one after another, that each of the stated number of frames may
+    /// consist of.
     ///
     /// # Errors
     /// The pixels are missing, cut short or of a kind that is not read.

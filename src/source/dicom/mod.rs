@@ -29,5 +29,5 @@ pub(super) use series::{is_dicom, is_series, read_series};
 pub(super) use tags::rows;
 pub(super) use write::{DicomWriter, Form, MOST_BYTES};
 
-/// Usual endings of DICOM files, which often have none, or a number.
+/// Usual file name endings of DICOM files, in lower case without the dot. Many DICOM files have no ending, or a number in its place.
 pub const ENDINGS: [&str; 3] = ["dcm", "dicom", "ima"];

@@ -15,7 +15,7 @@ pub(super) struct Palette {
 
 /// The DICOM elements of a palette, each for red, green and blue.
 pub(super) struct Tables {
-    /// Descriptor of each colour's table: number of entries, pixel value of the first entry, bits of an entry.
+    /// Descriptor of each colour's table: number of entries (0 for 65536), pixel value of the first entry, bits of an entry.
     pub about: [Vec<u16>; 3],
     /// The entries of each colour one after another; empty if they are given in `segmented` form.
     pub plain: [Vec<u16>; 3],

@@ -48,10 +48,11 @@ pub(crate) struct FreehandFile<P> {
 }
 
 impl<P: PlacedPictures> FreehandFile<P> {
-    /// A volume whose lattice contains the pictures at `poses`, one for each picture; None if it is not known. Logs how many pictures have none.
+    /// A volume whose lattice contains the pictures. `poses`: the pose of each picture in their order; None if it is not known. Logs how many
+    /// pictures have no valid pose.
     ///
     /// # Errors
-    /// No picture has a pose, or the volume is too large.
+    /// No picture has a valid pose, an option is out of its range, or the volume is too large.
     pub fn around(
         path: &Path,
         placed: P,
@@ -86,8 +87,8 @@ impl<P: PlacedPictures> FreehandFile<P> {
         &self.placed
     }
 
-    /// A description for users: pairs of title and value. `format`: of the pictures; `placed`: rows about the origin of their poses; `space`:
-    /// name of the coordinates that the volume lies in.
+    /// A description for users: pairs of title and value. `format`: name of the format of the pictures. `placed`: rows that say where their poses
+    /// come from. `space`: name of the coordinate frame in which the volume lies.
     pub fn describe(&self, format: &str, placed: Vec<(String, String)>, space: &str) -> Vec<(String, String)> {
         let [all, valid] = self.counts;
         let mut rows = Vec::new();

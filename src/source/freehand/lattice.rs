@@ -32,11 +32,11 @@ impl Lattice {
 
     /// The lattice that contains the clipped part of the frames with these poses, and a margin of `options.margin`. Invalid poses are ignored.
     ///
-    /// Its axes are the mean of the frames' axes: lateral along the rows, depth along the columns and perpendicular to lateral, elevation along
-    /// the normal (lateral x depth). Along the normal it is at least `options.extent` long. Its origin is the mean of the centres of the frames'
-    /// first rows, as if that were the face of the probe. The spacing is that of the options, otherwise the distance of pixels along rows and
-    /// columns, and the larger of both along the normal. It is made coarser until there are at most `options.max_voxels` voxels, and at most
-    /// 2048 along an edge.
+    /// Its axes are the mean of the frames' axes: lateral along the rows, depth along the columns and perpendicular to lateral, elevation along the
+    /// normal (lateral x depth). Along the normal it is at least `options.extent` long, without the margin. The origin of the volume's coordinates is
+    /// the mean of the centres of the frames' first clipped rows, as if that were the face of the probe. The spacing is that of the options,
+    /// otherwise the distance of pixels along rows and columns, and the larger of both along the normal. It is made coarser until there are at most
+    /// `options.max_voxels` voxels, and at most 2048 along an edge.
     ///
     /// # Errors
     /// One line: no valid pose, an option out of its range, or no spacing that is coarse enough.

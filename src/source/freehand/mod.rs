@@ -53,7 +53,8 @@ pub enum Splat {
 /// How the value of a voxel is computed from several pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Overlap {
-    /// The weighted mean of all pixels, independent of their order up to rounding.
+    /// The weighted mean of all pixels, independent of their order up to rounding. Once their weights in a voxel sum up to more than 4096, earlier
+    /// pixels count less.
     #[default]
     Mean,
     /// The weighted mean of the pixels of the last frame that reached the voxel.
@@ -67,7 +68,7 @@ pub enum Overlap {
 pub struct CompoundingOptions {
     pub splat: Splat,
     pub overlap: Overlap,
-    /// Widest gap between pictures that is filled, mm; at most 64 voxels. 0 fills none.
+    /// Widest gap between pictures that is filled, mm; at most 64 times the smallest distance between voxels. 0 fills none.
     pub max_hole: f64,
     /// The part of each frame that is used: first column, first row, columns, rows. `None`: the whole frame.
     pub clip: Option<[usize; 4]>,
@@ -75,10 +76,10 @@ pub struct CompoundingOptions {
     pub spacing: Option<f64>,
     /// Distance that the volume extends beyond the frames around which it is placed, on all sides, mm.
     pub margin: f64,
-    /// Least length of the volume along the normal of the frames, mm, counted from the first frame in the direction in which they move. `None`:
-    /// no longer than the frames need.
+    /// Least length of the volume along the normal of the frames, mm, without `margin`. A shorter volume is extended in the direction in which the
+    /// frames move, or alike to both sides if they do not move. `None`: no longer than the frames need.
     pub extent: Option<f64>,
-    /// Largest number of voxels of the volume.
+    /// Largest number of voxels of the volume. More than 2^31 are refused in any case.
     pub max_voxels: usize,
 }
 
@@ -104,7 +105,7 @@ pub struct CompoundingCounts {
     pub frames: u64,
     /// Number of compounded frames that have no pixel in the volume.
     pub outside: u64,
-    /// Number of frames that were refused: without a valid pose, or with a wrong number of samples.
+    /// Number of frames that were refused: without a valid pose, with a wrong number of samples, or without a pixel in `clip`.
     pub refused: u64,
     /// Number of pixels that were left out: not finite, or beyond 1e30.
     pub pixels: u64,
@@ -184,7 +185,7 @@ impl Compounder {
     /// Compounds a frame into the volume. Returns the number of its pixels that are in the volume.
     ///
     /// # Errors
-    /// One line: why the frame is refused. It is counted, and the volume is not changed.
+    /// One line: why the frame is refused. The frame is counted as refused, and the volume is not changed.
     pub fn push(&mut self, frame: &TrackedFrame) -> Result<u64, String> {
         let checked = frame.check().and_then(|()| frame.pose.clipped(self.options.clip));
         let [columns, rows] = match checked {
@@ -232,7 +233,7 @@ impl Compounder {
     }
 
     /// Samples of slice `k` as of the last [`Compounder::changed_slices`]: lateral fastest, rows along depth, each of the type
-    /// [`Compounder::stored`], little-endian. 0 where there are no pixels. `None` beyond the last slice.
+    /// [`Compounder::stored`], little-endian. 0 in voxels that no pixel reached and that are in no filled gap. `None` beyond the last slice.
     pub fn slice(&self, k: usize) -> Option<&[u8]> {
         self.slices.get(k).map(|slice| if slice.is_empty() { &self.zero[..] } else { &slice[..] })
     }
@@ -275,7 +276,8 @@ impl Pose {
     /// Checks the pose.
     ///
     /// # Errors
-    /// One line: no pixels, or a pose that is not finite, is degenerate, or is beyond 1e6 mm.
+    /// One line: no pixels or more than 65536 along a side, or a pose that is not finite, that makes a line or a point of the frame, or whose pixels
+    /// lie beyond 1e6 mm or less than 1e-6 mm apart.
     pub fn check(&self) -> Result<(), String> {
         let [columns, rows] = self.size;
         if !(1..=MAX_PIXELS).contains(&columns) || !(1..=MAX_PIXELS).contains(&rows) {

@@ -9,7 +9,8 @@ use std::time::{Duration, Instant};
 const MAX_FIRST_WAIT: Duration = Duration::from_secs(10);
 const MAX_FIRST_BYTES: usize = 256 << 20;
 
-/// When the volume of a [`Sweep`] is placed, and when it is emitted.
+/// When the volume of a [`Sweep`] is placed, which is when its lattice is laid around the first pictures, and when it is emitted by
+/// [`Sweep::update`].
 #[derive(Clone, Debug)]
 pub struct Schedule {
     /// Number of pictures after which the volume is placed around them. It is placed earlier after ten seconds, 256 MiB or `silence`.
@@ -31,7 +32,7 @@ impl Default for Schedule {
 /// Why one picture, or all pictures, are not in the volume.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Refusal {
-    /// The picture is not wholly inside the volume, which may not grow further.
+    /// The picture is not wholly inside the volume, which may not grow further. The part that is inside is compounded.
     Outside,
     /// The picture cannot be compounded, for the given reason.
     Picture(String),
@@ -86,7 +87,7 @@ impl Sweep {
     /// Adds a picture of one sample a pixel, column fastest.
     ///
     /// # Errors
-    /// The reason why the picture is not in the volume.
+    /// The reason why the picture is not, or not wholly, in the volume. Until the volume is placed, only a wrong number of samples is an error.
     pub fn push(&mut self, pose: Pose, bytes: Vec<u8>) -> Result<(), Refusal> {
         self.last = Some(Instant::now());
         if bytes.len() != pose.size[0] * pose.size[1] * self.stored.bytes() {
@@ -105,9 +106,10 @@ impl Sweep {
         }
     }
 
-    /// Brings the volume up to date if its [`Schedule`] says that it is to be emitted, or `at_once`, because no more pictures follow. None if neither holds, or
-    /// without new pictures. Otherwise true if a slice changed. A volume that was not placed yet is placed around the first pictures. `refuse` is then
-    /// called for each of these that is not, or not wholly, in it, or once with [`Refusal::Volume`] if it cannot be placed.
+    /// Brings the volume up to date if its [`Schedule`] says that it is to be emitted, or if `at_once` is true, because no more pictures follow.
+    /// Returns None if neither holds or no picture came since the last update, otherwise true if a slice changed. A volume that was not placed yet is
+    /// placed around the first pictures. `refuse` is called for each of these that is not, or not wholly, in the volume, or once with
+    /// [`Refusal::Volume`] if the volume cannot be placed.
     pub fn update(&mut self, at_once: bool, mut refuse: impl FnMut(Refusal)) -> Option<bool> {
         let waited = self.since?.elapsed();
         let is_placed = self.is_placed();

@@ -28,7 +28,8 @@ const MAX_ADDRESSES: usize = 8;
 /// Longest description of an error, characters.
 const MAX_ERROR_CHARACTERS: usize = 600;
 
-/// Options of a [`Client`]. No value can do harm: the time-out of an attempt to connect, and the wait before the next, are at least 10 ms.
+/// Options of a [`Client`]. Every value is accepted: the time-out of an attempt to connect, and the wait before the next attempt, count as 10 ms if
+/// they are shorter.
 #[derive(Clone, Debug)]
 pub struct ClientOptions {
     /// Longest time for connecting to one address.
@@ -36,9 +37,9 @@ pub struct ClientOptions {
     /// Longest time without a byte within a message, after which the connection is closed.
     pub stall_timeout: Duration,
     /// Longest time from the first byte of a message to its last, to which a second is added for each megabyte of the message. After it the
-    /// connection is closed, so that a peer that sends a byte now and then does not keep it.
+    /// connection is closed, so that a peer that sends a byte now and then does not keep the connection open.
     pub message_timeout: Duration,
-    /// Longest time without a message, after which the connection is closed: a peer that lost power does not close it.
+    /// Longest time without a byte between two messages, after which the connection is closed: a peer that lost power does not close it.
     pub silence_timeout: Duration,
     /// Wait before the first attempt to reconnect. It doubles with every attempt that brings no message.
     pub first_wait: Duration,
@@ -84,13 +85,13 @@ pub struct ClientStatistics {
     pub checksum_failures: u64,
     /// Number of messages that were skipped because their body is invalid for their type.
     pub malformed: u64,
-    /// Number of decoded messages of types that the program does not use.
+    /// Number of decoded messages of types that the program does not use. They are queued as [`Message::Other`].
     pub skipped: u64,
     /// Number of decoded messages that were dropped from the queue in favour of newer ones.
     pub dropped: u64,
     /// Number of connections that ended within a message.
     pub cut_short: u64,
-    /// Number of connections that were closed because bytes were no header where one had to be, or it stated too large a body.
+    /// Number of connections that were closed because the bytes where a header had to be were none, or because the header stated too large a body.
     pub lost_framing: u64,
     /// Number of connections after the first.
     pub reconnects: u64,
@@ -98,7 +99,7 @@ pub struct ClientStatistics {
 
 /// A client of an OpenIGTLink server, which reconnects whenever the connection breaks. Dropping it ends the connection within a second.
 ///
-/// Memory: at most the queue's bytes or its newest message, and three times the body of a message while it is decoded.
+/// Memory: at most [`ClientOptions::queue_bytes`] or the newest message in the queue, and three times the body of a message while it is decoded.
 pub struct Client {
     shared: Arc<Shared>,
     thread: Option<JoinHandle<()>>,
@@ -169,7 +170,7 @@ impl Client {
         self.shared.lock().statistics.clone()
     }
 
-    /// The last error of the connection or of a message that was skipped, on one line; None if there was none.
+    /// The last error of the connection or of a message that was skipped, on one line; None if there was none since the client was created.
     pub fn last_error(&self) -> Option<String> {
         self.shared.lock().last_error.clone()
     }

@@ -25,8 +25,8 @@ pub enum Decoded {
 
 /// Decodes the message at the start of `bytes`.
 ///
-/// `limit`: the largest accepted body, bytes. A larger one is refused as soon as its header is complete. Memory is allocated only when the whole
-/// body is available, and never more than its bytes.
+/// `limit`: the largest accepted body, bytes. A larger one is refused as soon as its header is complete. Memory is allocated only when the whole body
+/// is available, and at most about three times its bytes.
 ///
 /// # Errors
 /// [`DecodeError`]: what is wrong, and how many bytes to skip if the next message can be found.
@@ -128,11 +128,11 @@ pub enum Version {
 const ASCII: u16 = 3;
 const UTF_8: u16 = 106;
 
-/// Encodes a message. For simulated devices and tests.
+/// Encodes a message with its header and checksum.
 ///
 /// # Errors
-/// A field that the format cannot represent (a name that is too long or has zero bytes, a time before 1970 or after 2106, a
-/// number that is not finite, sizes that disagree with the samples), or [`Message::Other`], whose body was not kept.
+/// A field that the format cannot represent, or [`Message::Other`], whose body was not kept. Such fields are a name that is too long or has zero
+/// bytes, a STRING of more than 65535 bytes, a time before 1970 or after 2106, a number that is not finite, or sizes that disagree with the samples.
 pub fn encode(message: &Message, version: Version) -> Result<Vec<u8>, MessageError> {
     let error = |fault| MessageError::new(message.kind(), message.device(), fault);
     let mut bytes = vec![0; HEADER];
@@ -357,7 +357,7 @@ impl Image {
     }
 }
 
-/// Length of a header, bytes: version, type, device, time stamp, body size, checksum (header.md).
+/// Length of a header, bytes: version, type, device, time stamp, body size, checksum (header.md of the protocol's documents).
 pub const HEADER: usize = 58;
 /// Length of an extended header as the reference library writes it, bytes. Later versions may have a longer one.
 const EXTENDED: usize = 12;
@@ -538,7 +538,7 @@ impl MessageError {
     }
 }
 
-/// Why bytes are not a message, and where the next message begins.
+/// Why bytes are not a message, and where the next message begins if that is known.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum DecodeError {
     /// The checksum of the body is wrong. The next message begins after `length` bytes.

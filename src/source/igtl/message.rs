@@ -2,7 +2,7 @@
 
 use glam::{DMat4, DVec3, DVec4};
 
-/// A decoded message.
+/// An OpenIGTLink message, as it was decoded or is to be encoded.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Message {
     Transform(Transform),
@@ -37,14 +37,14 @@ pub struct TrackingData {
 /// A tool of a [`TrackingData`] and its pose.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tool {
-    /// Name of the tool; a name of more than 20 bytes is not sent, but refused.
+    /// Name of the tool, at most 20 bytes on the wire.
     pub name: String,
     pub kind: ToolKind,
     /// Pose of the tool: upper three rows of the 4 x 4 matrix, all finite. Its last column is a translation in mm.
     pub matrix: [[f32; 4]; 3],
 }
 
-/// Which degrees of freedom of a tool are known (trackingdata.md).
+/// Which degrees of freedom of a tool are known. The numbers are those on the wire (trackingdata.md of the protocol's documents).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ToolKind {
     /// 1: the tracker itself.
@@ -63,7 +63,7 @@ pub struct Status {
     pub device: String,
     /// Time stamp, s since 1970; 0 if it has none.
     pub time: f64,
-    /// Status code: 1 is OK, 2 to 19 are the faults that status.md lists.
+    /// Status code: 1 is OK, 2 to 19 are the faults that status.md of the protocol's documents lists.
     pub code: u16,
     /// Code whose meaning the device defines.
     pub subcode: i64,
@@ -144,7 +144,8 @@ impl Message {
     }
 }
 
-/// IMAGE: a 2D image, a volume, or a part of one. On the wire: 72 bytes that describe the samples, then the samples (image.md).
+/// IMAGE: a 2D image, a volume, or a part of one. On the wire: 72 bytes that describe the samples, then the samples (image.md of the protocol's
+/// documents).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Image {
     pub device: String,
@@ -211,7 +212,7 @@ impl Scalar {
 impl Image {
     /// The map from a pixel's index (of its centre, from 0, in the whole image) to its position in mm in the given coordinate system.
     ///
-    /// The position that the message states is the centre of the image (image.md, note of 2011), which is index (size - 1) / 2.
+    /// The position that the message states is the centre of the image, index (size - 1) / 2 (image.md of the protocol's documents, note of 2011).
     pub fn index_to_mm(&self, coordinates: Coordinates) -> DMat4 {
         let axes = self.axes.map(|a| DVec3::from(a.map(f64::from)));
         let middle = self.size.map(|n| (f64::from(n) - 1.0) / 2.0);

@@ -26,9 +26,9 @@ use std::time::{Duration, Instant};
 /// Where the poses of 2D frames come from.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Poses {
-    /// From TRANSFORM and TDATA messages. `device`: name of the TRANSFORM's device or of the TDATA's tool; None: any TRANSFORM. `tolerance`:
-    /// largest difference between the time stamps of a frame and its pose, s. `patience`: largest time by which frames may be ahead of the poses,
-    /// s.
+    /// From TRANSFORM and TDATA messages. `device`: name of the TRANSFORM's device or of the TDATA's tool; None: any TRANSFORM. `tolerance`: largest
+    /// difference between the time stamps of a frame and its pose, s. `patience`: time by which later frames may be ahead of one that still waits for
+    /// a later pose, s.
     Messages { device: Option<String>, tolerance: f64, patience: f64 },
     /// From the matrix of each image.
     Image,

@@ -16,9 +16,9 @@ const ROTATION_TOLERANCE: f64 = 1e-3;
 
 /// Assigns a pose to every 2D frame (IMAGE of depth 1), in order of arrival. It uses no clock but the time stamps of the messages.
 ///
-/// With poses on both sides within the tolerance, the translation is interpolated linearly and the rotation along the shorter arc; between
-/// different devices, or if a matrix is not a rotation, the nearer pose is used. A frame waits for a later pose until one has arrived, or until
-/// frames are `patience` ahead, or until 64 frames or 256 MiB wait.
+/// With poses on both sides within the tolerance, the translation is interpolated linearly and the rotation along the shorter arc; between different
+/// devices, or if a matrix is not a rotation, the nearer pose is used. A frame waits for a later pose until one has arrived, until a frame has
+/// arrived whose time stamp is more than `patience` later, or until more than 64 frames or 256 MiB wait.
 pub struct Pairing {
     device: Option<String>,
     tolerance: f64,
@@ -37,7 +37,7 @@ pub struct PairedFrame {
     pub image: Image,
     /// The tracked pose at the frame's time, mm. It is applied after the image's own matrix.
     pub pose: DAffine3,
-    /// Name of the device whose pose is nearest in time.
+    /// Name of the device, or of the TDATA tool, whose pose is nearest in time.
     pub device: String,
     /// Time of the frame minus time of the nearest pose, s.
     pub lag: f64,
@@ -63,9 +63,9 @@ struct Pose {
 }
 
 impl Pairing {
-    /// `device`: name of the TRANSFORM's device or of the TDATA's tool whose poses are used. None: any TRANSFORM, the nearest in time, and of
-    /// several at the same time the last. `tolerance`: largest difference between the time stamps of a frame and its pose, s. `patience`:
-    /// largest time by which frames may be ahead of the poses, s. Negative values and NaN count as 0.
+    /// `device`: name of the TRANSFORM's device or of the TDATA's tool whose poses are used. None: any TRANSFORM; the nearest in time is used, and of
+    /// several with the same time stamp the one that arrived last. `tolerance`: largest difference between the time stamps of a frame and its pose,
+    /// s. `patience`: time by which later frames may be ahead of one that still waits for a later pose, s. Negative values and NaN count as 0.
     pub fn new(device: Option<String>, tolerance: f64, patience: f64) -> Pairing {
         Pairing {
             seen: Names::new(device.clone()),
@@ -101,7 +101,7 @@ impl Pairing {
         self.settle(false)
     }
 
-    /// Pairs the frames that still wait with the poses that have arrived.
+    /// Pairs the frames that still wait with the poses that have arrived. Frames without a pose within the tolerance are dropped and counted.
     pub fn finish(&mut self) -> Vec<PairedFrame> {
         self.settle(true)
     }

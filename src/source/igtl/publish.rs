@@ -15,7 +15,7 @@ use std::net::SocketAddr;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 
-/// Name of the device in messages with pictures; [`VOLUME`]: in those with volumes.
+/// Device name of messages with pictures. [`VOLUME`] is the device name of messages with volumes.
 pub const PICTURE: &str = "EcholumePicture";
 pub const VOLUME: &str = "EcholumeVolume";
 /// Most voxels of a volume, one byte each: 255 MiB. Clients take 256 MiB in one message, with its headers.
@@ -36,7 +36,8 @@ pub struct PublisherStatistics {
     pub fault: Option<String>,
 }
 
-/// Sends pictures and volumes to the clients of an OpenIGTLink server of its own. Dropping it sends what still waits, and ends all connections.
+/// Sends pictures and volumes to the clients of an OpenIGTLink server of its own. Dropping it sends what still waits, and ends all connections unless
+/// a [`Publisher::listener`] still exists.
 ///
 /// Memory: the volume that is collected, one that waits, one that is converted, its voxels, and that of the [`Server`].
 pub struct Publisher {

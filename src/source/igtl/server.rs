@@ -70,8 +70,8 @@ pub struct ServerStatistics {
     pub sent: u64,
     /// Number of messages that were dropped from a client's queue in favour of newer ones.
     pub dropped: u64,
-    /// Number of clients that were disconnected because they read nothing, asked and did not read the answers, or sent something that is not a
-    /// message or did not end in time.
+    /// Number of clients that were disconnected because they read nothing or too slowly, asked and did not read the answers, or sent something that
+    /// is not a message or did not end in time.
     pub disconnected: u64,
 }
 
@@ -186,7 +186,7 @@ impl Server {
         self.shared.lock().statistics.clients > 0
     }
 
-    /// Queues a message for every client that has not asked to be sent none (STP_IMAGE), and returns at once.
+    /// Queues a message for every client except those that asked for no images (STP_IMAGE), and returns at once.
     ///
     /// # Errors
     /// A message that the format cannot hold.

@@ -282,8 +282,8 @@ pub struct FreeRunning {
 }
 
 impl FreeRunning {
-    /// The phantom for an array that a motor moves at `speed` deg/s: swept in both directions, with at most as many lines as the speed of sound
-    /// allows, and with the motor's travel during each frame.
+    /// The phantom for an array that a motor moves at `speed` deg/s: swept in both directions, and with the motor's travel during each frame. It has
+    /// fewer lines than `options` states, but at least 16, if the motor would travel more than three quarters of a slice pitch during a frame.
     ///
     /// # Errors
     /// An option of the phantom is out of its range.

@@ -200,7 +200,7 @@ pub struct TrackingCounts {
     pub filled: u64,
     /// Number of passes that became complete volumes.
     pub whole: u64,
-    /// Number of passes that stayed incomplete because more slices in a row were missing than are filled.
+    /// Number of passes that stayed incomplete because more than two slices in a row were missing, which are not filled.
     pub incomplete: u64,
 }
 

@@ -15,12 +15,13 @@ use std::str::FromStr;
 /// The object that the phantom's probe scans.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Body {
-    /// A fetal head, a hand and a cord in fluid behind the uterine wall; they move.
+    /// A fetal head, shoulders, a hand and an umbilical cord, in fluid behind the uterine wall. Head and hand move, unless [`PhantomOptions::still`]
+    /// is true.
     #[default]
     Head,
     /// A bright ball in dark fluid.
     Sphere,
-    /// Dark above a plane across the beam, bright below.
+    /// Dark between the probe and a plane across the central beam, bright behind the plane.
     Step,
     /// Thin bright wires in dark fluid.
     Wires,
@@ -115,7 +116,7 @@ impl RampTruth {
 
 /// The ground truth of the scanned object: positions in mm in the coordinates of [`Probe`], grey values 0..255 without speckle.
 ///
-/// Edges are linear in grey over one sample along the beam, with the middle grey on the edge itself.
+/// Edges are linear in grey over the distance from a sample to the next, measured perpendicular to the edge, with the middle grey on the edge itself.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Truth {
     /// The head, which no formula describes.

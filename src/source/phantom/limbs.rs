@@ -46,7 +46,7 @@ impl Hand {
         Hand { fingers: std::array::from_fn(finger) }
     }
 
-    /// Distance of a position in the axes of the head, mm, from the skin of the hand, negative inside.
+    /// Distance of a position in the axes of the head, mm, from the skin of the hand, negative inside. Away from the hand it is a lower bound.
     pub fn distance(&self, p: Vec3) -> f32 {
         let p = p - HAND;
         let bound = ball(p, vec3(40.0, -40.0, -10.0), 40.0);
@@ -77,8 +77,8 @@ impl Hand {
 }
 
 impl Hand {
-    /// Distance of a position in the axes of the head, mm, from the nearest bone of fingers, thumb, palm and forearm, negative inside. The joints
-    /// are of cartilage, which is dark, and do not count.
+    /// Distance of a position in the axes of the head, mm, from the nearest bone of fingers, thumb, palm and forearm, negative inside. The joints are
+    /// of cartilage, which is dark, and do not count. Far from the hand the result is a lower bound.
     pub fn bone(&self, p: Vec3) -> f32 {
         /// Shares of the way from joint to joint at which bone begins and ends.
         const SHAFT: [f32; 2] = [0.14, 0.86];

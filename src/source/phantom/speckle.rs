@@ -16,7 +16,7 @@ pub const DYNAMIC_RANGE: f64 = 50.0;
 pub(super) struct Beam {
     /// Position of sample 0 of the line, mm.
     pub first: DVec3,
-    /// Vector from a sample to the next, mm. Both maps of the probe are linear along a line.
+    /// Vector from a sample to the next, mm. It is the same for all samples of the line, which is straight.
     pub step: DVec3,
     /// Distance from sample to sample, mm.
     pub pitch: f64,
