@@ -21,7 +21,8 @@ pub struct Comparison {
     /// Absolute value of the mean signed error of the texels within tolerance, divided by the error that is allowed there; the largest
     /// of all outputs that have enough written texels. It is small if errors are roundings, which have both signs.
     pub bias: f64,
-    /// The worst texel of an output that has more texels beyond tolerance than its pass allows; None if no output has.
+    /// The worst texel of the first output that has more texels beyond tolerance than its pass and the [`ExtraTolerance`] allow; None if no output
+    /// has.
     pub worst: Option<Worst>,
 }
 
@@ -51,9 +52,9 @@ pub struct ExtraTolerance {
 
 impl ExtraTolerance {
     /// The extra tolerance for a dispatch that samples through the device's texture filter, whose weights have `bits` bits and may be truncated along
-    /// three axes; zero for others. Neighbours differ by at most 1. If a pass compares samples with a threshold or looks them up in a transfer
-    /// function, a small difference may become a large one. Then a share of the texels may be wrong: a threshold is reached a step earlier or later,
-    /// and rarely in another voxel. The group "sampling" judges single samples.
+    /// three axes; zero for other dispatches. Neighbouring texels are assumed to differ by at most 1. If a pass compares samples with a threshold or
+    /// looks them up in a transfer function, a small difference may become a large one. Then a share of the texels may be wrong: a threshold is
+    /// reached a step earlier or later, and rarely in another voxel. The group "sampling" judges single samples.
     pub fn of(pass: &Pass, scene: &Scene, args: &DispatchArgs, bits: u32) -> ExtraTolerance {
         if !pass.reads(scene, args).iter().any(|bind| bind.filtered) {
             return ExtraTolerance::default();

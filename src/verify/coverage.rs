@@ -10,7 +10,7 @@ use crate::spirv;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
-/// What of one pass its check in the group "passes" covers.
+/// What the check of one pass in the group "passes" covers.
 #[derive(Default)]
 pub struct PassCoverage {
     pub shaders: BTreeSet<&'static str>,
@@ -18,9 +18,9 @@ pub struct PassCoverage {
     pub constants: BTreeMap<&'static str, BTreeSet<i32>>,
     /// Pipelines of the check: each is a shader with the values of all its constants.
     pub pipelines: BTreeSet<(&'static str, Vec<(&'static str, i32)>)>,
-    /// Largest number of workgroups of a dispatch along x, y and z.
+    /// Largest number of workgroups of a dispatch along each of x, y and z.
     pub groups: [u32; 3],
-    /// Classes of instructions that occur in its shaders.
+    /// Classes of SPIR-V instructions that occur in the shaders.
     pub classes: BTreeSet<&'static str>,
 }
 
@@ -92,7 +92,8 @@ const COMMANDS: [(&str, &str); 21] = [
     ("vkWaitSemaphores", "determinism, failures"),
 ];
 
-/// The coverage as text: a line for each pass, for each class of instructions, unused shader, and Vulkan command.
+/// The coverage as text: a line for each pass and for each class of instructions, one line with all unused shaders, and a line for each Vulkan
+/// command.
 pub fn text(scenes: &[(String, Scene)]) -> String {
     let (of_passes, mut text) = (passes(scenes), String::new());
     let mut by_class: BTreeMap<&str, Vec<&str>> = BTreeMap::new();

@@ -257,7 +257,8 @@ impl PassSummary {
 }
 
 /// Kinds of inputs of single passes: noise, all zero, all one, a single bright texel, and noise beside empty texels. For distances, mm, noise is a
-/// smooth surface with cliffs and misses, and an empty texel is a miss; for volumes noise is blurred, so that it resembles tissue.
+/// smooth surface with cliffs and misses, a zero or empty texel is a miss, and each texel of "one" is 42 mm. For volumes noise is blurred, so that it
+/// resembles tissue.
 pub const KINDS: [&str; 5] = ["noise", "zero", "one", "hot", SPLIT];
 
 /// Noise to one side of a column, and nothing to the other, so that some invocations of a subgroup are done before the others: only then do its

@@ -85,8 +85,8 @@ pub struct LargestDifference {
 }
 
 impl LargestDifference {
-    /// Compares a picture with the expected one, and adds a fault if it differs by more than `allowed`: mean difference, and the difference that one
-    /// per cent of the values exceed; levels of 8 bits.
+    /// Compares a picture with the expected one, and adds a fault if it differs by more than `allowed`: the mean and the 99th percentile of the
+    /// differences of channel values, levels of 8 bits. `what`: description of the comparison.
     pub fn add(&mut self, findings: &mut Findings, what: &str, expected: &Picture, got: &Picture, allowed: [f64; 2]) {
         let is = difference(expected, got);
         self.pictures += 1;
@@ -134,7 +134,7 @@ fn volume(dut: &mut DeviceUnderTest, format: &str, allowed: [f64; 2]) -> Result<
     Ok(findings)
 }
 
-/// A feature that a device may missing, the options to render with, and the sampling that must be used instead.
+/// A feature that a device may lack, the options to render with, and the sampling that must be used instead.
 struct MissingFeature {
     name: &'static str,
     change: fn(&mut Context),

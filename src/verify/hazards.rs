@@ -121,10 +121,10 @@ fn volume_waited_for(
     Ok((renderer.picture()?, renderer.read(Slot::Volume)?))
 }
 
-/// Renders `rounds` pictures on `queues` queues from two volume images in turn. During each, the next volume is sent into the volume image that
-/// `into` returns for the number of the round, which is counted from 0. If the images alternate, the volumes do not mix; sent into the image that is
-/// being rendered, they would.
-/// Returns the numbers of pictures that were compared and that differ.
+/// Renders `rounds` pictures on `queues` queues from two volume images in turn: round n, counted from 0, renders image n % 2. During each round the
+/// next volume is sent into the image `into(n)`. If this is the image that is not being rendered, all pictures are right; otherwise some show the
+/// wrong volume. Each wrong picture is added to `findings` as a fault.
+/// Returns the number of pictures that were compared, and of those that differ.
 ///
 /// # Errors
 /// The device fails.

@@ -15,7 +15,7 @@ use crate::report::{Fault, Figure, Level, PictureComparison, Unit, Worst};
 use crate::scene::Scene;
 use glam::DVec3;
 
-/// The checks of the group, which are the same at every level. The slowest come last.
+/// The checks of the group "known answers", which are the same at every level. The slowest come last.
 pub fn checks(_: Level) -> Vec<Check> {
     let of = |name: &str, work: fn(&mut DeviceUnderTest) -> Result<Findings, GpuError>| {
         Check::new("known answers", name, work)

@@ -164,7 +164,7 @@ impl Check {
 
     /// Runs the check. A check that fails is run up to three times more, and passes, marked as flaky, once it passes. If it never does, it is run
     /// once while the host waits for each submission, and a note says if it passes then. An error of the device is a fault. After the loss of the
-    /// device the next check gets a new context.
+    /// device a new context is opened for all later runs.
     pub fn run(&self, dut: &mut DeviceUnderTest) -> Outcome {
         let first = self.run_once(dut);
         if first.verdict != Verdict::Failed {
@@ -259,8 +259,8 @@ pub struct DeviceUnderTest {
     scenes: Rc<Vec<(String, Scene)>>,
     /// Called on every new context.
     prepare: Option<fn(&Context)>,
-    /// The `echolume` program, which checks start as a child process: at first the executable of this process. Another program has to set None, and
-    /// such checks are then skipped.
+    /// The `echolume` program, which some checks start as a child process: at first the executable of this process. A process that is not `echolume`
+    /// has to set None, and these checks are then skipped.
     pub program: Option<PathBuf>,
     modes: Option<Rc<Vec<Drawn>>>,
     /// Fault injected into every new context.
@@ -356,7 +356,7 @@ impl DeviceUnderTest {
         &mut self.pass_runner
     }
 
-    /// Opens another context on the same device with the same options and injected fault, because the present one was lost or will be.
+    /// Opens a further context on the same device, with the same options and injected fault. The present context stays in use.
     ///
     /// # Errors
     /// The device cannot be opened again.

@@ -209,6 +209,7 @@ fn every_scene(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
 }
 
 /// Checks, one for each view, that render it on the device under test and on the device of `other`, and compare the pictures by [`compare_picture`].
+/// The picture of `other` is the expected one.
 ///
 /// # Errors
 /// One line: a built-in scene is invalid.

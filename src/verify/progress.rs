@@ -81,7 +81,7 @@ impl Progress {
         self.group.push(Outcome { pictures: Vec::new(), ..outcome.clone() });
     }
 
-    /// Prints what is left after the last check, and removes the bar.
+    /// Prints the line of the last group, and removes the bar.
     pub fn finish(mut self) {
         self.end_group();
         self.bar.finish_and_clear();

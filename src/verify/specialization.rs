@@ -9,7 +9,7 @@ use crate::passes::Stage;
 use crate::report::Level;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// The checks of the group: one for each stage.
+/// The checks of the group "specialization": one for each stage.
 pub fn checks(_: Level) -> Vec<Check> {
     let check = |stage: Stage| {
         Check::new("specialization", format!("constants of stage {}", stage.name()), move |dut| check(dut, stage))

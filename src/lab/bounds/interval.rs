@@ -87,7 +87,7 @@ impl Interval {
         Interval { low, high: a.max(b).next_up() }
     }
 
-    /// The square root of the non-negative numbers of the interval.
+    /// The square roots of the numbers of the interval; negative ones count as 0.
     pub fn root(self) -> Interval {
         let root = |v: f64| v.max(0.0).sqrt();
         Interval { low: root(self.low).next_down().max(0.0), high: root(self.high).next_up() }

@@ -22,16 +22,17 @@ use rayon::prelude::*;
 /// When to stop refining the bounds of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Effort {
-    /// The width (upper less lower bound, 0..1) of the widest channel that is narrow enough.
+    /// A ray is not refined further once its widest channel (upper less lower bound, 0..1) is at most this wide.
     pub width: f64,
-    /// Number of parts from which on a ray is not divided further. Its first division, at the faces of cells, may have more.
+    /// A ray is not refined further once it has this number of parts. Its first division, at the faces of cells and the points of the transfer
+    /// function, may have more.
     pub parts: usize,
 }
 
 /// Proven bounds of the light of every ray of a picture.
 #[derive(Clone, Debug)]
 pub struct PictureBounds {
-    /// Lower bounds of red, green, blue and opacity before stage 4, a texel for each ray; `high` has the upper bounds.
+    /// Lower bounds of red, green, blue and opacity before stage 4 (postprocess), a texel for each ray; `high` has the upper bounds.
     pub low: Texels,
     pub high: Texels,
     /// Number of parts of all rays together, without those that are surely transparent.
@@ -54,7 +55,7 @@ impl PictureBounds {
     }
 }
 
-/// What the bounds prove about the error of a drawn pixel.
+/// What the bounds prove about the error of a drawn pixel. The tolerance is that of [`proven`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Proof {
     /// The error is within the tolerance.
@@ -110,17 +111,17 @@ pub fn fault(scene: &Scene) -> Option<&'static str> {
     }
 }
 
-/// The bounds of all rays of a scene for which [`fault`] returns None. `volume`: the texels that stage 1 makes.
+/// The bounds of all rays of a scene for which [`fault`] returns None. `volume`: the texels that stage 1 (preprocess) makes.
 pub fn picture(scene: &Scene, volume: &Texels, effort: Effort) -> PictureBounds {
     enclosed(scene, volume, effort, |_, _| false)
 }
 
 /// Bounds that are as narrow as needed, or as `effort` allows, to prove for each pixel of the picture `drawn` (red, green, blue and opacity before
-/// stage 4) that its error is within `tolerance`, levels of 255 after toning, or that it is not. Returns the bounds and a proof for each pixel, row
-/// by row. [`fault`] must return None for the scene.
+/// stage 4, postprocess) that its error is within `tolerance`, levels of 255 after toning, or that it is not. Returns the bounds and a proof for each
+/// pixel, row by row. [`fault`] must return None for the scene.
 ///
 /// # Errors
-/// One line: the toning of the scene does not keep the order of values, or the picture has another size.
+/// One line: the scene has a colour map, which does not keep the order of values, or `drawn` does not have one pixel of four channels for each ray.
 pub fn proven(
     scene: &Scene,
     volume: &Texels,

@@ -25,12 +25,12 @@ impl Medium {
         Medium { points, threshold, absorption, tint: None, fade: None }
     }
 
-    /// The medium with a tint: at s mm from the start of the ray its colours are multiplied by start + rate s.
+    /// The medium with a tint: at s mm from the start of the ray its colours are multiplied by `start + rate * s`.
     pub fn tinted(self, start: [Interval; 3], rate: [Interval; 3]) -> Medium {
         Medium { tint: Some([start, rate]), ..self }
     }
 
-    /// The medium with `region.fade`; None: without.
+    /// The medium whose absorption is scaled by `region.fade`. With None it is not scaled.
     pub fn faded(self, fade: Option<Fade>) -> Medium {
         Medium { fade, ..self }
     }
@@ -147,9 +147,10 @@ impl Bounds {
     }
 }
 
-/// The bounds of a ray. Parts of the ray are halved until the widest channel is no wider than `target`, `enough` is true for the bounds, or there are
-/// `most` parts. `hints`: positions on the field's line in rising order, mm, at which parts end at first, even if these are more than `most`. The
-/// first and last are the ray's ends; the bounds hold for any others, such as the faces of cells.
+/// The bounds of a ray. Parts of the ray are halved until the widest channel is no wider than `target`, `enough` is true for the bounds, there are
+/// `most` parts, or no part can be halved. `hints`: positions on the field's line in rising order, mm, at which parts end at first, even if these are
+/// more than `most`. The first and last are the ray's ends. The bounds are valid for any positions between them; positions at the faces of cells make
+/// them narrower.
 pub fn bounds(
     field: &Field,
     medium: &Medium,

@@ -16,7 +16,7 @@ pub const FLOOR: &str = "device";
 #[serde(deny_unknown_fields)]
 pub struct Budget {
     pub reference: Reference,
-    /// Estimate of the error of the reference itself; 0 if it was computed in f64.
+    /// Estimate of the error of the reference itself; 0 for [`Reference::F64`].
     pub reference_error: OwnError,
     /// Each source of error alone, without those that have their finest setting in the scene. The last entry is [`FLOOR`].
     pub shares: Vec<Share>,
@@ -42,14 +42,15 @@ impl Budget {
     }
 }
 
-/// A source of error in a scene: a dial whose setting decides how accurate the picture is, with its own setting and its two finest.
+/// A source of error in a scene: a dial whose setting decides how accurate the picture is, with the scene's own setting of it and its two finest
+/// ones.
 pub struct Source {
     pub name: &'static str,
     /// Label of the scene's own setting of the dial.
     pub label: String,
-    /// Assignments `key=value` of its finest setting, only of keys of its own.
+    /// Assignments `key=value` of the dial's finest setting, only of keys that the dial itself varies.
     pub finest: Vec<String>,
-    /// Assignments `key=value` of the setting that is one step coarser than the finest.
+    /// Assignments `key=value` of the setting that is one step coarser than the finest, only of keys that the dial itself varies.
     pub nearly: Vec<String>,
 }
 

@@ -18,9 +18,10 @@ pub const TIME_MARGIN: f64 = 0.25;
 /// What a chosen combination has to keep.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Bound {
-    /// A largest error, in the unit of the measure. The estimated error of the reference counts in addition.
+    /// Largest error, in the unit of the [`Measure`]. The error of a combination plus the estimated error of its reference must not exceed it. For
+    /// distances and normals there is no such estimate.
     Error(f64),
-    /// A longest time for a volume and its picture, ns. The 95th percentile, increased by the share [`TIME_MARGIN`], must be within it.
+    /// Longest time for a volume and its picture, ns. The 95th percentile, increased by the share [`TIME_MARGIN`], must not exceed it.
     Time(f64),
 }
 
@@ -28,10 +29,12 @@ pub enum Bound {
 pub const MAX_CONTENDERS: usize = 6;
 
 /// Chooses a combination; returns its index in [`Report::choices`]. With an error bound it is the one with the shortest median time that keeps the
-/// bound, with a time bound the most accurate one. `refused`: indices of combinations that must not be chosen.
+/// bound, with a time bound the most accurate one. Combinations with too many changed rays are not considered, as in [`front`]. `refused`: indices of
+/// combinations that must not be chosen.
 ///
 /// # Errors
-/// One line: no times were measured, or no measured combination keeps the bound; it names the nearest one.
+/// One line: no combination has both a time and an error by `measure`, or none that may be chosen keeps the bound. The message then names the most
+/// accurate combination, or the fastest one for a time bound.
 pub fn choose(report: &Report, measure: Measure, bound: Bound, refused: &[usize]) -> Result<usize, String> {
     let all: Vec<Candidate> = candidates(report, measure).collect();
     if all.is_empty() {
@@ -69,9 +72,9 @@ pub fn choose(report: &Report, measure: Measure, bound: Bound, refused: &[usize]
     }
 }
 
-/// The combinations that may be the fastest with an error by `measure` of at most `error`, as indices of [`Report::choices`]: those that keep it and
-/// whose confidence interval of the time overlaps that of the fastest. The fastest is first; there are at most [`MAX_CONTENDERS`]. More runs have to
-/// decide between them. `refused`: indices of combinations that must not be chosen.
+/// The combinations that may be the fastest within an error bound, as indices of [`Report::choices`]. Their error by `measure`, with the estimated
+/// error of the reference added, is at most `error`, and the confidence interval of their time overlaps that of the fastest of them. The fastest is
+/// first; there are at most [`MAX_CONTENDERS`]. More runs have to decide between them. `refused`: indices of combinations that must not be chosen.
 pub fn contenders(report: &Report, measure: Measure, error: f64, refused: &[usize]) -> Vec<usize> {
     let mut kept: Vec<Candidate> =
         candidates(report, measure).filter(|c| c.error <= error && !refused.contains(&c.index)).collect();
@@ -81,7 +84,8 @@ pub fn contenders(report: &Report, measure: Measure, error: f64, refused: &[usiz
 }
 
 /// The Pareto front of the measured combinations by median time and error, from the fastest to the most accurate, as indices of [`Report::choices`].
-/// A combination is left out if the share of its rays that find another surface or none is above 0.1 % and above that of the scene's own settings.
+/// A combination is left out if too many of its rays are changed: they hit another surface than the reference's, or only one of the two hits. The
+/// limit is 0.1 % of the rays, or the share with the scene's own settings if that is larger.
 pub fn front(report: &Report, measure: Measure) -> Vec<usize> {
     let all: Vec<Candidate> = candidates(report, measure).collect();
     let pairs: Vec<[f64; 2]> = all.iter().map(|c| [c.times[1], c.error]).collect();
@@ -116,7 +120,7 @@ impl Combination {
         measure.of(&self.errors).map(|error| error + own)
     }
 
-    /// One line for the user, such as "(ray.step=0.25): RMSE 1.0e-3, 12.000 ms (95th percentile 13.100)".
+    /// One line for the user, such as "(ray.step=0.25): RMSE 1.000e-3, 12.000 ms (95th percentile 13.100)".
     pub fn describe(&self, measure: Measure) -> String {
         let mut text =
             format!("({})", if self.set.is_empty() { "the scene as it is".into() } else { self.set.join(" ") });
@@ -143,9 +147,10 @@ fn keeps_surfaces(report: &Report, choice: &Combination) -> bool {
 /// Changes of several dials at once: index of the dial, and index of its point.
 pub type Changes = Vec<(usize, usize)>;
 
-/// At most `most` combinations, apart from the first on the predicted Pareto front of error and time. The prediction adds squares of errors, as for
-/// independent errors, and multiplies the time by the factor of each change. The first combination is the scene with its own settings. With a bound,
-/// half of the others are those predicted nearest to it, and come next. The rest are spread evenly by rank, from the fastest to the most accurate.
+/// Combinations to measure, at most `most` of them, but at least one. The first is the scene with its own settings. All others lie on the predicted
+/// Pareto front of error and time. The prediction adds squares of errors, as for independent errors, and multiplies the time by the factor of each
+/// change. With a bound, the half of the others that is predicted nearest to the bound comes next. The rest are spread evenly by rank over the front,
+/// from the fastest to the most accurate.
 pub fn proposals(dials: &[Dial], bound: Option<Bound>, most: usize) -> Vec<Changes> {
     let turned: Vec<usize> =
         (0..dials.len()).filter(|d| dials[*d].kind == Kind::Numerical && default(&dials[*d]).is_some()).collect();

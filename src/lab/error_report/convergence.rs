@@ -2,15 +2,14 @@
 
 use serde::{Deserialize, Serialize};
 
-/// The points that an order is fitted to. The order shows only between steps that are too coarse for the asymptotic behaviour and errors that are too
-/// small to be caused by the step.
+/// Which points an order is fitted to. Points with coarser steps are not yet asymptotic; errors near the floor are not caused by the step.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Range {
     /// Smallest and largest step, in the unit of the dial.
     pub step: [f64; 2],
-    /// The error that remains for small steps, by rounding and the texel format. Points below `ABOVE_FLOOR` times this error are left out, because it
-    /// bends the line there by more than 5 %.
+    /// The error that remains for small steps, by rounding and the texel format. Points whose error is less than three times this are left out,
+    /// because it bends the line there by more than 5 %.
     pub floor: f64,
 }
 

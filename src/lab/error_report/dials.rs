@@ -18,7 +18,7 @@ pub struct DialSetting {
     pub value: f64,
 }
 
-/// One or a few settings that are varied together to trade error for time, or to choose a look.
+/// One key of the scene's settings, or a few that are varied together, with the values to measure. A dial trades error for time, or chooses a look.
 #[derive(Clone, Debug)]
 pub struct Dial {
     pub name: &'static str,
@@ -30,8 +30,8 @@ pub struct Dial {
     pub is_ordered: bool,
     /// Assignments `key=value` of the reference that errors are measured against. Empty for a look.
     pub best: Vec<String>,
-    /// Assignments `key=value` of the setting that is one step coarser than the reference. Where the device renders the reference, because exact rays
-    /// and f64 do not serve, the difference of the two pictures estimates the error of the reference. Empty for a look.
+    /// Assignments `key=value` of the setting that is one step coarser than the reference, or the same if there is none. Where the device renders the
+    /// reference, because exact rays and f64 do not serve, the difference of the two pictures estimates the error of the reference. Empty for a look.
     pub nearly: Vec<String>,
 }
 
@@ -102,7 +102,7 @@ pub const NAMES: &[&str] = &[
 /// The dial with this name, for a scene.
 ///
 /// # Errors
-/// Why this scene has no such dial, as the end of a sentence that begins with "this scene".
+/// The scene has no such dial, or the name is unknown. The text is the end of a sentence that begins with "this scene".
 pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
     let s = &scene.settings;
     let step = scene.step;

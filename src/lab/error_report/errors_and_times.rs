@@ -49,8 +49,8 @@ pub const MAX_COMBINATIONS: usize = 24;
 /// Which reference errors are measured against.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ReferenceChoice {
-    /// Exact rays for dials of ways to take samples along rays, if they exist for the scene; otherwise f64, but not for a scene with a light volume.
-    /// Each only if it takes about a minute or less; otherwise a converged picture of the device.
+    /// Exact rays ([`Reference::Exact`]) for dials that change how rays take samples, if they exist for the scene; otherwise f64, but not for a scene
+    /// with a light volume. Each is used only if it takes about a minute or less; otherwise the reference is a converged picture of the device.
     Auto,
     /// Exact rays for every dial but looks; an error if they do not exist for the scene.
     Exact,
@@ -97,7 +97,7 @@ pub struct Finest {
 pub struct Verified {
     /// The combination with its second measurement.
     pub choice: Combination,
-    /// Times of the scene with its own settings, measured alternately with the combination. None without time stamps.
+    /// Times of the scene with its own settings, measured alternately with the combination. None if the device has no time stamps.
     pub unchanged: Option<Times>,
     /// The combinations that were chosen first, and did not keep the bound in their second measurement.
     pub failed: Vec<Combination>,

@@ -131,8 +131,8 @@ fn errors_row(e: &Errors, measure: Measure, has_surface: bool) -> String {
     text
 }
 
-/// The report as tables of text: for each point of a dial its errors, its time, and the ratio of that to the time of the scene's own setting; then
-/// the error budget and the best combinations.
+/// The report as tables of text. Each point of a dial has its errors, its times of volume and picture, and the ratio of both together to those of the
+/// scene's own setting. Then follow the error budget and the Pareto front of the combinations by `measure`.
 pub fn summary_table(report: &Report, measure: Measure) -> String {
     let mut text = String::new();
     let [w, h, k] = report.sizes.volume;

@@ -65,7 +65,7 @@ pub struct SurfaceError {
     pub false_hits: f64,
     /// Share (0..1) of all pixels that are missed in the measured map, but hit in the reference.
     pub missed_hits: f64,
-    /// Share (0..1) of all pixels that are hit in both maps, but on different surfaces.
+    /// Share (0..1) of all pixels that are hit in both maps, but on different surfaces. Always 0 for normals.
     pub jumps: f64,
 }
 
@@ -117,7 +117,7 @@ pub fn changed_rays(measured: &Texels, reference: &Texels, cliff: f64, size: [us
 /// Compares pictures of 3 or 4 channels in 0..1.
 ///
 /// # Errors
-/// One line: sizes or channels differ, there is no pixel, or a value is not finite.
+/// One line: the channels are not 3 or 4, sizes or channels differ, there is no pixel, or a value is not finite.
 pub fn pictures(measured: &Texels, reference: &Texels) -> Result<PictureError, String> {
     if !matches!(measured.channels, 3 | 4) {
         return Err(format!("a picture has 3 or 4 channels, not {}", measured.channels));

@@ -36,7 +36,7 @@ pub struct Report {
     /// Description of the input on the first line, then all settings as TOML, with defaults filled in.
     pub scene: String,
     pub sizes: Sizes,
-    /// Number of runs over which a time is a median; those of the scene's own setting of a dial are more.
+    /// Number of timed runs of each setting. The scene's own setting of a dial has more, because it runs in turn with every other setting.
     pub repeats: u32,
     pub dials: Vec<Dial>,
     /// Combinations of settings of one dial or of several, each rendered and compared with the scene's finest picture. The first is the scene with
@@ -46,19 +46,19 @@ pub struct Report {
     pub budget: Budget,
 }
 
-/// Settings of several dials at once, with their errors and times.
+/// Settings of one or several dials at once, or the scene's own settings, with their errors and times.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Combination {
-    /// What differs from the scene's own settings: name of the dial, and label of its point.
+    /// What differs from the scene's own settings: name of each dial, and label of its point. Empty for the scene's own settings.
     pub changed: Vec<(String, String)>,
     /// The assignments of these changes, `key=value` as for `--set`.
     pub set: Vec<String>,
     /// Errors against the reference: the scene's picture with the finest numerical settings.
     pub errors: Errors,
-    /// Estimate of the error of that reference itself; 0 if it was computed in f64.
+    /// Estimate of the error of that reference itself; 0 if it is [`Reference::F64`].
     pub reference_error: OwnError,
-    /// Times of the combination. None without time stamps.
+    /// Times of the combination. None if the device has no time stamps.
     pub times: Option<Times>,
 }
 
@@ -73,7 +73,7 @@ pub struct OwnError {
 }
 
 impl OwnError {
-    /// The upper limit for the last picture of a converging sequence. `errors`: the difference of the last two pictures.
+    /// The upper limit of the error of the last picture of a converging sequence. `errors`: the difference of the last two pictures.
     pub fn of(errors: &Errors) -> OwnError {
         OwnError { rmse: errors.rmse, levels: errors.levels.p95 }
     }
@@ -83,13 +83,13 @@ impl OwnError {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
-    /// They are values of one setting and compute the same picture more or less accurately. A choice may vary the dial together with others.
+    /// The settings compute the same picture more or less accurately. A choice may vary the dial together with others.
     Numerical,
-    /// They change several such settings at once. A choice may vary the dial, but not together with others.
+    /// The settings change what several numerical dials change, all at once. A choice may vary the dial, but not together with others.
     Several,
-    /// They change the number of pixels, or of rays in a pixel: another picture, with an error of its own.
+    /// The settings change the number of pixels, or of rays in a pixel: another picture, with an error of its own. No choice varies the dial.
     Pixels,
-    /// They change the look: differences from the scene's own setting are not errors.
+    /// The settings change the look: differences from the scene's own setting are not errors. No choice varies the dial.
     Look,
 }
 
@@ -111,7 +111,7 @@ pub struct Dial {
     pub kind: Kind,
     /// True if the points lie on an axis, so that a line may join them; false if they are names.
     pub is_ordered: bool,
-    /// Unit of the points' values; empty for counts and names.
+    /// Unit of the points' values; empty if they have none.
     pub unit: String,
     pub reference: Reference,
     pub points: Vec<Point>,
@@ -121,7 +121,7 @@ pub struct Dial {
     /// alone make. None for other references, and for other dials than `step`.
     #[serde(default)]
     pub floor: Option<f64>,
-    /// For a dial of ways to take samples along rays, why its reference is not exact rays. None if it is, if another reference was asked for, and for
+    /// For a dial that changes how rays take samples, why its reference is not exact rays. None if it is, if another reference was asked for, and for
     /// other dials.
     #[serde(default)]
     pub note: Option<String>,
@@ -140,7 +140,8 @@ impl Dial {
 pub enum Reference {
     /// The picture of the reference renderer, in f64 on the CPU.
     F64,
-    /// The picture of the reference renderer with exact rays in place of stage 2: without steps, and without a table of the transfer function.
+    /// The picture of the reference renderer with exact rays in place of stage 2 (raycast): without steps, and without a table of the transfer
+    /// function.
     Exact {
         /// The exact rays' own estimate of their error, root mean square over the rays; not a bound. It is that of the picture, or of the distance
         /// map in mm if the scene shows surfaces.
@@ -182,9 +183,9 @@ pub struct Point {
     /// Value on the dial's axis, in the dial's unit. For names it is a number that only gives their order in a plot.
     pub value: f64,
     pub errors: Errors,
-    /// Times with this setting. None without time stamps.
+    /// Times with this setting. None if the device has no time stamps.
     pub times: Option<Times>,
-    /// Times divided by those of the scene's own setting, from alternate runs of both. None without time stamps.
+    /// Times divided by those of the scene's own setting, from alternate runs of both. None if the device has no time stamps.
     pub ratios: Option<Times>,
     /// True for the scene's own setting, which has no assignments.
     pub is_default: bool,
@@ -250,9 +251,9 @@ impl Time {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Times {
-    /// Work for each frame and volume: upload, stage 1, and the value ranges of bricks.
+    /// Work for each frame and volume: upload, stage 1 (preprocess), and the value ranges of bricks.
     pub volume: Time,
-    /// Work for each picture: which bricks rays may skip, stages 2 to 4, and the readback.
+    /// Work for each picture: which bricks rays may skip, stages 2 to 4 (raycast, shade, postprocess), and the readback.
     pub picture: Time,
     /// `volume` and `picture` together.
     pub total: Time,
@@ -266,7 +267,7 @@ impl Times {
     }
 }
 
-/// By which error settings are compared in a plot or a choice.
+/// The kind of error by which a plot or a choice compares settings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Measure {
     /// RMSE of the picture before toning, 0..1.
@@ -301,7 +302,7 @@ impl Measure {
         }
     }
 
-    /// An error by this measure as text, with name and unit, for messages.
+    /// An error by this measure as text for messages, with its unit, such as "RMSE 1.000e-3" or "0.250 levels".
     pub fn format(self, error: f64) -> String {
         match self {
             Measure::Rmse => format!("RMSE {error:.3e}"),
@@ -330,7 +331,7 @@ impl Report {
     /// The report as JSON.
     ///
     /// # Errors
-    /// One line: a number is not finite, or an error or time is negative; it names the dial and the point.
+    /// One line: a number is not finite, or an error or time is negative. It names the dial and point, the combination or the share of the budget.
     pub fn to_json(&self) -> Result<String, String> {
         self.check()?;
         serde_json::to_string_pretty(self).map_err(|e| format!("error report: {e}"))
@@ -391,8 +392,8 @@ impl Report {
         Ok(())
     }
 
-    /// The Pareto front over the points of all dials: indices of dial and point, from the fastest to the most accurate. Points without a time or
-    /// without this error are not on it, nor are points of another look.
+    /// The Pareto front over the points of all dials by median time and error: indices of dial and point, from the fastest to the most accurate.
+    /// Points without a time or without this error are not on it, nor are points of looks.
     pub fn pareto_front(&self, measure: Measure) -> Vec<(usize, usize)> {
         let mut indices = Vec::new();
         let mut pairs = Vec::new();

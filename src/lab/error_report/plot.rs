@@ -48,7 +48,7 @@ impl Figure {
     }
 }
 
-/// The diagram as SVG, time against the error by `measure`. `size`: width and height, pixels.
+/// The diagram as SVG: the error by `measure` over the time. `size`: width and height, pixels.
 ///
 /// # Errors
 /// One line: no point has both a time and this error, or the size is not within 640x400..4096x4096.
@@ -57,7 +57,7 @@ pub fn svg(report: &Report, figure: Figure, measure: Measure, size: [u32; 2]) ->
     canvas::svg(size, &Diagram { report, figure, measure })
 }
 
-/// The diagram as a picture, time against the error by `measure`. `size`: width and height, pixels.
+/// The diagram as a picture: the error by `measure` over the time. `size`: width and height, pixels.
 ///
 /// # Errors
 /// One line: no point has both a time and this error, or the size is not within 640x400..4096x4096.
@@ -74,7 +74,7 @@ fn check([width, height]: [u32; 2]) -> Result<(), String> {
     Ok(())
 }
 
-/// The size, pixels, at which every panel of the diagram has room for the names of its points.
+/// Width and height, pixels, at which every panel of the diagram has room for the names of its points. The height is at most 4096.
 pub fn size(report: &Report, figure: Figure) -> [u32; 2] {
     let panels = panels(report, figure, Measure::Rmse);
     let rows = panels.len().div_ceil(COLUMNS).clamp(1, 12) as u32;
@@ -486,7 +486,8 @@ impl Labels {
         }
     }
 
-    /// Top left of a label of this size for a mark, within the frame: beside it, or else where there is room, the nearest first.
+    /// Places a label of width `w` and height `h` for the mark at `at`, and returns its top left corner, pixels. The label lies beside the mark, or
+    /// else at the nearest free place of the frame. If none is free, it covers others.
     pub fn place(&mut self, at: [f64; 2], [w, h]: [f64; 2], frame: Frame) -> [f64; 2] {
         let around = |gap: f64| {
             let (east, west) = (at[0] + gap, at[0] - gap - w);

@@ -23,8 +23,8 @@ pub struct Extrapolated {
     pub coarser: Texels,
     /// The observed order of the error in the size of the cells. Infinite if the two finest pictures are equal.
     pub order: f64,
-    /// RMS difference of `picture` and `coarser`, over all values. It is the error of `coarser` as far as the next term is known, and so an upper
-    /// bound of the error of `picture` if the pictures converge.
+    /// RMS difference of `picture` and `coarser`, over all values: an estimate of the error of `coarser`. If the pictures converge, it is an upper
+    /// bound of the error of `picture`.
     pub error: f64,
     /// RMS difference of the picture with the smallest cells from the limit: an estimate of the error of that picture.
     pub finest: f64,

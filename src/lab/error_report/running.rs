@@ -54,7 +54,7 @@ impl<'a> Running<'a> {
     /// Makes the renderer, and runs it once, so that its shaders are compiled.
     ///
     /// # Errors
-    /// The device cannot hold the scene, or fails, or the time of a part is missing.
+    /// The device cannot hold the scene, or fails, or it has time stamps and the time of the volume or of the picture is missing.
     pub fn new(context: &Arc<Context>, frames: &'a [Frame], scene: &Scene) -> Result<Running<'a>, GpuError> {
         // A stamp at every pass: only so are the times of the volume and of the picture told apart.
         let options = RendererOptions { time_stamps: TimeStamps::EachPass, ..RendererOptions::default() };
@@ -65,11 +65,10 @@ impl<'a> Running<'a> {
         Ok(running)
     }
 
-    /// Sends the frames through stage 1 and renders a picture. Returns the GPU times of volume and picture, ns. None if the device has no time
-    /// stamps.
+    /// Sends the frames through stage 1 and renders a picture. Returns the GPU times [volume, picture], ns. None if the device has no time stamps.
     ///
     /// # Errors
-    /// The device fails, or it has time stamps and the time of a part is missing.
+    /// The device fails, or it has time stamps and the time of the volume or of the picture is missing.
     pub fn run(&mut self) -> Result<Option<[f64; 2]>, GpuError> {
         self.renderer.volume(self.frames)?;
         self.renderer.picture()?;
@@ -126,7 +125,7 @@ impl Runs {
     /// Runs both scenes alternately, `count` times. The default goes first in every other pair, so that what slows the machine down slows both.
     ///
     /// # Errors
-    /// The device fails, or it has time stamps and the time of a part is missing.
+    /// The device fails, or it has time stamps and the time of the volume or of the picture is missing.
     pub fn in_turn(own: &mut Running, default: &mut Running, count: u32) -> Result<Runs, GpuError> {
         let mut all = Runs::default();
         for n in 0..count {

@@ -23,7 +23,7 @@ const PHANTOM: Areas = Areas {
 /// What a measurement of filters covers.
 #[derive(Clone, Copy, Debug)]
 pub struct MeasureOptions<'a> {
-    /// Only filters whose names contain this are measured; empty for all.
+    /// Only filters whose names contain this text are measured, and always "no filter". Empty for all filters.
     pub only: &'a str,
     /// Pixels along the longer edge of a slice.
     pub pixels: u32,
@@ -41,8 +41,8 @@ pub enum MeasureError {
     Gpu(#[from] GpuError),
 }
 
-/// Measures all candidates on the middle frame of the phantom, whose mean over all speckle (the clean frame) is known. `after_each` is called after
-/// each candidate.
+/// Measures the candidates that `options` selects on the middle frame of the phantom, whose mean over all speckle (the clean frame) is known.
+/// `after_each` is called after each candidate.
 ///
 /// # Errors
 /// `options.pixels` is too small for the measured areas, or the device fails.
@@ -65,7 +65,8 @@ pub fn phantom(
     Ok(subject)
 }
 
-/// Measures all candidates on the middle frame of a recording's first volume. `after_each` is called after each candidate.
+/// Measures the candidates that `options` selects on the middle frame of a recording's first volume. `name`: that of the recording, for the result.
+/// `after_each` is called after each candidate.
 ///
 /// # Errors
 /// An area is less than 4 pixels wide or high, `crop` reaches beyond the sector, another area beyond `crop`; the recording cannot be read; the device

@@ -21,7 +21,7 @@ const FIGURES: [Figure; 6] = [
     Figure { name: "ms", of: |r| r.time.map(|t| t.median), digits: 2, is_larger_better: false },
 ];
 
-/// The report as Markdown: for each frame a table of the best setting of each filter, and one of all settings.
+/// The report as Markdown: for each frame a table of the [chosen](Report::chosen) setting of each filter, and one of all settings.
 pub fn markdown(report: &Report) -> String {
     let mut text = String::from("# Filters compared\n\n");
     let device = &report.device;

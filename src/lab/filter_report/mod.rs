@@ -71,7 +71,7 @@ pub struct Report {
 
 impl Report {
     /// For every filter, the index in `Subject::rows` of the candidate whose slice is most similar to the clean one (SSIM), in the order of the rows.
-    /// It is for the first subject with a clean slice; empty if there is none.
+    /// The first subject with a clean slice decides, and the indices are valid for the rows of all subjects. Empty if no subject has a clean slice.
     pub fn chosen(&self) -> Vec<usize> {
         let Some(subject) = self.subjects.iter().find(|s| s.clean.is_some()) else { return Vec::new() };
         let ssim = |n: &usize| subject.rows[*n].quality.ssim.unwrap_or(f64::NEG_INFINITY);

@@ -13,15 +13,15 @@ const IDEAL_STEEPNESS: f64 = 0.1;
 /// Measures of the quality of a filtered slice.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quality {
-    /// Mean over standard deviation in tissue of one kind. None without noise.
+    /// Mean over standard deviation in tissue of one kind. None if the standard deviation is 0.
     pub snr: Option<f64>,
-    /// Contrast-to-noise ratio of that tissue against the background. None if there is no noise.
+    /// Contrast-to-noise ratio of tissue of one kind against the background. None if neither has noise.
     pub cnr: Option<f64>,
     /// Pratt's figure of merit, 0..1: 1 if all edges are where those of the clean slice are. None if the clean slice is not known.
     pub edges: Option<f64>,
-    /// Root mean square difference from the clean slice, 0..1. None if that is not known.
+    /// Root mean square difference from the clean slice, 0..1. None if the clean slice is not known.
     pub rmse: Option<f64>,
-    /// Structural similarity (SSIM) to the clean slice, at most 1. None if that is not known, or smaller than 11 x 11 pixels.
+    /// Structural similarity (SSIM) to the clean slice, at most 1. None if the clean slice is not known, or the slice is smaller than 11 x 11 pixels.
     pub ssim: Option<f64>,
 }
 

@@ -33,7 +33,7 @@ use toml::{Table, Value};
 /// What counts as a difference in a comparison of profiles.
 #[derive(Clone, Copy, Debug)]
 pub struct CompareOptions {
-    /// Largest allowed ratio of new times to old ones ([`Ratio::estimate`]): a pass that is slower by more is a regression.
+    /// Largest allowed ratio of new times to old ones ([`Ratio::estimate`]). A pass, or the wall or CPU time, that is slower by more is a regression.
     pub threshold: Threshold,
     /// Probability, 0..1, of at least one false alarm in the whole report.
     pub alpha: f64,
@@ -101,7 +101,7 @@ pub struct Ratio {
     pub p: f64,
     /// p value after Holm's correction over all lines.
     pub p_holm: f64,
-    /// Noise floor as a ratio, at least 1: a difference below it is noise.
+    /// Noise floor as a ratio, at least 1: a change by a smaller factor, up or down, is noise.
     pub floor: f64,
 }
 
@@ -112,19 +112,19 @@ pub struct Line {
     pub stage: String,
     pub kind: Kind,
     pub verdict: Verdict,
-    /// Median of the old profile, ns. None if it lacks the line.
+    /// Median of the old profile, ns. None if it lacks the line or has no times for it.
     pub old_ns: Option<f64>,
-    /// Median of the new profile, ns. None if it lacks the line.
+    /// Median of the new profile, ns. None if it lacks the line or has no times for it.
     pub new_ns: Option<f64>,
     /// How the times differ. None if there was nothing to compare.
     pub ratio: Option<Ratio>,
     /// Why the line is not comparable, or another remark.
     pub note: Option<String>,
-    /// True if the line is slower by more than the threshold.
+    /// True if the verdict is slower, by more than the threshold. Always false for [`Kind::Host`].
     pub is_regression: bool,
     /// The smallest slowdown, as a ratio, that would have been detected with this noise. None if none would, or there was nothing to compare.
     pub limit: Option<f64>,
-    /// True if a slowdown by more than the threshold may have been overlooked.
+    /// True if a slowdown by more than the threshold may have been overlooked. Always false for [`Kind::Host`].
     pub is_unseen: bool,
     /// True for a pass whose share of the time is below [`CompareOptions::minor`], so that `is_unseen` does not fail the comparison.
     pub is_minor: bool,
@@ -201,7 +201,8 @@ pub fn compare(old: &Profile, new: &Profile, options: &CompareOptions) -> Result
     compare_repeats(old, new, options, Repeats::Apart)
 }
 
-/// Compares two profiles that were measured alternately in blocks: the n-th repeats of the n-th blocks of both were next to each other in time.
+/// Compares two profiles that were measured alternately in blocks. Each slice has one profile for each block. The times of repeat i of block n of
+/// both were measured next to each other.
 ///
 /// # Errors
 /// An option is out of range, a profile has no blocks or is inconsistent, its blocks are of different work, the profiles have different numbers of

@@ -289,7 +289,8 @@ fn notes(profile: &Profile) -> Vec<String> {
     notes
 }
 
-/// A comparison as a table for a terminal: differing conditions, one line per pass, the test, the regressions.
+/// A comparison as a table for a terminal: notes such as differing conditions, one row for each [`Line`], the test, and the regressions or what may
+/// have been overlooked.
 pub fn comparison_table(comparison: &Comparison) -> String {
     let head = [
         "stage",
@@ -365,7 +366,7 @@ pub enum Track {
 pub struct Span {
     pub name: String,
     pub track: Track,
-    /// Index of the repeat that it belongs to.
+    /// Index, from 0, of the measured repeat that the span belongs to.
     pub repeat: usize,
     pub begin_ns: f64,
     pub end_ns: f64,

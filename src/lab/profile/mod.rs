@@ -55,7 +55,7 @@ pub struct Profile {
     pub cpu_ns: Vec<f64>,
     /// Time from the begin of the first pass to the end of the last one, by the device's clock. Empty without time stamps.
     pub device_ns: Vec<f64>,
-    /// None if they were not asked for, or the device has no time stamps.
+    /// The measured roofline ceilings of the device. None if they were not asked for, or the device has no time stamps.
     pub ceilings: Option<Ceilings>,
     /// How the volume is sampled and how texels are read, in words. None in files of earlier versions.
     #[serde(default)]
@@ -96,21 +96,21 @@ pub struct PassProfile {
     pub name: String,
     /// Stage of the pass; `copies` for uploads and readbacks, `host` for a host span.
     pub stage: String,
-    /// Number of dispatches in one repeat; of a host span, how often it occurs.
+    /// Number of dispatches in the first measured repeat; of a copy or a host span, how often it occurs there.
     pub runs_per_picture: u32,
     /// Time of all runs together, ns, for each repeat. Empty without time stamps.
     pub samples_ns: Vec<f64>,
     /// CPU time of all threads in each repeat, ns, if the device is the CPU; otherwise empty.
     #[serde(default)]
     pub cpu_ns: Vec<f64>,
-    /// Least number of bytes that a repeat reads: every texel of every bound slot once.
+    /// Least number of bytes that a repeat reads: every texel of every bound slot (image or buffer) once.
     pub bytes_read: u64,
     /// Least number of bytes that a repeat writes, counted in the same way.
     pub bytes_written: u64,
-    /// Number of texel fetches without a filter in a repeat. None if they cannot be counted.
+    /// Number of unfiltered texel fetches in a repeat. None if they cannot be counted.
     #[serde(default)]
     pub fetches: Option<u64>,
-    /// Number of filtered texture samples in a repeat. None if they cannot be counted.
+    /// Number of filtered texture samples in a repeat. None if they are not counted, which holds for every profile that this program measures.
     #[serde(default)]
     pub filtered: Option<u64>,
     /// Number of invocations that a repeat needs, without those that fill up workgroups. None for a copy or a host span.

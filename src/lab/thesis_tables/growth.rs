@@ -13,8 +13,8 @@ use std::sync::Arc;
 /// Starting and largest windows of Tables 7-9, pixels, up to the last columns of the tables: a window of 7x7 grows to 19 in Tables 7 and 9, and to 21
 /// in Table 8.
 pub const WINDOWS: [[u32; 2]; 7] = [[3, 17], [5, 19], [7, 19], [7, 21], [9, 21], [11, 21], [13, 23]];
-/// Estimators of the centre for which growth is measured: the thesis ties Fig. 48, and so Table 7, to the median (5.7), and planes to Perona-Malik
-/// (5.7). Tables 8 and 9 do not say.
+/// Estimators of the enhanced sigma filter's centre value for which growth is measured. The thesis ties Fig. 48, and so Table 7, to the median (5.7),
+/// and planes to Perona-Malik (5.7). Tables 8 and 9 do not say.
 pub const CENTRES: [Estimator; 2] = [Estimator::Median, Estimator::PeronaMalik];
 
 /// Values of the thesis: name of the table, starting window in pixels, and per cent of the pixels whose window's edge grew by 0, 2 and 4 pixels.
@@ -130,7 +130,7 @@ pub fn scene_of(grey: &Grey, settings: Settings) -> Result<Scene, SceneError> {
 /// Filters one picture with the settings of every row, and returns how far its windows grew in each.
 ///
 /// # Errors
-/// A window is out of range, or the device cannot hold the picture.
+/// The settings of a row are refused or do not record growth, or the device cannot hold the picture or fails.
 pub fn measure(context: &Arc<Context>, grey: &Grey, rows: Vec<GrowthSettings>) -> Result<Vec<Growth>, GrowthError> {
     let (mut grown, mut renderer) = (Vec::new(), None);
     for (centre, sigma, windows, settings) in rows {

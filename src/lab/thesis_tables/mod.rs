@@ -16,11 +16,11 @@ use growth::Grown;
 pub(crate) const SECTOR_ANGLE: f64 = 77.0;
 /// Angle over the frames of a volume, deg.
 pub(crate) const FAN_ANGLE: f64 = 61.0;
-/// Depth of a scan line from the face to its last sample, mm.
+/// Depth of a scan line from the probe's face to its last sample in the measurements of the thesis, mm.
 pub const DEPTH: f64 = 160.0;
-/// Samples of a scan line.
+/// Samples of a scan line in the measurements of the thesis.
 pub const SAMPLES: usize = 512;
-/// Speed of sound, m/s.
+/// Speed of sound in the measurements of the thesis, m/s.
 pub const SOUND_SPEED: f64 = 1540.0;
 /// Time that the thesis measured under these conditions, ms.
 const USUAL_MS: f64 = 54.6;
@@ -31,7 +31,8 @@ pub(crate) const THESIS_BANDWIDTH: f64 = 80.0;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Filter3d {
     None,
-    /// As in the thesis: along every ray, with a sliding front slice (`ray.sliding`). The value is the number of samples along each edge.
+    /// As in the thesis: along every ray, with a sliding front slice (`ray.sliding`). The value is the number of samples along each edge of the
+    /// filter's cube.
     Sliding(u32),
     /// Separable, applied slice by slice in stage 1 (`slices.smooth.kernel`). The value is the number of taps along each axis.
     Stored(u32),
@@ -57,14 +58,14 @@ pub struct Conditions {
     pub lines: usize,
     /// n of a volume of n^3: slices of n x n pixels, and n samples of a ray from the face to the end of the volume.
     pub volume: u32,
-    /// Edge of the square picture, pixels. It equals that of the volume, unless the table keeps the picture's size.
+    /// Edge of the square picture, pixels. It equals `volume`, except in the rows of Table 4 that keep the picture's size.
     pub picture: u32,
     pub filter_3d: Filter3d,
-    /// Edge of the sigma filter's window, pixels. The filter runs on the distance map, or, if rays are composited, it is the starting
-    /// window of all three stages.
+    /// Edge of the sigma filter's window, pixels. If rays are composited, it is the starting window of the enhanced sigma filters of all three
+    /// stages. Otherwise a plain sigma filter runs on the distance map.
     pub filter_2d: u32,
-    /// True for the pipeline of the thesis (4.1, chapter 6): whole rays are composited and their colour is lit, and the enhanced sigma
-    /// filter runs in stages 1, 3 and 4. False: only the surface is found, in one colour, and a plain sigma filter runs in stage 3.
+    /// True for the pipeline of the thesis (4.1, chapter 6): whole rays are composited and their colour is lit, and the enhanced sigma filter runs in
+    /// stages 1, 3 and 4 (preprocess, shade, postprocess). False: only the surface is found, in one colour, and a plain sigma filter runs in stage 3.
     pub is_composited: bool,
 }
 
@@ -81,9 +82,9 @@ impl Conditions {
 /// GPU times of a row of a table. Each list has one entry per repeat.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Times {
-    /// Stages 2-4 of one picture, which the thesis timed; ns, by repeat.
+    /// Stages 2-4 (raycast, shade, postprocess) of one picture, which the thesis timed; ns, by repeat.
     pub picture: Vec<f64>,
-    /// Stage 1 of all frames of a volume together; ns, by repeat.
+    /// Stage 1 (preprocess) of all frames of a volume together; ns, by repeat.
     pub preprocess: Vec<f64>,
 }
 
@@ -123,7 +124,7 @@ pub struct Row {
     pub thesis: Thesis,
     /// The measured times. Empty before the measurement, and on a device without time stamps.
     pub times: Times,
-    /// Which rays hit a surface, and at what depth. None before the measurement.
+    /// How many rays hit a surface, and at what mean depth. None before the measurement.
     pub reached: Option<Reached>,
 }
 
@@ -140,7 +141,8 @@ pub struct Table {
 }
 
 impl Table {
-    /// Ratio of the row's median time of stages 2-4 to that of the row with the usual conditions. None if either was not measured.
+    /// Ratio of the row's median time of stages 2-4 ([`Times::picture`]) to that of the row with the usual conditions. None if either was not
+    /// measured.
     pub fn ratio(&self, row: &Row) -> Option<f64> {
         let usual = Spread::new(&self.rows.get(self.usual)?.times.picture)?;
         let own = Spread::new(&row.times.picture)?;
@@ -230,7 +232,7 @@ pub struct Report {
     pub quick: bool,
     /// Number of measured volumes for each row.
     pub repeats: usize,
-    /// Number of volumes that are rendered first and not measured.
+    /// Number of volumes for each row that are rendered first and not measured.
     pub warm_up: usize,
     /// The rate of copying on this device: bytes read plus bytes written, per second. None without time stamps.
     pub copy: Option<Ceiling>,

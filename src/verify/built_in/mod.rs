@@ -189,7 +189,7 @@ fn wide_scenes() -> Vec<SceneSpec> {
     scenes
 }
 
-/// Shared memory of a workgroup, bytes, with which every pass has the shader that it has on a GPU.
+/// Shared memory of a workgroup, bytes, as a GPU has it: with so much every pass uses the same shader as on a GPU.
 pub const SHARED_MEMORY: u32 = 32 << 10;
 
 /// Edge of a brick where a scene states none, texels.
@@ -238,7 +238,7 @@ pub fn labelled(mut scene: Scene) -> Result<Scene, String> {
     Ok(scene)
 }
 
-/// Pseudorandom numbers in 0..1, the same on every machine (SplitMix64).
+/// Pseudorandom numbers from 0 to below 1, the same on every machine (SplitMix64). The field is the state, at first the seed.
 pub struct Noise(pub u64);
 
 impl Noise {
@@ -257,7 +257,7 @@ impl Noise {
     }
 }
 
-/// A small abdominal wobbler probe: 24 lines over 66 deg, 9 frames over 27 deg, 64 samples a line.
+/// A small abdominal wobbler probe: 24 lines over 66 deg, 9 frames over 27.5 deg, 64 samples a line.
 pub fn wobbler() -> Probe {
     Probe {
         array: Array::Curved { radius: 20.0 },
@@ -315,7 +315,8 @@ pub fn cartesian(size: [usize; 3]) -> Geometry {
 pub const BYTES: Input = Input { stored: StoredType::U8, range: [0.0, 255.0] };
 pub const FLOATS: Input = Input { stored: StoredType::F32, range: [0.0, 1.0] };
 
-/// The frames of a volume by a function of (column, row, slice) that gives the value, 0..1, that a shader reads there.
+/// The frames of a volume by a function of (column, row, slice) that gives the value, 0..1, that a shader reads there. In a sweep the column is the
+/// sample, and the row the scan line.
 pub fn frames(scene: &Scene, f: impl Fn([usize; 3]) -> f64) -> Vec<Texels> {
     let [width, height] = scene.frame_size().map(|n| n as usize);
     let one = |k| Texels::from_fn([width, height, 1], 1, |[x, y, _], _| f([x, y, k]));
@@ -396,7 +397,8 @@ pub fn geometries() -> Vec<(&'static str, Geometry)> {
     ]
 }
 
-/// Settings with every filter, light and adjustment at once.
+/// Settings as TOML with several filters of the slices, the distance map and the picture, and with lights, shadow, occlusion and adjustments of the
+/// picture at once.
 pub const ALL_FILTERS: &str = "
     slices = { pixels = 41, median = true, sigma = { window = 5, sigma = 0.08 }, smooth = { lateral = 2.0, depth = 3.0, elevation = 0.8 } }
     distance = { median = 5, bilateral = { pixels = 1.5, distance = 2.0, repeat = 2 }, sigma = { window = 7, sigma = 0.7 } }

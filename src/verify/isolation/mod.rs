@@ -38,10 +38,10 @@ const MAX_STARTS: u32 = 3;
 
 /// A function that returns the name of the first signal that asked this process to end; None if none has.
 pub type Signal<'a> = &'a dyn Fn() -> Option<&'static str>;
-/// A function that prints a line that a worker wrote outside the protocol.
+/// A function that prints a line that a worker wrote and that is not a message to this process.
 pub type Echo = Arc<dyn Fn(&str) + Send + Sync>;
 
-/// Runs checks in worker processes, one at a time; a worker that crashes is replaced.
+/// Runs checks in worker processes, one at a time. A worker that crashes is replaced.
 pub struct Workers<'a> {
     /// The command of a worker.
     command: &'a dyn Fn() -> Command,
@@ -55,8 +55,8 @@ pub struct Workers<'a> {
 
 impl<'a> Workers<'a> {
     /// Starts the first worker with `command`, and waits until it has opened the device. `limit` is the time limit of a check, and of this start, for
-    /// which it is at least one minute and at most ten. `signal` is asked during every wait, and ends it. `echo` gets what a worker prints outside
-    /// the protocol.
+    /// which it is at least one minute and at most ten. `signal` is called repeatedly during every wait, which ends once it returns a name. `echo`
+    /// gets each line that a worker prints and that is not a message to this process.
     ///
     /// # Errors
     /// The program cannot be started, refuses its arguments, finds no device or does not open it in time, the driver crashes when it is opened, or a

@@ -154,8 +154,8 @@ pub fn refuse(failure: Failure) -> Result<(), String> {
     Message::Refused { code, message: failure.message() }.send()
 }
 
-/// Sends `ready`, then runs the checks whose indices in `checks` the lines of standard input state, until standard input ends. Each outcome is sent
-/// on standard output.
+/// Sends `ready`. Then reads from each line of standard input the index of a check in `checks`, runs it, and sends its outcome on standard output,
+/// until standard input ends.
 ///
 /// # Errors
 /// One line: standard output is closed, or there is no such check.

@@ -12,10 +12,10 @@ use std::fmt::{Display, Formatter};
 /// How bad a change is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Class {
-    /// It fails the run: a check fails that did not before, an error now exceeds its tolerance, a time has grown beyond the threshold, or one that
-    /// was measured once beyond three times its value.
+    /// The change fails the run: a check fails that did not before, an error now exceeds its tolerance, a time has grown beyond the threshold, or a
+    /// time that was measured once has more than tripled.
     Worse,
-    /// It is reported, and does not fail the run.
+    /// The change is reported, and does not fail the run.
     Changed,
     Better,
 }
@@ -63,7 +63,8 @@ pub struct BaselineComparison {
     pub differences: Vec<String>,
     /// What could not be compared, with the reasons, and other remarks.
     pub notes: Vec<String>,
-    /// The changes, the worst first, otherwise in the order of the new run.
+    /// The changes, the worst class first. Within a class those of verdicts and of which figures there are come first, then those of errors, then
+    /// those of times, each in the order of the new run.
     pub changes: Vec<Change>,
     /// Number of checks that did not change.
     pub same: usize,
@@ -83,7 +84,7 @@ impl BaselineComparison {
         worse.map(|c| (&c.group, &c.name)).collect::<HashSet<_>>().len()
     }
 
-    /// Lines to print: differences of the conditions, then all changes with their checks, the worst first. Empty if nothing changed.
+    /// Lines to print: differences of the conditions, then all changes with their checks, the worst first. Empty if there are neither.
     pub fn lines(&self) -> Vec<String> {
         self.differences.iter().cloned().chain(self.changes.iter().map(Change::to_string)).collect()
     }
@@ -106,7 +107,7 @@ struct Pair<'a> {
     new: &'a Figure,
 }
 
-/// Compares the checks and figures of `new` with those of the same name in `old`. `threshold`: ratio of times from which on a slower check fails the
+/// Compares the checks and figures of `new` with those of the same name in `old`. `threshold`: ratio of times above which a slower check fails the
 /// run.
 pub fn compare(old: &Run, new: &Run, threshold: Threshold) -> BaselineComparison {
     let (mut changes, mut notes, mut pairs) = (Vec::new(), Vec::new(), Vec::new());

@@ -26,7 +26,8 @@ use std::time::Duration;
 pub enum Level {
     /// For CI: every pass, mode and path once.
     Quick,
-    /// Every input of every pass in every scene, and a stress test of some minutes.
+    /// Every pass on noise in every scene that needs it, on the other kinds of input once for each different dispatch, and a stress test of some
+    /// minutes.
     Full,
 }
 
@@ -148,8 +149,8 @@ pub struct Figure {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub allowed: Option<f64>,
     pub unit: Unit,
-    /// The single measurements in their order: times of which `value` is the median, or shares of which it is the largest. Empty for errors and
-    /// counts.
+    /// The single measurements in their order: times of which `value` is the median, or shares of which `value` is the largest. Empty for errors,
+    /// counts, and times that were measured once.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub samples: Vec<f64>,
     /// True if the figure depends on circumstances of the run and not on the device. It is reported, but not compared with a baseline.
@@ -247,8 +248,8 @@ impl Figure {
         Ok(Figure { what: what.into(), value, allowed: None, unit: Unit::Ns, samples, fleeting: false })
     }
 
-    /// The figure of a time that was measured once. Beside a baseline, only a factor above 3 that makes more than 0.1 s
-    /// counts as a change.
+    /// The figure of a time that was measured once. A comparison with a baseline reports it only if it changed by a factor above 3 and by more than
+    /// 0.1 s.
     pub fn single_time(what: impl Into<String>, time: Duration) -> Figure {
         let value = time.as_nanos() as f64;
         Figure { what: what.into(), value, allowed: None, unit: Unit::Ns, samples: Vec::new(), fleeting: false }
@@ -259,7 +260,8 @@ impl Figure {
         self.unit == Unit::Ns && self.samples.is_empty()
     }
 
-    /// The value divided by its limit: a check with more than 1 fails, and NaN gives infinity. None without a limit.
+    /// The value divided by its limit; above 1 the limit is exceeded. NaN gives infinity, and so does a value above a limit of 0. None without a
+    /// limit.
     pub fn used(&self) -> Option<f64> {
         let allowed = self.allowed?;
         Some(match self.value {

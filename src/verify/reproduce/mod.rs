@@ -99,7 +99,7 @@ impl Array {
 pub struct Reproduction {
     /// One line: pass, scene, iteration and kind of input.
     pub title: String,
-    /// True if the dispatch that was written differs from its reference on this device.
+    /// True if the dispatch that was written differs from its reference on this device by more than the tolerance.
     pub fails: bool,
     /// Why there is no script for Amber. None if there is one.
     pub without_script: Option<String>,

@@ -47,7 +47,7 @@ impl Detection {
         history::of(&self.fault).map(|bug| format!("as in {}: {} ({})", bug.driver, bug.what, bug.source))
     }
 
-    /// The detection as the outcome of a check, which fails if the fault was not detected.
+    /// The detection as the outcome of a check: failed if the fault was not detected, left out if it was not tested, otherwise passed.
     pub fn outcome(&self) -> Outcome {
         let (verdict, faults, note) = match &self.by {
             _ if self.left_out => (Verdict::LeftOut, Vec::new(), Some(self.message.clone())),
@@ -68,7 +68,8 @@ impl Detection {
     }
 }
 
-/// Whether a deliberate crash was detected, from the outcome of the check whose process crashed.
+/// Whether a deliberate crash was detected, from the outcome of the check whose process crashed. It is detected if the check failed and its fault
+/// names the signal that ended the process.
 pub fn crash(outcome: &Outcome) -> Detection {
     let said = outcome.faults.first().map(|fault| fault.what.clone());
     let is_named = outcome.verdict == Verdict::Failed && said.as_ref().is_some_and(|said| said.contains("signal"));
@@ -88,9 +89,9 @@ pub fn faults() -> impl Iterator<Item = InjectedFault> {
     injected_faults::FAULTS.iter().copied().chain(injected_faults::of_instructions())
 }
 
-/// Drops every barrier, then injects every fault, one at a time. Calls `tell` with each detection: two for the dropped barriers (by an independent
-/// check of barriers, and by the validation layer), one for each fault, and a last one that tells whether the checks that detected faults pass
-/// without one.
+/// Drops barriers, then injects every fault, one at a time. Calls `tell` with each detection: two for the dropped barriers, one for each fault, and a
+/// last one that tells whether the checks that detected faults pass without one. Barriers are dropped twice: all of them for an independent check of
+/// barriers, and some for the validation layer.
 ///
 /// # Errors
 /// The device cannot be opened, or fails without a fault.

@@ -39,7 +39,7 @@ const SHARED: &[&str] = &["SLM size", "LDS size", "Workgroup Memory Size", "ldsU
 pub struct Columns {
     /// Number of registers of an invocation; half registers count as registers.
     pub registers: Option<f64>,
-    /// Occupancy: how many subgroups a processor can hold at the same time.
+    /// Occupancy: how many subgroups a multiprocessor, SIMD unit or core, depending on the driver, can hold at the same time.
     pub waves: Option<f64>,
     /// Values that did not fit into registers, in the driver's unit.
     pub spills: Option<f64>,
@@ -51,7 +51,8 @@ pub struct Columns {
 }
 
 impl Columns {
-    /// `statistics`: the driver's names of the values of each executable ([`PipelineProfile::statistics`](super::PipelineProfile::statistics)).
+    /// Converts the driver's statistics of a pipeline. `statistics`: the driver's names of the values of each executable
+    /// ([`PipelineProfile::statistics`](super::PipelineProfile::statistics)).
     pub fn of(statistics: &[String], pipeline: &Pipeline) -> Columns {
         let executables = &pipeline.executables;
         let sum = |executable: &Executable, names: &[&str]| {

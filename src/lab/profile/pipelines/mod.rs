@@ -51,7 +51,7 @@ pub struct Pipeline {
     /// Values of specialization constants by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub constants: BTreeMap<String, i32>,
-    /// Formats of the inputs, in the order of the pass.
+    /// Formats of the inputs, such as `R8`, in the order in which the pass declares them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub formats: Vec<String>,
     /// Compile time without any cache, ms.
