@@ -15,7 +15,7 @@ pub struct Drawer {
     pub is_software: bool,
 }
 
-/// How far two pictures of one unit may differ.
+/// How far two pictures of one unit of a batch may differ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Class {
@@ -59,7 +59,8 @@ pub struct Agreement {
 }
 
 impl Agreement {
-    /// Compares the picture `drawn` with the stored one, `kept`. Equal pixels mean equal bytes, as both are encoded alike.
+    /// Compares the picture `drawn` with the stored one, `kept`. The transparency of `drawn` is ignored, because a file has none. Equal pixels mean
+    /// equal bytes, as both are encoded alike.
     pub fn of(kept: &Picture, kept_by: Option<&Drawer>, drawn: &Picture, drawn_by: Option<&Drawer>) -> Agreement {
         let class = Class::of(kept_by, drawn_by);
         // A file has no transparency.

@@ -4,8 +4,9 @@ use super::agreement::{Class, Drawer};
 use super::results::{Record, Status};
 use std::collections::BTreeMap;
 
-/// Comparisons of outputs of the same units by two devices: how many there are, how many outputs have the same bytes, and which do not agree (by more
-/// than the tolerance of `verify`, or, with one device and driver, in any byte).
+/// Summary of the comparisons between two devices, or of one device with itself: how many units were compared, how many of them have the same bytes
+/// in all outputs, and which do not agree. Outputs do not agree if they differ by more than the tolerance of `verify` or, with one device and driver,
+/// in any byte.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Pair {
     pub compared: usize,
@@ -15,8 +16,8 @@ pub struct Pair {
 }
 
 /// All comparisons in the results, by class and the devices of both outputs, that of the stored or earlier output first (None: no device was used).
-/// There is one for each unit that was drawn again and, by the digests of its outputs, for each unit that two processes did. Where two different
-/// drivers gave other bytes in the second way, nothing is compared, because a digest does not say how far they differ.
+/// Each attempt that drew a finished unit again is one comparison. So is each success with the key of an earlier success: the digests of their
+/// outputs are compared. If they differ between two different drivers, there is no comparison, because digests do not say how far the outputs differ.
 pub fn pairs(records: &[Record]) -> BTreeMap<(Class, Option<Drawer>, Option<Drawer>), Pair> {
     let mut pairs: BTreeMap<(Class, Option<Drawer>, Option<Drawer>), Pair> = BTreeMap::new();
     let mut first: BTreeMap<&str, &Record> = BTreeMap::new();

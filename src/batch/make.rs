@@ -16,14 +16,15 @@ const MAX_DEPTH: usize = 64;
 /// Whether a file becomes a unit of the manifest.
 pub enum Found {
     Unit(Box<Unit>),
-    /// The file does not; the text names it and the reason.
+    /// The file does not become a unit; the text names the file and the reason.
     LeftOut(String),
 }
 
 /// The files that `patterns` name, sorted, each once: files, folders with all recordings below them, and patterns with `*`, `?`, `**` and `[...]`.
 ///
 /// # Errors
-/// A pattern is invalid or matches nothing, or a folder cannot be read or is more than 64 folders deep.
+/// A pattern is invalid or gives no file (such as a folder without recordings), a folder cannot be read, or folders are nested more than 64 deep
+/// below a named one.
 pub fn files(patterns: &[String]) -> Result<Vec<PathBuf>, Failure> {
     let mut found = Vec::new();
     for pattern in patterns {
@@ -69,8 +70,9 @@ fn walk(folder: &Path, depth: usize, found: &mut Vec<PathBuf>) -> Result<(), Str
     Ok(())
 }
 
-/// Makes the unit of a file: its absolute path, digest, length and expected cost. The file is opened and read; one that cannot be is left
-/// out. `command`: what is to be done with it, the words of a command line; render if it is empty.
+/// Makes the unit of a file: its absolute path, digest, length and expected cost. `command`: what is to be done with the recording, the words of a
+/// command line; empty: render. The file is opened and read. It is left out if it cannot be read, does not have the volume that `command` names, or
+/// has a name that is not UTF-8.
 ///
 /// # Errors
 /// The command is wrong, independently of the file.

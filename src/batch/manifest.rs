@@ -20,7 +20,7 @@ const MAX_OUTPUTS: usize = 4;
 pub struct Unit {
     /// Path of the recording, absolute or relative to the manifest's folder.
     pub input: String,
-    /// SHA-256 of the recording, 64 hexadecimal digits. None: the recording has to be read to compute the key of its outputs.
+    /// SHA-256 of the recording, 64 lower-case hexadecimal digits. None: the recording has to be read to compute the key of its outputs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub digest: Option<String>,
     /// Length of the recording's files, bytes; None if not given.
@@ -35,7 +35,8 @@ pub struct Unit {
     /// What is done: `render`, `convert`, `measure` or `verify` with its flags. None: `render`, with `scene` if that is given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub command: Option<Vec<String>>,
-    /// File names of the outputs, without a folder, one for each output of the command. Empty: a name by the kind of work, such as `picture.png`.
+    /// File names of the outputs, without a folder. Every command makes one output, so that more names are an error when the command is parsed.
+    /// Empty: a name by the kind of work, such as `picture.png`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub outputs: Vec<String>,
 }
@@ -116,7 +117,8 @@ fn for_each_line(file: &Path, mut each: impl FnMut(u64, &str) -> Result<(), Stri
 /// The expected cost of every unit, in the order of the manifest: at least 0, relative to the others, 1 where the line states none.
 ///
 /// # Errors
-/// One line that names the file, the line and the fault.
+/// One line that names the file and the fault, and the line if one is wrong: the file cannot be read, has no unit or more than 2^27, a line is no
+/// unit, or a cost is negative or not finite.
 pub fn costs(file: &Path) -> Result<Vec<f64>, String> {
     let mut costs = Vec::new();
     for_each_line(file, |_, text| {
@@ -136,7 +138,7 @@ pub fn costs(file: &Path) -> Result<Vec<f64>, String> {
 /// The units that `is_chosen` selects by their index in the manifest, from 0, in the order of the manifest.
 ///
 /// # Errors
-/// One line that names the file, the line and the fault.
+/// One line that names the file and the fault, and the line if one is wrong.
 pub fn units(file: &Path, is_chosen: impl Fn(usize) -> bool) -> Result<Vec<Numbered>, String> {
     let (mut units, mut place) = (Vec::new(), 0);
     for_each_line(file, |line, text| {
@@ -156,7 +158,7 @@ pub fn units(file: &Path, is_chosen: impl Fn(usize) -> bool) -> Result<Vec<Numbe
 /// [`units`].
 ///
 /// # Errors
-/// One line that names the file, the line and the fault.
+/// One line that names the file and the fault, and the line if one is wrong.
 pub fn for_each_unit(file: &Path, mut each: impl FnMut(&Unit)) -> Result<(), String> {
     for_each_line(file, |_, text| {
         each(&serde_json::from_str(text).map_err(|e| format!("is no unit: {e}"))?);

@@ -53,7 +53,8 @@ impl Painter {
     /// has every slice.
     ///
     /// # Errors
-    /// The device lacks a feature, has too little memory, or was lost too often, or [`DeviceOptions::stop`] ended the wait for it.
+    /// The device lacks a feature, has too little memory, did not finish in time, was lost too often or cannot be opened again, or
+    /// [`DeviceOptions::stop`] ended the wait for it.
     pub fn draw(&mut self, scene: &Scene, frames: &[Frame], is_whole: bool) -> Result<Picture, GpuError> {
         self.losses = Losses::default();
         loop {

@@ -33,8 +33,8 @@ fn rank(record: &Record) -> (bool, bool, &str) {
 /// The results of all shards of a batch, reduced to one for each unit: a recording and what is done with it.
 #[derive(Default)]
 pub struct Merged<'a> {
-    /// The result of each unit, by its input and work: the last success, where drawing it again for a comparison counts only if there is no other;
-    /// without a success, the last failure.
+    /// The result of each unit, by its input and work: the last success by date, otherwise the last failure. Among either, an attempt that drew a
+    /// finished unit again for a comparison counts only if there is no other.
     pub units: BTreeMap<(&'a str, &'a str), &'a Record>,
 }
 

@@ -41,9 +41,9 @@ pub struct Seconds {
     pub read: f64,
     /// Time for which the worker waited for the recording, s.
     pub wait: f64,
-    /// Time for drawing, converting or comparing, s.
+    /// Time for drawing, converting or comparing, s. For `convert` it includes writing the volume. 0 if the attempt failed.
     pub work: f64,
-    /// Time for writing and renaming the outputs, s.
+    /// Time for writing and renaming the output, s. About 0 for `convert`, and 0 if the attempt failed.
     pub write: f64,
 }
 
@@ -63,7 +63,7 @@ pub struct OutputFile {
 pub struct Record {
     /// Name and version of the format; [`FORMAT`] if this version of the program wrote it.
     pub format: String,
-    /// Key of the outputs, with which their file names begin; empty if the recording could not be read.
+    /// Key of the outputs, with which their file names begin. Empty if the manifest states no digest and the recording could not be read.
     pub key: String,
     /// Number of the unit's line in the manifest, from 1.
     pub line: u64,
@@ -136,7 +136,7 @@ fn hash_of(input: &str, work: &str) -> u64 {
     hasher.finish()
 }
 
-/// The set of units in a manifest, as hashes: a million take 16 MiB.
+/// The set of units in a manifest, as hashes: a million take about 18 MiB.
 #[derive(Default)]
 pub struct Asked(HashSet<u64>);
 
@@ -153,7 +153,7 @@ pub struct Earlier {
     pub is_begun: bool,
     /// True if the files that were read have at least one record.
     pub has_lines: bool,
-    /// True if at least one of these records is about a unit of the present manifest. False if the manifest was not given.
+    /// True if at least one of these records is about a unit of the present manifest, which is `asked` of [`Earlier::read`]. False without `asked`.
     pub is_of_these: bool,
     /// Keys and recordings of this shard's units with a line that says done.
     done: HashSet<(String, String)>,
@@ -201,7 +201,7 @@ impl Earlier {
         Ok(found)
     }
 
-    /// True if any shard has done this unit with this version of the program. It must be among the units that were given to [`Earlier::read`].
+    /// True if any shard has done this unit with this version of the program. False for a unit that was not in `asked` of [`Earlier::read`].
     pub fn says_done(&self, input: &str, work: &str) -> bool {
         self.done_anywhere.contains(&hash_of(input, work))
     }
@@ -219,8 +219,8 @@ pub struct Results {
 }
 
 impl Results {
-    /// Opens or creates `results/shard-I-of-N.ndjson`, and completes a line that a killed process left unfinished. `earlier`: the results that
-    /// were read before.
+    /// Opens or creates `results/shard-I-of-N.ndjson`. If a killed process left the last line unfinished, a newline ends that line. `earlier`: the
+    /// results that were read before.
     ///
     /// # Errors
     /// One line that names the file that cannot be opened or written.
@@ -266,7 +266,7 @@ impl Results {
         self.earlier.done.contains(&(record.key.clone(), record.input.clone()))
     }
 
-    /// Number of earlier runs of this shard that lost the device by this unit.
+    /// Number of earlier runs of this shard that lost the device while they did this unit.
     pub fn losses(&self, input: &str, work: &str) -> usize {
         // Nearly always empty, and a key has to be copied.
         let is_known = !self.earlier.lost.is_empty();
@@ -314,7 +314,7 @@ fn files_of(folder: &Path) -> Result<Vec<PathBuf>, (PathBuf, io::Error)> {
 /// left incomplete.
 ///
 /// # Errors
-/// One line: there are no results, or they cannot be read.
+/// One line: the folder has no folder `results`, or a file in it cannot be read.
 pub fn read_all(folder: &Path) -> Result<(Vec<Record>, usize), String> {
     let files = files_of(folder)
         .map_err(|(place, e)| format!("{}: cannot be read: {e}; is this the folder of a batch?", place.display()))?;

@@ -34,7 +34,7 @@ impl Shard {
     /// is submitted again in part keeps its division. `variable`: returns the value of an environment variable, None if it is not set.
     ///
     /// # Errors
-    /// One line: an invalid number, an array with gaps, a Job without a count, or a count above 1 without any of these variables.
+    /// One line: an invalid number, an array with gaps and no `count`, a Job without a `count`, or a `count` above 1 without any of these variables.
     pub fn from_environment(count: Option<u32>, variable: impl Fn(&str) -> Option<String>) -> Result<Shard, String> {
         let number = |name: &str| match variable(name) {
             None => Ok(None),

@@ -110,14 +110,14 @@ struct MeasureUnit {
 /// What is done with a recording: a checked command with all its settings. Units that differ only in their recording share it.
 pub struct Work {
     pub kind: Kind,
-    /// The command, or the scene as JSON, as text in the results ([`text`]).
+    /// The work of the unit as text, by which results name it; made by [`text`].
     pub text: String,
     pub geometry: GeometryArgs,
     /// Index of the volume in the recording, from 0.
     pub volume: usize,
     /// Settings with which pictures are drawn, as layers.
     pub layers: Layers,
-    /// Voxel spacing of a converted volume, mm; `None`: that of the recording.
+    /// Voxel spacing of a converted volume, mm; `None`: the grid of a Cartesian recording, or the sample spacing of a sweep.
     pub spacing: Option<f64>,
     /// Value of a converted volume outside the insonified region; `None`: the value of no echo.
     pub outside: Option<f64>,
@@ -127,7 +127,8 @@ pub struct Work {
     digest: Vec<u8>,
 }
 
-/// The command of a unit, or `scene` and its settings as JSON, as text in the results; `render` if the unit states neither.
+/// The work of a unit as text, by which results name it: the words of its command, or `scene` followed by its settings as JSON, or `render` if the
+/// unit states neither.
 pub fn text(unit: &Unit) -> String {
     match (&unit.scene, &unit.command) {
         (Some(scene), _) => format!("scene {}", serde_json::to_string(scene).unwrap_or_default()),
@@ -140,7 +141,8 @@ impl Work {
     /// Parses the work of a unit. Reads the files that its flags name, relative to the working folder.
     ///
     /// # Errors
-    /// The command line or a setting is wrong, or the command cannot write the format of the output.
+    /// The command line or a setting is wrong, a file that it names cannot be read, the unit names several outputs, or the command cannot write the
+    /// format of the output.
     pub fn of(unit: &Unit) -> Result<Work, Failure> {
         let text = text(unit);
         let mut work = match &unit.scene {

@@ -37,9 +37,9 @@ pub struct Job<'a> {
     pub folder: &'a Path,
     pub shard: Shard,
     pub device: DeviceOptions,
-    /// True if the digests of finished outputs are compared with their records.
+    /// True if the digests of finished outputs are compared with their records. A unit with a damaged output is done again.
     pub verifies: bool,
-    /// Share of the finished pictures that are drawn again and compared, 0..=1.
+    /// Share of the finished units of kind `Render`, 0..=1, whose pictures are drawn again and compared with the stored ones.
     pub recheck: f64,
     /// Results that earlier runs wrote for this shard ([`Earlier::read`]).
     pub earlier: Earlier,
@@ -54,7 +54,7 @@ pub struct Job<'a> {
 pub struct Ended {
     pub units: usize,
     pub failed: usize,
-    /// True if a signal ended the run before all units were tried.
+    /// True if [`Job::stops`] or [`DeviceOptions::stop`] ended the run before it found that no unit was left.
     pub stopped: bool,
 }
 

@@ -20,7 +20,7 @@ pub struct Completions {
 }
 
 impl Completions {
-    /// Prints the completion script for `program`.
+    /// Prints the completion script for `program` to standard output.
     pub fn run(&self, mut program: Command) -> Result<(), Failure> {
         let name = program.get_name().to_string();
         let mut script = Vec::new();
@@ -40,7 +40,7 @@ pub struct ManPages {
 }
 
 impl ManPages {
-    /// Writes the manual pages of `program`.
+    /// Writes the manual page of every command of `program` into the requested folder. Without a folder, prints the page of the program alone.
     pub fn run(&self, mut program: Command) -> Result<(), Failure> {
         program.build();
         let Some(folder) = &self.output else {

@@ -141,9 +141,9 @@ impl Block {
 /// What a process says when a volume is done.
 const DONE: &str = "in turn: done";
 
-/// Binds this process, which measures a block, to the last core that it may run on. Otherwise the distribution of threads of a software device
-/// and of other load over the cores differs between two processes and stays the same for seconds: alternating volumes would not cancel it, and
-/// more volumes would not average it out.
+/// Binds this process, which measures a block, to the last core that it may run on. Otherwise the distribution of threads of a software device and of
+/// other load over the cores differs between two processes and stays the same for seconds: alternating volumes would not cancel it, and more volumes
+/// would not average it out. Does nothing except on Linux.
 pub fn keep_to_one_core() {
     #[cfg(target_os = "linux")]
     if let Ok(cores) = rustix::thread::sched_getaffinity(None)
@@ -174,8 +174,8 @@ pub fn end_turn() {
 }
 
 /// Measures this program with its own arguments and `other` alternately, in the order A B B A, and compares the times. `repeats`: number of measured
-/// volumes of each side, divided into blocks. Each block is a pair of processes, which first draw `warm_up` volumes that are not measured. An error
-/// if a process fails or ends early.
+/// volumes of each side, at least; they are divided into blocks of equal size. Each block is a pair of processes, which first draw `warm_up` volumes
+/// that are not measured. An error if a process fails or ends early.
 pub fn compared(other: &Other, repeats: u32, warm_up: u32, options: &CompareOptions) -> Result<Comparison, Failure> {
     let mut sides = sides(other)?;
     let folder = WorkFolder::new(&std::env::temp_dir(), "echolume-profile-").map_err(failed)?;

@@ -19,7 +19,7 @@ impl From<GpuError> for DrawFault {
 }
 
 impl DrawFault {
-    /// The failure with which a command ends that draws in order to measure; it does not draw again after the device was lost.
+    /// The failure of a command that does not draw again after the device was lost, such as one that measures times.
     pub fn failed(self) -> Failure {
         self.failure(false)
     }
@@ -33,8 +33,9 @@ impl DrawFault {
 }
 
 /// Draws on the device of `context`. If the device is lost, `reopen` opens it again and `draw` is called again, with smaller bands in `options`,
-/// until it was lost too often in a row ([`Losses`]). `progress` returns how many of several pictures are finished. The last argument of `draw`
-/// is true if it is called again: then a part of the source may have been read.
+/// until it was lost too often in a row ([`Losses`]). `progress` returns how many of several pictures are finished; a further one begins the count of
+/// losses anew. The last argument of `draw` is true if it is called again: then a part of the source may have been read. `own_shaders`: true if the
+/// shaders are the user's, so that one that does not compile is an error of the input.
 ///
 /// # Errors
 /// The error of `draw` or `reopen`.
@@ -66,8 +67,8 @@ pub fn draw_despite_losses<T>(
 /// Sends every frame of the volume with this index to volume image 0 of the renderer. `each` is called with each frame before it is sent.
 ///
 /// # Errors
-/// The source cannot be read, `each` fails, or the device fails. The loss of the device is a variant of its own, so that the caller can try
-/// again.
+/// The source cannot be read, `each` fails, or the device fails. An error of the device, such as its loss, is a variant of its own
+/// ([`DrawFault::Gpu`]), so that the caller can try again.
 pub fn send_volume(
     renderer: &mut Renderer,
     source: &mut dyn Source,

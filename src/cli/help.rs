@@ -202,7 +202,7 @@ const SHORT: [(&str, &str); 15] = [
 /// Most characters of a line of help behind the flag.
 const LINE: usize = 64;
 
-/// Sorts the flags of all commands into groups for their help.
+/// Puts the flags of `render`, `stream`, `view` and `worksheet`, and the flags that every command has, into groups for the help.
 pub fn grouped(program: Command) -> Command {
     let of_all = ["verbose", "log_file", "max_memory"];
     let program =
@@ -265,7 +265,8 @@ fn first_part(help: &str) -> String {
     line.to_string()
 }
 
-/// Adds the values that a shell completes. The program accepts more of them: modes have synonyms, and presets may be the user's own.
+/// Adds the values that a shell completes, for writing a completion script. A parser made of the result refuses other valid values: synonyms of
+/// modes, and presets of the user.
 pub fn completed(program: Command) -> Command {
     program.mut_subcommands(|command| command.mut_args(with_values))
 }

@@ -1,7 +1,7 @@
 //! The command line: subcommands, logging and exit codes.
 //!
-//! Exit codes of every command: 0 done, 1 failed, 2 bad input or usage, 3 no Vulkan device, 4 stopped by a signal before all was done.
-//! `batch` also returns 3 for a lost device and 4 if some units failed. `profile` also returns 5 if the noise may hide a slowdown.
+//! Exit codes of every command: 0 done, 1 failed, 2 bad input or usage, 3 no Vulkan device. `verify` also returns 4 if a signal stopped it before all
+//! was done. `batch` also returns 3 for a lost device and 4 if some units failed. `profile` also returns 5 if the noise may hide a slowdown.
 
 /// What a build without a feature says of what it leaves out.
 #[cfg(not(all(feature = "lab", feature = "verify", feature = "view")))]

@@ -18,7 +18,8 @@ pub enum Nothing {
     Ground,
 }
 
-/// What fills the picture of at least two pixels if nothing is visible in it; otherwise None.
+/// What fills the picture if nothing is visible in it: all pixels have one colour, or show the ground. None otherwise, and for a picture of one
+/// pixel.
 pub fn of(scene: &Scene, picture: &Picture) -> Option<Nothing> {
     let mut pixels = picture.rgba.chunks_exact(4).map(|p| [p[0], p[1], p[2]]);
     let first = pixels.next().filter(|_| picture.rgba.len() > 4)?;
@@ -43,7 +44,7 @@ fn is_ground(scene: &Scene, picture: &Picture) -> bool {
     })
 }
 
-/// The warning about a picture in which nothing is visible. `file`: name of the picture; `why`: the cause, if known.
+/// The warning about a picture in which nothing is visible. `file`: name of the picture; `why`: the cause ([`cause`]); None: the scene has no volume.
 pub fn line(file: &str, nothing: Nothing, why: Option<&str>) -> String {
     let shown = match nothing {
         Nothing::Ground => "the ground alone (light.volume.ground)".into(),

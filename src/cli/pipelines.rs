@@ -18,7 +18,7 @@ pub struct Request<'a> {
     /// Measures the pipelines of each mode, preset and filter instead of those of the scene alone.
     pub all: bool,
     pub json: Option<&'a Path>,
-    /// Stored measurements to compare: one is compared with the new measurement, two with each other.
+    /// Files of stored measurements: one is compared with the new measurement, two with each other. Empty: nothing is compared.
     pub compare: &'a [PathBuf],
     pub force: bool,
     pub shaders: &'a ShaderArgs,

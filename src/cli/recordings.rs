@@ -406,7 +406,7 @@ pub struct Info {
 }
 
 impl Info {
-    /// Prints the description. `all`: also each key that the file states and that was not used.
+    /// Prints the description of the recording, one fact a line. `all`: also each key that the file states and that was not used.
     pub fn run(&self, all: bool) -> Result<(), Failure> {
         let Description { rows: mut facts, unused } =
             source::description(&self.file, self.geometry.options()).map_err(input)?;

@@ -78,7 +78,7 @@ pub struct Job<'a> {
     pub options: RendererOptions,
     pub validate: bool,
     pub timings: bool,
-    /// True if the shaders come from a folder of the user. One that does not compile is then an error of the input.
+    /// True if the shaders come from a folder of the user. A shader that does not compile is then an error of the input.
     pub own_shaders: bool,
 }
 
@@ -123,8 +123,8 @@ impl SeriesArgs {
         }
     }
 
-    /// Draws and writes the pictures. A signal ends the command after the file that is being written is complete. What was written before an error
-    /// stays, but no film.
+    /// Draws and writes the pictures. A signal ends the command with a failure, after the file that is being written is complete. Pictures in files
+    /// that were written before a failure stay; an incomplete film is not kept.
     pub fn run(&self, job: &Job) -> Result<(), Failure> {
         let name = if self.volumes.is_some() { "volume" } else { "picture" };
         let target = SeriesTarget::of(job.output, name)?;

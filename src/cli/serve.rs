@@ -24,7 +24,7 @@ impl ServeArgs {
     /// Starts the server if one is requested, and prints its address.
     ///
     /// # Errors
-    /// The address is not valid, the port is in use, or the spacing is not a length.
+    /// The address is not valid or cannot be opened (the port is in use, for example), or the spacing is not in 0.01..=1000 mm.
     pub fn start(&self) -> Result<Option<Serving>, Failure> {
         let Some(given) = &self.serve else { return Ok(None) };
         let place = given.strip_prefix(SCHEME).filter(|place| !place.is_empty());

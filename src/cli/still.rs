@@ -12,7 +12,7 @@ use crate::terminal::{Failure, input};
 pub struct StillArgs {
     /// For each setting: the part of the flag that sets it, for messages, and the assignment, such as `still.samples=64`.
     pub set: Vec<(String, String)>,
-    /// Time that the path tracing of a picture may take, s; None: not limited. It determines the number of paths.
+    /// Time that the path tracing of a picture may take, s, from which the number of samples follows. None: `set` states the number of samples.
     pub time: Option<f64>,
 }
 
@@ -66,7 +66,7 @@ pub fn samples_within(time: f64, mut taken: impl FnMut(u32) -> Result<f64, Failu
 }
 
 /// A line about the noise of a path-traced still: median and 95th percentile, over the lit pixels, of the relative standard error of a pixel's
-/// luminance. `None` if the scene has no still.
+/// luminance. With one sample per pixel the line has no errors. `None` if the scene has no still.
 pub fn noise(renderer: &mut Renderer) -> Result<Option<String>, GpuError> {
     let Some(still) = renderer.scene().still().copied() else { return Ok(None) };
     let [light, squares] = final_sums(renderer.scene());

@@ -217,8 +217,8 @@ impl View {
         Ok(())
     }
 
-    /// The log that the configuration asks for: its path, the largest size of a file in bytes, and the number of files. None if it asks for
-    /// none.
+    /// The log that the configuration asks for: its path, the largest size of a file in bytes, and the number of files. None if it asks for none,
+    /// there is no configuration, or it cannot be read.
     pub fn log(&self) -> Option<(PathBuf, u64, u32)> {
         let files = self.config()?.ok()?.files;
         Some((files.log?, u64::from(files.log_size_mb) << 20, files.log_files))

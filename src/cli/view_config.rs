@@ -104,7 +104,7 @@ pub enum First {
     BeingOpened(Receiver<Result<Box<dyn Live>, Failure>>),
 }
 
-/// The source, and the options of the console: the viewer's interface. A kiosk reads its configuration again after a fault.
+/// The source, and the options of the console (the viewer's user interface). A kiosk makes it again from its configuration after a fault.
 pub struct ConsoleConfig {
     /// The source of frames. None: the console shows only a message.
     pub source: Option<SourceArgs>,
@@ -151,11 +151,12 @@ impl ConsoleConfig {
         Ok(ConsoleConfig { source: Some(SourceArgs::from_config(config)?), first: None, options })
     }
 
-    /// The same configuration after its source was opened. If that takes longer than a second, the source is still being opened by a thread, and
-    /// the window shows the progress.
+    /// Begins to open the source on a thread, and waits for it for one second. In the returned configuration, `first` is the open source or, if
+    /// opening takes longer, the channel on which the thread sends it; the window then shows the progress. Does nothing without a source, or if
+    /// `first` is set.
     ///
     /// # Errors
-    /// The source cannot be opened.
+    /// Opening the source failed within that second, or no thread can be started.
     pub fn begun(mut self) -> Result<ConsoleConfig, Failure> {
         let Some(source) = self.source.clone().filter(|_| self.first.is_none()) else { return Ok(self) };
         let (sender, opened) = channel();

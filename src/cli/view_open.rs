@@ -24,8 +24,8 @@ pub struct Shown {
 }
 
 impl Shown {
-    /// The source that the command line selects. `file`: a recording or a workspace that takes its place. An error if a workspace cannot be read or
-    /// names no recording.
+    /// The source that the command line selects: `file`, a recording or a workspace, or without it that of the flags in `source`. An error if a
+    /// workspace cannot be read or names no recording.
     pub fn of(source: &SourceArgs, file: Option<&Path>) -> Result<Shown, Failure> {
         let named = file.unwrap_or(source.path());
         if workspace::is_named(named) {
@@ -90,7 +90,7 @@ impl OpenedInWindow {
         locked(&self.current.shown).clone()
     }
 
-    /// Takes the open source that was opened last in the window. None if it was taken before.
+    /// Takes the open source that was opened last in the window. None if it was taken before or none was opened.
     pub fn take_source(&self) -> Option<Box<dyn Live>> {
         locked(&self.current.source).take()
     }

@@ -6,7 +6,7 @@ use crate::picture::Picture;
 use crate::source::DEMO_DATA;
 use plotters::prelude::{DrawingBackend, RGBColor, ShapeStyle};
 
-/// Width of what lies between tiles, pixels.
+/// Width of the gap between neighbouring tiles, pixels.
 pub const GAP: u32 = 2;
 const BETWEEN: [u8; 3] = [58, 64, 74];
 /// Colours of the difference: no difference, and the first or the second picture brighter by the whole scale. Blue and orange differ for every
@@ -22,10 +22,10 @@ const BEYOND: f64 = 0.01;
 /// Most tiles of a picture.
 pub const MAX_TILES: usize = 4;
 
-/// The name of the tile of a difference.
+/// Name of the tile that shows the difference of two pictures.
 pub const DIFFERENCE: &str = "A \u{2212} B";
 
-/// The name of a tile: its letter, the name of the volume, and whether it is the phantom's.
+/// The name of a tile: its letter, the name of the volume and, if the volume is the phantom's, [`DEMO_DATA`].
 pub fn tile_name(letter: char, volume: impl std::fmt::Display, is_synthetic: bool) -> String {
     match is_synthetic {
         true => format!("{letter}  {volume} \u{b7} {DEMO_DATA}"),
@@ -33,7 +33,8 @@ pub fn tile_name(letter: char, volume: impl std::fmt::Display, is_synthetic: boo
     }
 }
 
-/// Columns and rows of tiles: up to three beside each other, or in a high picture one above the other; four in a square.
+/// Columns and rows of the tiles in a picture of this size: up to three tiles are in one row, or in one column if the picture is higher than wide;
+/// four are in two rows of two.
 pub fn grid(tiles: usize, [width, height]: [u32; 2]) -> [u32; 2] {
     match tiles {
         0..=1 => [1, 1],
@@ -68,14 +69,15 @@ pub fn beside(mut tiles: Vec<(String, Picture)>, size: [u32; 2]) -> Result<Pictu
 #[derive(Clone, Debug, PartialEq)]
 pub struct Difference {
     pub picture: Picture,
-    /// The scale runs from -`end` to `end`, levels of 255: 16, 32, 64, 128 or 255. Of the pixels that are black in neither picture at most 1 % differ
-    /// by more.
+    /// The scale runs from -`end` to `end`, levels of 255. `end` is the smallest of 16, 32, 64, 128 and 255 for which, of the pixels that are black
+    /// in neither picture, at most 1 % differ by more.
     pub end: u16,
     /// Root mean square of the difference over all pixels, levels of 255.
     pub rms: f64,
 }
 
-/// Draws the difference of two pictures: blue where the second is brighter, orange where the first is, with the scale at the right edge.
+/// Draws the difference of two pictures: blue where the second is brighter, orange where the first is, with the scale at the right edge if there is
+/// room for it.
 ///
 /// # Errors
 /// One line: pictures of different sizes, or the scale cannot be drawn.

@@ -81,7 +81,7 @@ fn spelled(name: &str) -> Result<&str, String> {
 /// Reads the presets in a file; none if there is no file.
 ///
 /// # Errors
-/// One line that names the file: it cannot be read, or is damaged.
+/// One line that names the file: it cannot be read, is damaged, or is of another version.
 pub fn read(file: &Path) -> Result<Vec<UserPreset>, String> {
     let fault = |fault: &str| format!("{}: {}", file.display(), printable(fault));
     if file.symlink_metadata().is_err_and(|e| e.kind() == std::io::ErrorKind::NotFound) {

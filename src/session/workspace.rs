@@ -33,7 +33,7 @@ pub struct Origin {
     /// Index of the volume that was shown, from 0.
     #[serde(default)]
     pub volume: usize,
-    /// Path of the segmentation that is shown with it; None if none is.
+    /// Path of the segmentation that is shown with the recording; None if none is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub labels: Option<PathBuf>,
     /// Path of the probe file that was given with `--probe`; None if it was not given.

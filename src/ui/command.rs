@@ -32,7 +32,7 @@ pub enum Command {
     Roll(f64),
     /// Multiplies the zoom; above 1 is closer.
     Zoom(f64),
-    /// Moves what is shown to the right and down, by shares of the picture's height.
+    /// Moves what the rendering shows to the right and down, by shares of the picture's height. On planes alone it has no effect.
     Pan([f64; 2]),
     /// Moves the light to the right and down over a dome above the surface, by shares of the picture's height.
     MoveLight([f64; 2]),
@@ -40,7 +40,7 @@ pub enum Command {
     MoveFace(Face, f64),
     /// Moves the region by distances along lateral, depth and elevation, mm.
     MoveRegion([f64; 3]),
-    /// Makes the start curve of the region bend at handles, or straight again.
+    /// Gives the region a start curve with handles, at which rendering starts, or removes it.
     ToggleStartCurve,
     /// Moves the handle of the start curve with this index to a position: lateral, depth, mm.
     MoveStartHandle(usize, [f64; 2]),
@@ -50,7 +50,7 @@ pub enum Command {
     RemoveStartHandle(Option<usize>),
     /// Moves the viewer's clip plane further into the volume, mm; negative values pull it back.
     MoveClip(f64),
-    /// Selects a plane: the one that is shown alone and that commands move.
+    /// Selects the plane that commands move and that is shown alone. If no plane is shown, also selects [`Mode::Plane`].
     Plane(PlaneName),
     /// Moves the selected plane along its normal, mm.
     StepPlane(f64),
@@ -71,7 +71,8 @@ pub enum Command {
     Opacity(Option<TransferName>),
     ColourMap(ColourMap),
     Shadow(bool),
-    /// Restores all settings of the start. A frozen picture stays frozen, and measurements are kept.
+    /// Restores all settings of the start except the size of the picture. A frozen picture stays frozen. Measurements, body marks and labels are
+    /// kept, cuts are not.
     Reset,
     /// Undoes the last change: of settings, planes, region or measurements.
     Undo,
@@ -87,9 +88,9 @@ pub enum Command {
     Point([f64; 3], bool),
     /// Sets a point of the measurement in progress on the surface under this pixel of the picture.
     PickSurface([f64; 2]),
-    /// Closes the contour or ends the volume that is being measured.
+    /// Ends the trace or the path that is being measured. Of a volume, closes the contour in progress, or without one ends the volume.
     EndMeasure,
-    /// Discards the measurement in progress.
+    /// Discards the measurement in progress, and ends the typing of a text.
     CancelMeasure,
     /// Moves a point of a measurement: index of the measurement, index of its point, new position, mm.
     MovePoint(usize, usize, [f64; 3]),
@@ -101,13 +102,13 @@ pub enum Command {
     Type(char),
     Untype,
     EndTyping,
-    /// Starts the contour of a cut at this pixel of the picture.
+    /// Starts the contour of a cut or a stroke of the brush at this pixel of the picture.
     BeginCut([f64; 2]),
-    /// Continues the contour of a cut to this pixel of the picture.
+    /// Continues the contour of a cut or the stroke of the brush to this pixel of the picture.
     CutAlong([f64; 2]),
-    /// Closes the contour of a cut and cuts along it.
+    /// Closes the contour of a cut and cuts along it, or ends the stroke of the brush and removes tissue near it.
     EndCut,
-    /// Discards the contour of a cut that is being drawn.
+    /// Discards the contour of a cut or the stroke of the brush that is being drawn.
     CancelCut,
     /// Chooses which side of the next contour of a cut is kept.
     KeepSide(KeptSide),
@@ -142,7 +143,7 @@ pub enum Command {
     Sides(VolumeAxis, Sides),
     /// Exchanges the patient's left and right side.
     ExchangeLeftAndRight,
-    /// Sets at which edge of the picture the probe's marker is drawn.
+    /// Sets at which end of the scan lines the probe's marker is, or that it is not drawn.
     ProbeMarker(ProbeMarker),
     /// Measures the volume of the largest bright body in the region.
     MeasureBody,
@@ -154,13 +155,13 @@ pub enum Command {
     SaveWorkspace,
     /// Shows or hides the list of files to open.
     OpenFiles,
-    /// Opens the n-th entry of the list of files.
+    /// Opens the entry with this index of the list of files.
     OpenFile(usize),
-    /// Shows the n-th of the open recordings.
+    /// Shows the open recording with this index.
     ShowRecording(usize),
-    /// Shows the recording that is this many positions further in the list of open recordings.
+    /// Shows the recording that is this many positions further in the list of open recordings; after the last one comes the first.
     StepRecording(i32),
-    /// Closes the n-th open recording; `usize::MAX`: the one that is shown.
+    /// Closes the open recording with this index; `usize::MAX`: the one that is shown.
     CloseRecording(usize),
     /// Compares the shown volume with the next open recording; if there is none, with itself as it is now. Ends the comparison if there is one.
     Compare,
@@ -174,27 +175,28 @@ pub enum Command {
     MoveCompared(usize, [[f64; 2]; 2], bool),
     /// Cuts or ties a link between the shown and the compared volumes.
     ToggleLink(Link),
-    /// Moves the compared volume rigidly onto the shown one, or leaves it where it is.
+    /// Moves the compared volumes rigidly onto the shown one. If they are aligned or about to be, moves them back to where their recordings say.
     Align,
     /// Stops reading the file that is being opened.
     CancelReading,
     /// Shows or hides the menu of export formats.
     Exports,
-    /// Exports the shown volume in the n-th format of that menu.
+    /// Exports in the format with this index of the menu of export formats: the shown volume or, if the format is for them, the loop, the labels or a
+    /// report.
     Export(usize),
     /// Cancels the export in progress.
     CancelExport,
     /// Shows or hides the list of presets.
     Presets,
-    /// Applies the n-th preset of the list: first the built-in ones, then the user's.
+    /// Applies the preset with this index of the list: first the built-in ones, then the user's.
     Preset(usize),
     /// Starts to type the name of a new preset with the present settings.
     NamePreset,
-    /// Starts to type a new name for the user's n-th preset.
+    /// Starts to type a new name for the user's preset with this index.
     RenamePreset(usize),
-    /// Saves the preset under the name that was typed.
+    /// Saves the new preset under the name that was typed, or renames the preset.
     EndNaming,
-    /// Deletes the user's n-th preset.
+    /// Deletes the user's preset with this index.
     DeletePreset(usize),
     /// Restores the user's presets as they were before the last change.
     RestorePresets,
@@ -204,7 +206,7 @@ pub enum Command {
     StepCine(i32),
     /// Shows the volume at this index of the cine loop (0 is the oldest), and freezes.
     SeekCine(usize),
-    /// Starts to play the cine loop repeatedly, or stops it.
+    /// Freezes and starts to play the cine loop repeatedly, or stops it.
     PlayCine,
     /// Marks the shown volume as the first that is played; `true`: as the last.
     MarkCine(bool),
@@ -245,9 +247,9 @@ pub enum Command {
     /// Turns moving the pointer by keys on or off.
     KeyboardPointer,
     ToggleFullScreen,
-    /// Closes the list, question or panel that is open; if none is, leaves full screen, and otherwise the program.
+    /// Closes the list, question or panel that is open. If none is, ends what is in progress, or leaves full screen, or otherwise the program.
     Back,
-    /// Leaves the program. If volumes or measurements would be lost, a question comes first.
+    /// Leaves the program. If volumes or measurements would be lost, a question comes first. It has no effect in a kiosk.
     Exit,
     /// Saves what would be lost, and then leaves the program.
     SaveAndExit,

@@ -23,25 +23,25 @@ use std::time::{Duration, Instant};
 /// How the compared volumes are shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum CompareView {
-    /// All of them beside the shown one.
+    /// All compared volumes are beside the shown one, each on a tile.
     #[default]
     Tiles,
-    /// The first one beside it, with the difference of both pictures as a third tile.
+    /// The first compared volume is beside the shown one, with the difference of both pictures as a third tile.
     Difference,
-    /// The first one over it, beyond a line that the user moves.
+    /// The first compared volume covers the shown one beyond a line that the user moves.
     Wipe,
 }
 
-/// What the compared volumes have in common with the shown one.
+/// What the compared volumes have in common with the shown one. They always have its mode and layout.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Link {
     /// Camera and region.
     View,
-    /// Position and direction of planes.
+    /// Position, direction and zoom of planes, and which plane is selected.
     Planes,
-    /// Windows, filters, light and all other settings.
+    /// Windows, filters, light and all other settings that no other link has.
     Look,
-    /// Position in the loop.
+    /// The volume in time: a compared recording shows the volume whose index is the position of the shown one in the cine loop.
     Volume,
 }
 
@@ -72,15 +72,15 @@ pub(super) struct Shown {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Other {
     pub name: String,
-    /// Whether it is of the phantom.
+    /// True if the volume is the phantom's.
     pub is_synthetic: bool,
-    /// Its picture; None until it is drawn.
+    /// The picture of the volume; None until it is drawn.
     pub picture: Option<Arc<Picture>>,
-    /// The length, mm, and the angle, degrees, by which it is moved; None if it is where its recording says.
+    /// The length, mm, and the angle, degrees, by which the volume is moved; None if it is where its recording says.
     pub moved: Option<[f64; 2]>,
-    /// Whether that motion was found by [`register`].
+    /// True if the motion was found by [`register`] and the user has not changed it since.
     pub is_aligned: bool,
-    /// Whether its motion onto the shown volume is being searched for.
+    /// True while the motion of the volume onto the shown one is being searched for.
     pub is_aligning: bool,
 }
 

@@ -24,10 +24,11 @@ pub struct DirectOptions {
     pub time: Option<Duration>,
 }
 
-/// Takes over a monitor and runs the console that `make` creates, until the user leaves. Returns the console and its last context.
+/// Takes over a monitor and runs the console that `make` creates, until the user leaves or `options.time` is over. Returns the console and its last
+/// context.
 ///
 /// # Errors
-/// No device has such a monitor, or another program uses it; or the device or the monitor is lost repeatedly.
+/// No device has such a monitor, or another program uses it; the input devices cannot be read; or the device or the monitor is lost repeatedly.
 pub fn run(
     device: &ContextOptions,
     options: DirectOptions,

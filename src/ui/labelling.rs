@@ -24,18 +24,18 @@ pub enum Effect {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LabelCommand {
     Effect(Effect),
-    /// Chooses whether the brush is a ball also on planes, or else a disc in the plane.
+    /// True: the brush is a ball on planes, too. False: on planes it is a disc in the plane.
     Ball(bool),
     /// Chooses the label that is painted.
     Choose(u8),
     /// Adds a label, and chooses it.
     Add,
-    /// Labels the body of the volume by contours with this index in the list of measurements.
+    /// Gives the chosen label to the body within the contours of the measurement with this index.
     Fill(usize),
-    /// Moves the brush to this pixel of the picture on the tile of planes with this index, or else on the rendering. The flag is true if it
+    /// Moves the brush to this pixel of the picture: on the tile of planes with this index, or with None on the rendering. The flag is true if it
     /// erases, whatever the effect is.
     Stroke([f64; 2], Option<usize>, bool),
-    /// Ends a stroke, or grows from its last place.
+    /// Ends a stroke. If the effect grows, labels the body at the last place of the brush.
     EndStroke,
 }
 

@@ -59,7 +59,7 @@ mod served {
             ScreenReader { adapter, heard, is_listening: false }
         }
 
-        /// Handles an event of the window that concerns its position or focus.
+        /// Passes an event of the window to the connection, which uses those about its position and focus.
         pub fn event(&mut self, window: &Window, event: &WindowEvent) {
             self.adapter.process_event(window, event);
         }

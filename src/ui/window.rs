@@ -26,7 +26,7 @@ pub struct WindowOptions {
     /// Part of the name of the monitor on which full screen is shown; `None`: the monitor of the window.
     pub monitor: Option<String>,
     pub present_mode: PresentMode,
-    /// True if the window is opened again when it is closed, as in a kiosk.
+    /// True if a request to close the window is ignored, and a window that is destroyed is opened again, as in a kiosk.
     pub stays_open: bool,
     /// The console ends after this time; None: it does not end by itself.
     pub time: Option<Duration>,
@@ -36,7 +36,8 @@ pub struct WindowOptions {
 /// size of the window in pixels, its pixels per point, and the function that wakes the event loop.
 pub type MakeConsole<'a> = dyn FnMut(&Arc<Context>, [u32; 2], f32, Wake) -> Console + 'a;
 
-/// Opens a window and runs the console that `make` creates, until the user leaves. Returns the console and its last context.
+/// Opens a window and runs the console that `make` creates, until the user leaves or `options.time` is over. Returns the console and its last
+/// context.
 ///
 /// # Errors
 /// There is no window system, no device can present on it, or the device is lost repeatedly.

@@ -78,8 +78,8 @@ impl Bundle {
         value_of(Some("files"), "log").map_or(config::DEFAULT_LOG.into(), |log| folder.join(log))
     }
 
-    /// Adds a file of this name with `text`, which is redacted and then cut at 2^20 characters: a private name at the cut is recognised. `description`:
-    /// its line in the README.
+    /// Adds a file of this name with `text`. The text is redacted first and then cut at 2^20 characters, so that a private name at the cut is
+    /// recognised. `description`: its line in the README.
     pub fn add(&mut self, name: &str, description: &str, text: &str) {
         self.add_up_to(MAX_ENTRY, name, description, text);
     }

@@ -103,7 +103,7 @@ impl Chord {
         }
     }
 
-    /// True if exactly this combination is pressed.
+    /// True if `key` and `modifiers` are exactly this combination.
     pub fn is(&self, key: Key, modifiers: Modifiers) -> bool {
         *self == Chord { key, modifiers }
     }

@@ -35,8 +35,9 @@ type Opener = Box<dyn FnMut(&Path) -> io::Result<Box<dyn Sink>> + Send>;
 /// Writes a log to several files in rotation. The text up to the end of a line is one event, which is written completely or not at all.
 ///
 /// Writing never fails. Lines that cannot be written, on a full disk or in a deleted folder, are counted. Every later write tries again, and the
-/// first one that succeeds reports how many lines are missing. No line is split between two files, and all files together hold at most `bytes`
-/// times `files`. Only one process at a time may write to a log ([`files::Lock`](crate::files::Lock)).
+/// first one that succeeds reports how many lines are missing. No line is split between two files; a line that is longer than a file is cut. All
+/// files together hold at most `bytes` times `files` of `RotatingLog::open`. Only one process at a time may write to a log
+/// ([`files::Lock`](crate::files::Lock)).
 pub struct RotatingLog {
     path: PathBuf,
     bytes: u64,
@@ -58,7 +59,8 @@ pub struct RotatingLog {
 }
 
 impl RotatingLog {
-    /// Opens the log at `path`, or creates it. `bytes`: largest size of one file, at least 4096; `files`: their number, at least 1.
+    /// Opens the log at `path`, or creates it. `bytes`: largest size of one file, where less than 4096 counts as 4096; `files`: number of files with
+    /// the current one, where 0 counts as 1.
     ///
     /// # Errors
     /// One line that names the file: it cannot be written, or it or a file that rotation would move exists and is not a log.
@@ -234,8 +236,8 @@ impl Drop for RotatingLog {
 
 /// A log whose file may not be available yet. Until it can be opened, lines go to another writer.
 ///
-/// Writing never fails. A write tries to open the file if the last try is at least `pause` ago. The first line of the file then states where the
-/// earlier lines are.
+/// Writing never fails. A write tries to open the file if the last try is at least `pause` ago. The first line of the file then states why it could
+/// not be opened before.
 pub struct LateLog<O, W> {
     open: O,
     until: W,
@@ -251,7 +253,7 @@ impl<O: FnMut() -> Result<RotatingLog, String>, W: Write> LateLog<O, W> {
         LateLog { log: open(), open, until, pause, tried: Instant::now() }
     }
 
-    /// The reason on one line why the file could not be opened; None if it is open.
+    /// The reason on one line why the last try could not open the file; None if it is open.
     pub fn fault(&self) -> Option<&str> {
         self.log.as_ref().err().map(String::as_str)
     }

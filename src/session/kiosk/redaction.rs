@@ -78,7 +78,8 @@ impl Redactor {
         }
     }
 
-    /// Makes a recording's path private: the names in it are replaced wherever they occur in a text.
+    /// Makes a recording's path private: paths inside of its folder are removed, and the names in the path are replaced wherever they occur in a
+    /// text. Names that identify nobody are kept: those of fewer than three bytes, of system folders, and common words such as `data`.
     pub fn add_recording(&mut self, path: &Path) {
         if let Some(folder) = path.parent() {
             self.add_folder(folder);

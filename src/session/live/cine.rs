@@ -75,7 +75,8 @@ impl Cine {
         self.filling = None;
     }
 
-    /// Adds a frame. Returns true if it completes a volume. A frame with another volume number discards the volume that is incomplete.
+    /// Adds a frame. Returns true if it completes a volume. A frame with another volume number discards the volume that is incomplete. A frame is
+    /// ignored if the loop is off, or if its slice is not below the number of slices.
     pub fn frame(&mut self, frame: Frame) -> bool {
         if self.limits.volumes == 0 || frame.slice >= self.slices {
             return false;

@@ -41,7 +41,7 @@ pub struct FeedCounts {
     pub unrecorded: u64,
     /// Number of times that the source was disconnected.
     pub disconnected: u64,
-    /// Number of pictures of a freehand sweep that are not, or not wholly, in a volume.
+    /// Number of 2D frames of a freehand sweep that are not, or not wholly, compounded into a volume.
     pub left_out: u64,
 }
 
@@ -176,8 +176,8 @@ impl Feed {
         Feed { shared: Arc::default(), can_wait: true, is_recording: false, thread: None }
     }
 
-    /// Reads a source and records it as [`Feed::new`] does. `wake` is called after each event, and when the connection to the source is lost or
-    /// found.
+    /// Reads a source and records it as [`Feed::new`] does. `wake` is called after each event that was queued, and when the connection to the source
+    /// is lost or found.
     ///
     /// # Errors
     /// The thread cannot be started.
@@ -185,7 +185,8 @@ impl Feed {
         Feed::observed(source, record, wake, None)
     }
 
-    /// Reads a source as [`Feed::waking`] does. `observer` is called with every event before it is queued, on the thread of the source.
+    /// Reads a source as [`Feed::waking`] does. `observer` is called with every event except [`Event::Idle`] before it is queued, on the thread of
+    /// the source. It also gets frames that are then lost because the queue is full.
     ///
     /// # Errors
     /// The thread cannot be started.

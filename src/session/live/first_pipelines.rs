@@ -41,8 +41,9 @@ impl FirstPipelines {
         self.making.as_ref().map(|making| !making.preparation.is_finished())
     }
 
-    /// True if the pipelines of these settings are compiled, or will be when the geometry begins. Otherwise `begin` starts the compilation.
-    /// `settings`: as drawn, and at full quality. `begin` returns None if there is nothing to compile in advance; then the result is true.
+    /// True if the pipelines of these settings are compiled, or will be when the geometry begins. Otherwise they are being compiled: `begin` starts
+    /// that unless a compilation still runs. `settings`: as drawn, and at full quality. `begin` returns None if there is nothing to compile in
+    /// advance; then the result is true.
     ///
     /// # Errors
     /// The error with which a renderer of the settings would fail, a lost device, or the error of `begin`.

@@ -49,7 +49,7 @@ impl FirstVolume {
         Defaults { layers: self.layers.clone(), geometry: header.forward.clone(), levels }
     }
 
-    /// Evaluates a frame. If it completes the first volume, returns what the default settings are derived from; otherwise None.
+    /// Evaluates a frame. If it completes the first volume that has echoes, returns what the default settings are derived from; otherwise None.
     pub fn frame(&mut self, frame: &Frame) -> Option<Defaults> {
         let (header, collected) = (self.header.as_ref()?, self.collected.as_mut()?);
         if !collected.take(header, frame) {

@@ -31,8 +31,8 @@ pub struct StreamOptions {
     /// The settings that the user chose. All others are derived from the geometry and the first complete volume. None: the settings given to the
     /// stream are complete, and nothing is derived.
     pub chosen: Option<Layers>,
-    /// A function that gives settings of lower quality for a scene at full quality. One result of stage 1 serves all of them, so that no frame is
-    /// sent again when the quality changes. None: a change of quality may need the frames again.
+    /// A function that gives settings of lower quality for a scene at full quality. One result of stage 1 (the filters of frames) serves all of them,
+    /// so that no frame is sent again when the quality changes. None: a change of quality may need the frames again.
     pub lowered: Option<Lowered>,
     /// Compile the pipelines of the first geometry in the background, if `wake` is given. Meanwhile [`Stream::step`](super::Stream::step)
     /// returns at once.

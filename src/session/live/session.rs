@@ -62,8 +62,8 @@ impl Views {
         Ok(Views { forward, backward, is_directional, is_mixed: is_directional && update == Update::Rolling })
     }
 
-    /// The same scenes with visible bounds so large that one result of stage 1 also serves pictures with the settings `full` and with those that
-    /// `lowered` makes of them. Settings that cannot be drawn are ignored.
+    /// The same scenes with visible bounds so large that one result of stage 1 (the filters of frames) also serves pictures with the settings `full`
+    /// and with those that `lowered` makes of them. Settings that cannot be drawn are ignored.
     ///
     /// # Errors
     /// The geometry cannot be drawn with the settings `full`.
@@ -91,8 +91,8 @@ impl Views {
         &self.forward
     }
 
-    /// The scene of a volume. `backward`: for each slice, true if it was swept backwards. If neighbouring slices of different directions would
-    /// cross, all slices get the direction of the majority.
+    /// The scene of a volume. `backward`: for each slice, true if it was swept backwards. All slices get the direction of the majority if volumes are
+    /// shown whole, or if neighbouring slices of different directions would cross.
     pub fn of(&self, backward: &[bool]) -> Cow<'_, Scene> {
         let count = backward.iter().filter(|b| **b).count();
         let majority = 2 * count > backward.len();

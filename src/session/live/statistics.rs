@@ -30,7 +30,7 @@ pub struct SourceFaults {
 pub struct Statistics {
     /// Length of the period.
     pub time: Duration,
-    /// Number of frames that arrived.
+    /// Number of frames that were taken from the feed, refused ones included. Frames that were lost or ignored while frozen are not counted.
     pub frames: u64,
     /// Number of frames that were lost because the queue was full.
     pub lost: u64,

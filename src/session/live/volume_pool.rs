@@ -224,8 +224,8 @@ impl VolumePool {
         is_complete
     }
 
-    /// Takes the next volume to show; None if there is no new one. The volume image that was shown before becomes free, so that no picture of it
-    /// may be in flight.
+    /// Takes the next volume to show; None if there is no new one. The volume image that was shown before becomes free, so that the caller must have
+    /// no picture of it in flight.
     pub fn take(&mut self) -> Option<Ready> {
         let ready = self.ready.take()?;
         self.shown = Some(ready.image);

@@ -37,11 +37,11 @@ pub enum Demo {
     Always,
 }
 
-/// The picture as it is saved. If `marks.bar` of its settings is set, it has the marks and the bar below it that [`marked`] adds; otherwise the
-/// measurements and lines that [`measured`] draws. It is unchanged if there is nothing to draw.
+/// The picture as it is saved. If `marks.bar` of the scene's settings is true, it has the marks and the bar below it that [`marked`] adds; otherwise
+/// the measurements and lines that [`measured`] draws. It is unchanged if there is nothing to draw.
 ///
-/// `volume`: number of the volume that it shows; measurements of other volumes are dimmed. None: not known, no measurement is dimmed. `start`: the
-/// start surface, if one was found. `demo`: None if the volume may be of a patient.
+/// `volume`: number of the volume that the picture shows; measurements of other volumes are dimmed. None: not known, no measurement is dimmed.
+/// `start`: the surface at which rendering starts (setting `unveil`), if one was found. `demo`: None if the volume may be of a patient.
 ///
 /// # Errors
 /// One line: the picture is not of this scene's size, or the drawing failed.
@@ -65,8 +65,8 @@ pub fn as_set<'a>(
 
 /// The picture with its measurements, annotations, body marks and lines as [`measured`] draws them, with the patient's sides and the probe's marker
 /// on its tiles, and with a bar of text below it, by which it is higher. `volume`: number of the volume that it shows; measurements of other volumes
-/// are dimmed. None: not known, none is dimmed. `start`: the start surface, if one was found. `time`: time of the picture, for the bar. `origin`:
-/// what the picture shows, such as "Demo data (phantom)"; None for patients.
+/// are dimmed. None: not known, none is dimmed. `start`: the surface at which rendering starts (setting `unveil`), if one was found. `time`: time of
+/// the picture, for the bar. `origin`: what the picture shows, such as "Demo data (phantom)"; None for patients.
 ///
 /// # Errors
 /// One line: the picture is not of this scene's size, or the drawing failed.
@@ -102,8 +102,9 @@ pub fn marked(
 /// The picture with its measurements, annotations and body marks, the lines on its reference tile, and the line at which rendering starts. On a
 /// picture of another size than the scene's only `origin` is written.
 ///
-/// `volume`: number of the volume that it shows; measurements of other volumes are dimmed. None: not known, none is dimmed. `start`: the start
-/// surface, if one was found. `origin`: what the picture shows, in small letters in a corner; None for nothing.
+/// `volume`: number of the volume that the picture shows; measurements of other volumes are dimmed. None: not known, none is dimmed. `start`: the
+/// surface at which rendering starts (setting `unveil`), if one was found. `origin`: what the picture shows, in small letters in the lower left
+/// corner; None for nothing.
 ///
 /// # Errors
 /// One line: the drawing failed.

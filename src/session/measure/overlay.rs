@@ -23,7 +23,7 @@ pub struct Drawn {
     /// The lines to draw, each as a list of points. A closed line repeats its first point at the end.
     pub lines: Vec<Vec<[f64; 2]>>,
     /// The points that the user set: the index of each in the measurement, and its position, where a cross is drawn and it can be dragged. Of a path
-    /// along a surface both ends, with the indices 0 and 1; they cannot be dragged.
+    /// along a surface both ends, with the indices 0 and 1; they cannot be dragged. Empty for traces, contours of a volume and boxes.
     pub points: Vec<(usize, [f64; 2])>,
     /// The tip of an arrow's head, and a point on its shaft, from which the direction follows; None if it is no arrow.
     pub head: Option<[[f64; 2]; 2]>,
@@ -34,8 +34,8 @@ pub struct Drawn {
     pub at: [f64; 2],
 }
 
-/// The drawings of all measurements over the picture of a scene. `all`: the list in [`crate::scene::Settings::measure`]; `volume`: number of the
-/// volume that the picture shows. None: not known, all measurements count as made on it.
+/// The drawings of all measurements over the picture of a scene, one for each tile that shows the measurement. `all`: the list in
+/// [`crate::scene::Settings::measure`]; `volume`: number of the volume that the picture shows. None: not known, all measurements count as made on it.
 pub fn drawn(scene: &Scene, volume: Option<u32>, all: &[Measurement]) -> Vec<Drawn> {
     if all.is_empty() {
         return Vec::new();
@@ -113,7 +113,7 @@ pub fn preview(
     found
 }
 
-/// A label with the distance between the slices of a tomography, for its reference tile.
+/// A label with the distance between the slices of a tomography, for its reference tile; empty with fewer than two slices.
 pub fn spacing_label(tiling: &Tiling) -> String {
     match &tiling.tiles[..] {
         [_, first, second, ..] => format!("every {:.1} mm", second.plane.at.distance(first.plane.at)),

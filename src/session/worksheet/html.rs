@@ -11,7 +11,7 @@ use std::rc::Rc;
 
 const STYLE: &str = include_str!("style.css");
 
-/// The text of the page. `pictures`: one of each measurement, in their order.
+/// The worksheet as a page of HTML. `settings`: those of the workspace. `pictures`: one for each of `sheet.measurements`, in their order.
 ///
 /// # Errors
 /// One line: a picture cannot be encoded.

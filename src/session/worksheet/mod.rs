@@ -32,7 +32,7 @@ pub struct Sheet {
     pub program: String,
     /// When the pictures were drawn first, such as `2026-11-23 20:00:00 UTC`.
     pub date: String,
-    /// Name and driver of the device that drew them.
+    /// Name and driver of the device that drew the pictures.
     pub device: String,
     /// File name of the workspace; empty if there is none.
     pub workspace: String,
@@ -52,7 +52,7 @@ pub struct Recording {
     pub volumes: usize,
     /// Number of its files, those that state its geometry included; 0 for the phantom.
     pub files: usize,
-    /// Length of all files.
+    /// Total length of all files, bytes.
     pub bytes: u64,
     /// SHA-256 of its file; of several the hash of their digests, one a line. Empty for the phantom.
     pub sha256: String,
@@ -61,11 +61,12 @@ pub struct Recording {
 /// A measurement.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 pub struct Entry {
-    /// Its number in the list, from 1.
+    /// Number of the measurement in the list of the workspace's settings, from 1.
     pub number: usize,
     pub kind: String,
     pub text: String,
-    /// They are written for others: what is read is computed again.
+    /// What was measured. The JSON has it for other programs. It is empty in a sheet that was read, because it is computed again from
+    /// [`Sheet::source`].
     #[serde(skip_deserializing)]
     pub quantities: Vec<Quantity>,
     /// How a volume follows from its contours or voxels, or why the measurement has no result; None for others.
@@ -79,9 +80,9 @@ pub struct Entry {
     /// Time stamp of that volume, s; None if it has none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time: Option<f64>,
-    /// The plane or the view that it was made on; empty if that is not known.
+    /// The plane or the view that the measurement was made on; if that was not recorded, the one that its picture shows. Empty if neither is known.
     pub plane: String,
-    /// The mode, and a digest of the settings that it was made with.
+    /// The mode, and a digest of the settings, with which the measurement was made; if they were not recorded, those of its picture.
     pub settings: String,
     pub picture: Shown,
 }
@@ -90,9 +91,9 @@ pub struct Entry {
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Shown {
-    /// What differs from the settings of `source`, as assignments of `render --set`.
+    /// What differs from the settings of [`Sheet::source`], as assignments of `render --set`.
     pub set: Vec<String>,
-    /// What it shows.
+    /// The caption: the plane or the view that the picture shows.
     pub caption: String,
     /// The mode, and a digest of its settings.
     pub settings: String,
@@ -111,7 +112,7 @@ pub struct Block {
 }
 
 impl Block {
-    /// True for what has a block of its own: texts and arrows are only drawn.
+    /// True if the measurement has a picture of its own in the worksheet. False for texts and arrows, which are only drawn on pictures.
     pub fn is_for(measured: &Measurement) -> bool {
         !matches!(measured.kind, MeasureKind::Text | MeasureKind::Arrow)
     }
@@ -272,7 +273,7 @@ impl Sheet {
     /// The sheet as JSON.
     ///
     /// # Errors
-    /// One line: a number that JSON does not have.
+    /// One line: the sheet cannot be written as JSON.
     pub fn json(&self) -> Result<String, String> {
         serde_json::to_string_pretty(self).map(|text| text + "\n").map_err(|e| e.to_string())
     }

@@ -301,7 +301,7 @@ impl Console {
         asks
     }
 
-    /// Sets whether the window fills the screen and the user can leave full screen.
+    /// Sets whether the window fills the screen. If it does, [`Command::Back`] leaves full screen before it leaves the program.
     pub fn set_full_screen(&mut self, is_full_screen: bool) {
         self.presentation.set_full_screen(is_full_screen);
     }

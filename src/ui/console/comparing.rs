@@ -17,7 +17,7 @@ use std::time::Instant;
 const UNLIKE: f64 = 0.5;
 
 impl Console {
-    /// The pictures of the difference and of the compared volumes, each None until it is drawn; empty without a comparison.
+    /// The picture of the difference, and after it those of the compared volumes, each None until it is drawn; empty without a comparison.
     pub fn compared(&self) -> Vec<Option<Arc<Picture>>> {
         self.comparison.as_ref().map_or_else(Vec::new, |comparison| comparison.shown().pictures())
     }

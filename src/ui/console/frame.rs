@@ -293,7 +293,7 @@ impl Console {
         Ok(())
     }
 
-    /// The reason why the source could not be opened, so that there was nothing to show; None if it was opened.
+    /// The reason why the source could not be opened and is not tried again, so that there was nothing to show; otherwise None.
     pub fn source_fault(&self) -> Option<String> {
         self.connection.fault()
     }

@@ -26,7 +26,7 @@ pub struct ConsoleOptions {
     pub budget: Option<Duration>,
     /// The rungs of the quality ladder, from full quality down.
     pub rungs: Vec<Rung>,
-    /// Time after which a source that ended is opened again; `None`: it is not.
+    /// Time after which a source that ended or could not be opened is opened again; `None`: it is not.
     pub retry: Option<Duration>,
     /// Kind of the source, for messages.
     pub source: SourceKind,
@@ -50,9 +50,9 @@ pub struct ConsoleOptions {
     /// True if volume numbers of the stream are those of the recording.
     pub plays_once: bool,
     pub opening: OpeningOptions,
-    /// Path of the file that marks that the hints of the first start were shown; `None`: they are not shown.
+    /// Path of the file that marks that the hints of the first start were shown; `None`: the hints are never shown.
     pub first_steps: Option<PathBuf>,
-    /// Path of the file with the user's presets; `None`: there are none.
+    /// Path of the file with the user's presets; `None`: the user can save no presets.
     pub presets: Option<PathBuf>,
     /// Called when [`Console::update`](super::Console::update) has something to do.
     pub wake: Wake,

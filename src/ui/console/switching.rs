@@ -43,7 +43,8 @@ impl Console {
         }
     }
 
-    /// Opens a recording or a workspace and shows it. If it is the one that is shown, it is read again.
+    /// Reads a recording or a workspace in the background, and then shows it. If it is the one that is shown, it is read again. Refused with a
+    /// message if the present cine loop is not saved.
     pub fn open_path(&mut self, path: &Path) {
         self.read(path, false);
     }

@@ -113,7 +113,7 @@ pub struct Display {
     pub full_screen: bool,
     /// Draw directly on the monitor (VK_KHR_display), without a window system. Default: false.
     pub direct: bool,
-    /// A part of the name of the monitor to use. Default: the first monitor.
+    /// A part of the name of the monitor to use. Default: the monitor of the window; if `direct` is true, the first monitor.
     pub monitor: Option<String>,
     /// Width and height of a window that is not full-screen, pixels, 64 to 16384 each. Default: 1280 x 800.
     pub size: [u32; 2],
@@ -568,7 +568,7 @@ impl ConfigError {
         ConfigError { path: path.into(), line, key: short(&printable(key)), fault: short(&printable(fault)) }
     }
 
-    /// The wrong key, such as `display.scale`; empty if the fault is in the file itself.
+    /// The wrong key, such as `display.scale`; empty if the fault is in the file itself or the key is not known.
     pub fn key(&self) -> &str {
         &self.key
     }

@@ -520,7 +520,8 @@ impl Stream {
         }
     }
 
-    /// Changes the settings. The volume on display is drawn again. If stage 1 must run again, the volume is sent again from the cine loop.
+    /// Changes the settings. The volume on display is drawn again. If stage 1 (the filters of frames) must run again, the volume is sent again from
+    /// the cine loop.
     ///
     /// # Errors
     /// The geometry cannot be drawn with the settings; the previous ones remain. If only the device refuses them, a later [`Step::Fault`]
@@ -547,8 +548,8 @@ impl Stream {
         Ok(())
     }
 
-    /// Freezes the display, or continues. While it is frozen, frames that arrive are recorded but not shown. Frames of a recording go into the
-    /// cine loop while that has room, and then wait.
+    /// Freezes the display, or continues. Frames that arrive while it is frozen are not shown, but still recorded if the feed records. Frames of a
+    /// recording go into the cine loop while that has room, and then wait.
     pub fn freeze(&mut self, is_frozen: bool) {
         if self.is_frozen == is_frozen {
             return;

@@ -108,8 +108,8 @@ impl Stream {
         self.reported.totals()
     }
 
-    /// Number of complete volumes that arrived, shown or dropped. None before the first header, while the display is frozen, after the source has
-    /// ended, and if the source waits for pictures.
+    /// Number of volumes that were shown or dropped so far ([`VolumeCounts`]), which is a measure of how many have arrived. None before the first
+    /// header, while the display is frozen, after the source has ended, and if the source waits for pictures.
     pub fn live_volumes(&self) -> Option<u64> {
         let is_live = !self.is_frozen && self.end.is_none() && !self.feed.can_wait();
         self.pool().filter(|_| is_live).map(|pool| pool.counts().shown + pool.counts().dropped)
@@ -129,7 +129,7 @@ impl Stream {
         self.header.as_ref()
     }
 
-    /// Number of frames that were taken from the feeds of all sources so far.
+    /// Number of frames that were taken from the feeds of all sources so far, without those that were ignored while frozen.
     pub fn frames(&self) -> u64 {
         self.statistics.frames
     }

@@ -33,10 +33,10 @@ const INK: Colour = [0.10, 0.12, 0.14];
 const DIM: Colour = [0.36, 0.41, 0.43];
 const RULE: Colour = [0.84, 0.86, 0.87];
 
-/// The bytes of the file. `pictures`: one of each measurement, in their order.
+/// The worksheet as the bytes of a PDF file. `settings`: those of the workspace. `pictures`: one for each of `sheet.measurements`, in their order.
 ///
 /// # Errors
-/// One line: the typeface that is built in cannot be read.
+/// One line: the typeface that is built in cannot be read, or compression failed.
 pub fn write(sheet: &Sheet, settings: &Settings, pictures: &[Rc<Picture>]) -> Result<Vec<u8>, String> {
     let mut report = Report { typeface: Typeface::new()?, pages: vec![Content::new()], down: TOP, images: Vec::new() };
     report.head(sheet);
