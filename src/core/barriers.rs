@@ -7,11 +7,12 @@ use crate::passes::{DispatchArgs, Part, Pass, Slot};
 use crate::scene::Scene;
 use std::ops::Range;
 
-/// A resource whose accesses are ordered. Each image of a multibuffered slot is a resource of its own, by its index.
+/// A GPU resource whose accesses are ordered by barriers. `Slot(slot, image)` is one image of a slot. `image` is 0 unless the slot has one for each
+/// volume image ([`Slot::is_multibuffered`]).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Resource {
     Slot(Slot, u32),
-    /// The buffer for results that the host reads.
+    /// The buffer into which the device copies results for the host.
     Readback,
 }
 
@@ -28,8 +29,8 @@ pub enum PipelineStage {
 pub struct PipelineStages(u8);
 
 impl PipelineStages {
-    /// All stages on the device. The host is not included: making memory visible to it can cost a cache flush, so only a host access
-    /// requests it.
+    /// All stages on the device, without the host. Only the barrier before an access by the host includes the host, because making memory visible to
+    /// it can cost a cache flush.
     pub const DEVICE: PipelineStages = PipelineStages(0b011);
 
     pub fn has(self, worker: PipelineStage) -> bool {
@@ -51,8 +52,8 @@ impl From<PipelineStage> for PipelineStages {
     }
 }
 
-/// One memory access of an operation (a dispatch, copy or clear). Its parts are slices of a 3D image or layers of an array; any other resource has a
-/// single part.
+/// One memory access of an operation (a dispatch, copy or clear). `parts` are slices of a 3D image or layers of an array, from 0; any other resource
+/// has the single part 0.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Access {
     pub resource: Resource,
@@ -73,8 +74,9 @@ impl Access {
         Access { resource: Resource::Slot(slot, image), parts, write, stage }
     }
 
-    /// True if the order of two accesses matters. Slices of a 3D image are not subresources in Vulkan: two writers of different slices may overlap,
-    /// but a reader, which may filter across slices, and a writer may not. The slot `TileRanges` is treated likewise.
+    /// True if the operation of `later` must wait for that of this access: both use the same resource, at least one writes, and their parts overlap.
+    /// Slices of a 3D image are not subresources in Vulkan, and a reader may filter across slices. Therefore a reader and a writer of a volume, or of
+    /// the slot `TileRanges`, conflict whatever their parts are.
     pub fn conflicts(&self, later: &Access) -> bool {
         if self.resource != later.resource || !(self.write || later.write) {
             return false;
@@ -86,7 +88,7 @@ impl Access {
     }
 }
 
-/// The memory accesses of a dispatch.
+/// The memory accesses of a dispatch: those of the slots that it reads, then those of the slots that it writes.
 pub fn accesses(scene: &Scene, pass: &Pass, args: &DispatchArgs) -> Vec<Access> {
     let access = |bind: crate::passes::Bind, write| {
         let all = bind.slot.shape(scene).parts();
@@ -119,7 +121,8 @@ pub struct BarrierTracker {
 }
 
 impl BarrierTracker {
-    /// Records an operation with these accesses. Returns the barrier that it needs before it, if any.
+    /// Records an operation with these accesses, which follows all operations recorded before. Returns the barrier that has to precede it; None if it
+    /// needs none.
     pub fn record(&mut self, accesses: &[Access]) -> Option<Barrier> {
         let hazard = accesses.iter().any(|later| {
             self.pending.iter().any(|(earlier, covered)| !covered.has(later.stage) && earlier.conflicts(later))
@@ -131,7 +134,8 @@ impl BarrierTracker {
         barrier
     }
 
-    /// Call it when the last recording was not submitted: its barriers do not count, and the next operation waits for all earlier ones.
+    /// Has to be called when the last recording was not submitted. Barriers of that recording then do not count: the next operation gets a barrier
+    /// that waits for all earlier operations.
     pub fn invalidate(&mut self) {
         self.is_invalid = true;
     }

@@ -14,9 +14,10 @@ const FORMAT: &str = "echolume dump 1";
 /// Width and height of a drawn table, pixels.
 const GRAPH: [usize; 2] = [512, 256];
 
-/// Draws a slot: colours unchanged, a volume as its slices side by side, a distance map with near bright, far dark and misses black, a table as
-/// curves. A single channel is stretched from its minimum to its maximum unless it is within 0..1. `texels`: what the slot holds; None for a table
-/// that the CPU computes from the scene. Other slots without texels give one black pixel.
+/// Draws a slot: four channels as a colour (0..1, opaque), a volume as its slices side by side, a distance map with near bright, far dark and misses
+/// black, a table of the CPU as one curve per channel. Of any other slot the first channel is drawn in grey, stretched from its smallest to its
+/// largest value unless all values are within 0..1. `texels`: what the slot holds; None for a table that the CPU computes from the scene. Other slots
+/// without texels give one black pixel.
 pub fn draw(slot: Slot, texels: Option<&Texels>, scene: &Scene) -> Picture {
     match (texels, slot.initializer()) {
         (Some(texels), _) if texels.channels == 4 && texels.size[2] == 1 => colours(texels),
@@ -105,9 +106,9 @@ fn curves(values: &[f32], channels: usize) -> Picture {
     Picture { width: width as u32, height: height as u32, rgba }
 }
 
-/// A slot as an array that numpy reads (NPY 1.0, little endian, C order), and a description of its axes, channels and units. `texels`: what the slot
-/// holds; None for a table that the CPU computes from the scene. Other slots without texels give an empty array. Values are f32 as the shaders read
-/// them, f64 where they are bits.
+/// A slot as the bytes of an NPY file for numpy (NPY 1.0, little endian, C order), and a JSON description of its axes, channels and units. `texels`:
+/// what the slot holds; None for a table that the CPU computes from the scene. Other slots without texels give an empty array. Values are f32 as the
+/// shaders read them; those of formats of unsigned integers are f64.
 pub fn array(slot: Slot, texels: Option<&Texels>, scene: &Scene) -> (Vec<u8>, Value) {
     let Meaning { channels, unit, miss } = slot.meaning();
     let (shape, values) = match (texels, slot.initializer()) {
@@ -149,8 +150,7 @@ pub fn array(slot: Slot, texels: Option<&Texels>, scene: &Scene) -> (Vec<u8>, Va
     (bytes, about)
 }
 
-/// NPY, format 1.0: a magic number, a Python literal, padded so that they end at a multiple of 64 bytes, and the values. The last axis of `shape` is
-/// the fastest. False for `as_f64` stores f32.
+/// The bytes of an NPY file, format 1.0. The last axis of `shape` varies fastest. `as_f64`: true stores the values as f64, false as f32.
 pub fn npy(shape: &[usize], values: &[f64], as_f64: bool) -> Vec<u8> {
     let sizes: String = shape.iter().map(|n| format!("{n}, ")).collect();
     let kind = if as_f64 { "<f8" } else { "<f4" };

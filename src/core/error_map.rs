@@ -29,8 +29,8 @@ pub struct ErrorMap {
     pub share_above: f64,
 }
 
-/// Why a shorter step along rays makes a different picture instead of a more accurate one, and what to set instead, as the end of a
-/// sentence. None if a shorter step is more accurate.
+/// Why the difference from a picture with a shorter step does not show the error of the step along rays, and what to set instead: there are no steps,
+/// other settings choose them, or the step is part of a filter. The text follows a colon. None if a shorter step makes the picture more accurate.
 pub fn step_fault(scene: &Scene) -> Option<&'static str> {
     let settings = &scene.settings;
     if scene.is_flat() || settings.mode == Mode::Cube || scene.still().is_some() {
@@ -51,10 +51,12 @@ pub fn step_fault(scene: &Scene) -> Option<&'static str> {
     )
 }
 
-/// The scene with half the step along rays. For surfaces alone it is half the step of their detector, which may be shorter than `ray.step`.
+/// The scene with half the step along rays. If the scene shows surfaces and composites no volume, the new step is half the step of the surface
+/// detector, which may be shorter than `ray.step`.
 ///
 /// # Errors
-/// The reason why half the step tells nothing about the error of this picture, and what to set instead, as the end of a sentence.
+/// The reason why half the step tells nothing about the error of this picture, and what to set instead (the text follows a colon), or a fault of the
+/// new settings.
 pub fn finer(scene: &Scene) -> Result<Scene, String> {
     if let Some(why) = step_fault(scene) {
         return Err(why.into());
@@ -88,7 +90,7 @@ pub fn finer(scene: &Scene) -> Result<Scene, String> {
 /// between both pictures.
 ///
 /// # Errors
-/// One line: the pictures differ in size or have fewer than 3 channels.
+/// One line: the pictures differ in size or in their number of channels, or have fewer than 3 channels.
 pub fn error_map(picture: &Texels, finer: &Texels, tolerance: f64) -> Result<ErrorMap, String> {
     if picture.size != finer.size || picture.channels != finer.channels || picture.channels < 3 {
         return Err(format!("error map: {:?} and {:?} cannot be compared", picture.size, finer.size));

@@ -23,24 +23,24 @@ pub struct Plan {
 /// What has to run again after a change of scene or shaders.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Rerun {
-    /// The geometry, the type of the samples, or the size or format of slots that frames fill differ: all slots are made again, and all frames have
-    /// to be sent again.
+    /// The geometry (apart from the motor's travel during a frame), the type or range of the samples, or the slots that frames fill, with their sizes
+    /// and formats, differ. All slots are made again, and all frames have to be sent again.
     Everything,
-    /// All frames have to be sent again, through stage 1.
+    /// All frames have to be sent again, through stage 1 (preprocess).
     Frames,
     /// These steps over the volume and the picture have to run again, given by their indices in [`Plan::steps`], and the CPU has to compute these
     /// slots again.
     Steps { steps: Vec<usize>, slots: Vec<Slot> },
 }
 
-/// The most expensive part of a rendering that has to run again. The variants ascend from the least to the most expensive.
+/// The most expensive part of a rendering that has to run again. The variants are in ascending order of cost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Work {
-    /// Only planes beside a rendering and stage 4. Both take little time.
+    /// Only planes beside a rendering and stage 4 (postprocess), both of which take little time.
     Tone,
-    /// Stage 3, on the distance map that exists.
+    /// Stage 3 (shade), with the distance map as it is.
     Shading,
-    /// Stage 2: rays are cast again.
+    /// Stage 2 (raycast): rays are cast again.
     Rays,
 }
 
@@ -56,7 +56,7 @@ impl Work {
 }
 
 impl Plan {
-    /// The work that these steps are, given by their indices in [`Plan::steps`].
+    /// The most expensive work among these steps, which are given by their indices in [`Plan::steps`]. [`Work::Tone`] if there are none.
     pub fn work(&self, scene: &Scene, steps: impl IntoIterator<Item = usize>) -> Work {
         let of_planes = |slot: &Slot| matches!(slot, Slot::SharpSectionVolume | Slot::SectionVolume);
         let work_of = |step: &Step| match step.pass.stage {
@@ -91,7 +91,7 @@ impl Plan {
         self.slots.iter().map(|s| s.bytes(scene)).sum()
     }
 
-    /// A description of the plan: passes with the reason why each is needed or not, the visible region, and slots with their bytes.
+    /// A description of the plan in several lines: passes with the reason why each is needed or not, the visible region, and slots with their bytes.
     pub fn explain(&self, scene: &Scene) -> String {
         let mut text = String::new();
         let mut stage = None;
@@ -186,8 +186,8 @@ impl Plan {
         format!("{last}, the last pass of a frame, writes them into the 3D image; of up to {at_once} frames at once")
     }
 
-    /// What has to run again after a change from `old` to `new`; `self` is the plan of `new`. It does not know what settings mean: steps are compared
-    /// by their parameters, shaders and slots, and a step that reads a slot that changes runs again too.
+    /// What has to run again after a change from `old` to `new`; `self` is the plan of `new`. Steps are compared by their shaders, constants,
+    /// parameters and slots, without knowledge of what settings mean. A step that reads a slot that changes runs again too.
     pub fn rerun(&self, old: &Scene, new: &Scene) -> Rerun {
         let before = Plan::new(old);
         // The slots that frames fill. Everything else can be computed again from them.
@@ -249,8 +249,8 @@ impl Plan {
 pub type Contents = BTreeMap<Slot, (&'static str, u32)>;
 
 impl Plan {
-    /// Marks further steps in `stale` (for each step, true if it has to run): those whose result a stale step reads from a slot in which a later
-    /// filter of the chain has overwritten it. `contents`: which step's result each slot holds now.
+    /// Marks further steps in `stale` (for each step, true if it has to run): those whose result a stale step reads from a slot that holds the result
+    /// of another step by now. `contents`: which step's result each slot holds.
     pub fn complete(&self, scene: &Scene, stale: &mut [bool], contents: &Contents) {
         'again: loop {
             let mut now = contents.clone();
@@ -275,7 +275,8 @@ impl Plan {
     }
 }
 
-/// Ranges of slices that have to be recomputed if the marked slices have changed and each result depends on `reach` neighbours on either side.
+/// Ranges of slices that have to be recomputed if the slices that are true in `changed` have changed and each result depends on `reach` neighbours on
+/// either side. They are in rising order and do not overlap.
 pub fn affected(changed: &[bool], reach: u32) -> Vec<Range<u32>> {
     let mut runs: Vec<Range<u32>> = Vec::new();
     for slice in (0..changed.len() as u32).filter(|s| changed[*s as usize]) {
@@ -289,7 +290,7 @@ pub fn affected(changed: &[bool], reach: u32) -> Vec<Range<u32>> {
 }
 
 impl Step {
-    /// Number of neighbouring slices on either side that this step reads, for a pass over the volume.
+    /// Number of further slices on either side of a dispatch's slices that this step reads; 0 if it reads no such neighbours.
     pub fn reach(&self, scene: &Scene) -> u32 {
         let reads = self.pass.reads(scene, &self.args());
         reads.iter().map(|b| if let Part::Around(more) = b.part { more } else { 0 }).max().unwrap_or(0)

@@ -56,7 +56,7 @@ impl Axis {
         self.at(self.len().saturating_sub(1) as f64)
     }
 
-    /// Mean distance between neighbours; 0 for a single position.
+    /// Mean distance between neighbours; 0 for fewer than two positions.
     pub fn pitch(&self) -> f64 {
         match self {
             Axis::Even { pitch, count, .. } if *count > 1 => *pitch,

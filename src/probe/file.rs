@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 /// Largest size of a probe file, bytes.
 pub(super) const MAX_BYTES: u64 = 1 << 20;
-/// Thickness of the slab as which a single frame is drawn where the probe file states none, mm.
+/// Thickness, mm, of the slab that a single frame is drawn as if its file states none.
 pub const SLAB: f64 = 1.0;
 /// Time stamps are rounded: a motor that turns by one frame in a frame's time may seem to turn by so much more, as a share.
 const ROUNDED: f64 = 1e-3;
@@ -45,8 +45,8 @@ impl ProbeFile {
         ProbeFile { path: path.into(), tables, interval: None }.checked()
     }
 
-    /// Makes a probe file of its tables, given as a JSON object, and checks it as [`ProbeFile::read`] does. `path` only names their origin in
-    /// messages; nothing is read from there.
+    /// Makes a probe file of its tables, given as a JSON object, and checks it as [`ProbeFile::read`] does. `path` is only the name of their origin
+    /// in messages; nothing is read from there.
     ///
     /// # Errors
     /// Unknown keys, values of another type, and numbers out of their range: one line that names `path` and the field.
@@ -60,8 +60,8 @@ impl ProbeFile {
         Ok(self)
     }
 
-    /// The probe file in the folder of a recording: `<stem>.probe.toml`, which is for this recording alone, otherwise `probe.toml`,
-    /// which is for all recordings of the folder. None if there is neither.
+    /// Looks for the probe file of a recording in the folder of the recording. `<stem>.probe.toml` is for this recording alone; if there is none,
+    /// `probe.toml` is for all recordings of the folder. None if there is neither.
     pub fn find_for(recording: &Path) -> Option<PathBuf> {
         let own = recording.file_stem().map(|stem| {
             let mut name = stem.to_os_string();
@@ -71,12 +71,13 @@ impl ProbeFile {
         own.into_iter().chain([recording.with_file_name("probe.toml")]).find(|p| p.is_file())
     }
 
-    /// Path of the file that was read.
+    /// Path of the file that was read, or of the origin that [`ProbeFile::from_json`] was given.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// The same probe file for a recording whose time stamps state an interval of `interval` s between frames; None if it has no time stamps.
+    /// The same probe file for a recording whose time stamps state an interval of `interval` s between frames; None: the recording has no time
+    /// stamps. Only `motion.steady` needs the interval.
     pub fn timed(self, interval: Option<f64>) -> ProbeFile {
         ProbeFile { interval, ..self }
     }
@@ -86,7 +87,8 @@ impl ProbeFile {
         self.tables.samples.range
     }
 
-    /// Angle between the first and the last frame of a volume that is swept as a fan, degrees. None for other motions.
+    /// Angle between the first and the last frame of a volume that is swept as a fan, degrees. None for other motions, or if the file does not state
+    /// it.
     pub fn fan_angle(&self) -> Option<f64> {
         let motion = &self.tables.motion;
         let table = motion.frame_angles_deg.as_ref().and_then(|table| Some(table.last()? - table.first()?));
@@ -171,8 +173,8 @@ impl ProbeFile {
     /// probe stands still during a frame ([`Advance::None`]); [`Volumes::swept`] adds the motor's motion in a volume.
     ///
     /// # Errors
-    /// The probe file has a table for another number of lines or frames, there are fewer frames than one volume, or numbers make no valid
-    /// [`Probe`].
+    /// The probe file lacks a key or has two that exclude each other, has a table for another number of lines or frames, or has numbers that make no
+    /// valid [`Probe`]; or there are fewer frames than one volume.
     pub fn geometry(&self, samples: usize, lines: usize, frames: usize) -> Result<(Probe, Volumes), InputError> {
         let mut volumes = self.volumes(frames)?;
         let (motion, slices) = self.motion(volumes.frames)?;
@@ -326,7 +328,7 @@ impl ProbeFile {
     }
 }
 
-/// The error of a geometry as an error of `file`, which the geometry comes from.
+/// Converts the error of a geometry to an error of the file that the geometry comes from.
 pub fn geometry_error(file: &Path, error: &GeometryError) -> InputError {
     InputError::new(file, error.field, &error.fault)
 }

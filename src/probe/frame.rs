@@ -9,7 +9,7 @@ pub struct Frame {
     pub volume: u32,
     /// Index in its volume in order of acquisition, from 0.
     pub number: u32,
-    /// Index in its volume in geometric order, from 0. Of K frames a volume it is K - 1 - `number` if the volume was swept backwards.
+    /// Index in its volume in geometric order, from 0: it equals `number`, but is K - 1 - `number` in a volume of K frames that was swept backwards.
     pub slice: usize,
     /// True if the volume was swept backwards.
     pub backward: bool,

@@ -30,14 +30,15 @@ pub enum Motion {
     Still { thickness: f64 },
 }
 
-/// Distance that the motor travels while a frame is acquired line by line: signed, in the unit of the slice axis (rad or mm).
+/// Change of a slice's position while its frame is acquired line by line, in the unit of the slice axis (rad or mm). Line n of L lines is at the
+/// slice's position + advance n / L. The advance is negative if the position falls from line to line, whatever the order in time.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Advance {
     /// The motor stops for each frame.
     None,
-    /// The same distance for every slice: the motor moves in one direction, and the slices are uniformly spaced.
+    /// The same change for every slice: the motor moves in one direction, lines fire in one order, and the slices are uniformly spaced.
     Same(f64),
-    /// One distance for each slice: lines fire in both orders, or the slices are not uniformly spaced.
+    /// One change for each slice: lines fire in both orders, or the slices are not uniformly spaced.
     Each(Vec<f64>),
 }
 
@@ -54,7 +55,7 @@ pub struct Probe {
     /// Number of samples of a line, at least 2.
     pub samples: usize,
     pub motion: Motion,
-    /// Position of each slice when its line 0 was acquired, in geometric order: rad or mm, see [`Motion`].
+    /// Position of each slice at the time of its line 0, in geometric order: rad or mm, see [`Motion`].
     pub slices: Axis,
     pub advance: Advance,
     /// Speed of sound, m/s.
@@ -145,7 +146,7 @@ impl Probe {
         self.slices.at(slice) + self.advance_at(slice) * line / self.lines.len() as f64
     }
 
-    /// Distance that the motor travels while the frame at a fractional slice is acquired, rad or mm: see [`Advance`].
+    /// Change of the slice's position while the frame at a fractional slice index is acquired, rad or mm: see [`Advance`].
     pub fn advance_at(&self, slice: f64) -> f64 {
         match &self.advance {
             Advance::None => 0.0,
@@ -187,7 +188,8 @@ impl Probe {
         }
     }
 
-    /// Fractional indices of a point in space. Closed form: the line does not depend on the slice.
+    /// Fractional indices of a point in space. Sample and line follow from the in-plane point alone; the slice follows from its position and the
+    /// line.
     pub fn to_indices(&self, place: DVec3) -> Indices {
         let (x, y, position) = self.inverse_sweep_map(place);
         let (sample, line) = self.plane_indices(x, y);
@@ -416,7 +418,7 @@ impl Probe {
     }
 }
 
-/// How the frames of a recording make up volumes.
+/// How the frames of a recording make up volumes, and how the motor moves in them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Volumes {
     /// Number of frames of a volume (K).

@@ -69,7 +69,7 @@ impl Geometry {
 }
 
 impl Geometry {
-    /// True if the two geometries differ at most in the motor's travel during a frame, which moves only the later lines of each slice.
+    /// True if the two geometries differ at most in the motor's travel during a frame ([`Advance`]), which leaves line 0 of each slice where it is.
     pub fn equals_except_advance(&self, other: &Geometry) -> bool {
         match (self, other) {
             (Geometry::Sweep(a), Geometry::Sweep(b)) => {
@@ -80,8 +80,8 @@ impl Geometry {
         }
     }
 
-    /// True if the two geometries differ at most in the motor's travel during a frame and in the line that fires first. Each slice of one is
-    /// then at most as far from the same slice of the other as the motor travels during both.
+    /// True if the two geometries differ at most in the motor's travel during a frame and in the line that fires first. The distance of each slice in
+    /// one from the same slice in the other is then at most the sum of both travels.
     pub fn equals_except_travel(&self, other: &Geometry) -> bool {
         let (Geometry::Sweep(a), Geometry::Sweep(b)) = (self, other) else { return self == other };
         let moved = Geometry::Sweep(Probe { slices: a.slices.clone(), ..b.clone() });
@@ -103,8 +103,8 @@ impl Geometry {
         self == other || (self.equals_except_advance(other) && travels(self) == travels(other))
     }
 
-    /// The geometry of a volume that has slices of both directions: slice k is as in `backward` if `marked[k]` is true, otherwise as in `self`.
-    /// None for Cartesian geometries, if the last lines of neighbouring slices would cross, or if the two geometries differ in more than the
+    /// The geometry of a volume with slices of both directions of the motor: slice k is as in `backward` if `marked[k]` is true, otherwise as in
+    /// `self`. None for Cartesian geometries, if the last lines of neighbouring slices would cross, or if the two geometries differ in more than the
     /// motor's travel.
     pub fn with_mixed_directions(&self, backward: &Geometry, marked: &[bool]) -> Option<Geometry> {
         let (Geometry::Sweep(forward), Geometry::Sweep(back)) = (self, backward) else { return None };

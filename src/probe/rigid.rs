@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 /// A rigid motion: a rotation about a point, then a shift. Axes are lateral, depth and elevation.
 ///
-/// Its text has six numbers with commas between them: the shift, mm, then the turn, degrees.
+/// As text it is six numbers with commas between them: the shift, mm, then the rotation vector, degrees. The text does not contain the point.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Rigid {
     /// The translation after the rotation, mm.
@@ -31,7 +31,7 @@ impl Rigid {
         self.turn.length()
     }
 
-    /// The motion of a map that has no scale, with this point as [`Rigid::about`].
+    /// The motion that a map without scale makes, with this point as [`Rigid::about`].
     pub fn of(map: &DAffine3, about: DVec3) -> Rigid {
         let turn = DQuat::from_mat3(&map.matrix3).to_scaled_axis() / 1f64.to_radians();
         Rigid { shift: map.transform_point3(about) - about, turn, about }

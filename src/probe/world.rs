@@ -74,7 +74,8 @@ impl World {
         self.directions().determinant() < 0.0
     }
 
-    /// The map of the same voxels after their axes were put in another order. `size`: number of voxels along the stored axes.
+    /// The map of the same voxels after their axes were put in another order, from indices in that order. `size`: number of voxels along the stored
+    /// axes.
     pub fn reordered(&self, order: &AxisOrder, size: [usize; 3]) -> World {
         let mut origin = self.origin();
         let axes = [0, 1, 2].map(|drawn| {
@@ -90,8 +91,9 @@ impl World {
         World { voxel_to_world: DMat4::from_cols(x, y, z, origin.extend(1.0)) }
     }
 
-    /// The grid on which the volume is drawn: its axes are those of the lattice, and its coordinates are the world's, rotated into them. For a
-    /// lattice that is parallel to the axes of the world, the coordinates are the world's. `size`: number of voxels along the axes.
+    /// The grid on which the volume is drawn. Its axes are those of the lattice, and its coordinates are the components of world positions along
+    /// these axes. For a lattice that is parallel to the axes of the world, the coordinates are the world's. `size`: number of voxels along the axes
+    /// of the lattice.
     pub fn grid(&self, size: [usize; 3]) -> Grid {
         let spacing = [0, 1, 2].map(|n| self.axis(n).length());
         let origin = self.directions().transpose() * self.origin();
@@ -132,7 +134,8 @@ const RIGID_TOLERANCE: f64 = 1e-3;
 /// Farthest place of a pose, mm.
 const MAX_DISTANCE: f64 = 1e6;
 
-/// True if the map is a rotation, to within 0.06 degrees and 0.1 % of scale, and a translation of at most 1 km.
+/// True if the map is a rotation (its axes are perpendicular to within 0.06 degrees and have length 1 to within 0.05 %) and a translation of at most
+/// 1 km along each axis.
 pub fn is_rigid(pose: &DAffine3) -> bool {
     let turn = pose.matrix3;
     let off = (turn.transpose() * turn - DMat3::IDENTITY).to_cols_array();
@@ -150,12 +153,12 @@ fn largest(step: DVec3) -> usize {
     (1..3).fold(0, |main, n| if step[n].abs() > step[main].abs() { n } else { main })
 }
 
-/// The order in which the stored axes of a Cartesian volume are drawn as lateral, depth and elevation.
+/// Which stored axes of a Cartesian volume are drawn as lateral, depth and elevation, and in which direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AxisOrder {
-    /// For lateral, depth and elevation the stored axis (0 is the fastest) that is drawn as it.
+    /// The stored axes (0 is the fastest) that are drawn as lateral, depth and elevation, in this order.
     pub stored: [usize; 3],
-    /// For lateral, depth and elevation: true if it is drawn from the last index of the stored axis to the first.
+    /// For lateral, depth and elevation: true if the axis is drawn from the last index of the stored axis to the first.
     pub reversed: [bool; 3],
 }
 
@@ -192,7 +195,8 @@ impl AxisOrder {
     /// The order in which axes are drawn as they are stored.
     pub const STORED: AxisOrder = AxisOrder { stored: [0, 1, 2], reversed: [false; 3] };
 
-    /// An order that keeps the handedness and draws the given stored axis as depth. If possible, drawn slices are stored frames.
+    /// An order that keeps the handedness and draws the given stored axis as depth. If depth is stored axis x or y, each drawn slice is one stored
+    /// frame ([`AxisOrder::keeps_frames`]).
     pub fn with_depth(depth: DepthAxis) -> AxisOrder {
         let (stored, reversed) = match (depth.axis, depth.reversed) {
             (0, false) => ([1, 0, 2], [true, false, false]),
@@ -205,8 +209,9 @@ impl AxisOrder {
         AxisOrder { stored, reversed }
     }
 
-    /// The order for an image orientation of the PLUS toolkit: two or three letters, one for each stored axis. M(arked) and U(nmarked) are
-    /// lateral, F(ar) and N(ear) depth, A(scending) and D(escending) elevation; without a third letter it is A. None for other words.
+    /// The order for an image orientation of the PLUS toolkit: two or three letters, one for each stored axis. M(arked) and U(nmarked) are lateral,
+    /// F(ar) and N(ear) depth, A(scending) and D(escending) elevation; U, N and D reverse the axis. A missing third letter is A. None for other
+    /// words.
     pub fn of_plus(word: &str) -> Option<AxisOrder> {
         let letters: Vec<char> = word.chars().chain("A".chars().filter(|_| word.len() == 2)).collect();
         let mut order = AxisOrder { stored: [3; 3], reversed: [false; 3] };
@@ -225,8 +230,8 @@ impl AxisOrder {
         (letters.len() == 3 && order.stored.iter().all(|n| *n < 3)).then_some(order)
     }
 
-    /// The stored order with the lateral or the elevation axis reversed, so that a left-handed lattice becomes right-handed. The first of the
-    /// two that runs against the world's axes is chosen, else the lateral one.
+    /// The stored order with either the lateral or the elevation axis reversed, so that a left-handed lattice becomes right-handed. Of these two, the
+    /// first that points against an axis of the world is reversed; if neither does, the lateral axis is.
     pub fn with_other_hand(world: &World) -> AxisOrder {
         let is_against = |n: &usize| {
             let step = world.axis(*n);
@@ -236,7 +241,7 @@ impl AxisOrder {
         AxisOrder { stored: [0, 1, 2], reversed: [0, 1, 2].map(|n| n == chosen) }
     }
 
-    /// The order that has the effect of this one, followed by `next`.
+    /// The order that has the effect of this order followed by `next`, whose stored axes are the drawn axes of this order.
     pub fn then(&self, next: &AxisOrder) -> AxisOrder {
         AxisOrder {
             stored: next.stored.map(|n| self.stored[n]),

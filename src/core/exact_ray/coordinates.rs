@@ -23,7 +23,7 @@ impl Line<'_> {
         self.base + self.direction * s
     }
 
-    /// Fractional column, row and slice of the volume at s, whole at the centres of texels; also outside the insonified region.
+    /// Fractional column, row and slice of the volume at s, whole at the centres of texels. They are extrapolated outside the insonified region.
     pub fn coordinates(&self, s: f64) -> [f64; 3] {
         let grid = &self.scene.grid;
         let place = self.place(s);

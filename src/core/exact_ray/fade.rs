@@ -20,7 +20,7 @@ pub struct Fade<'a> {
 }
 
 impl<'a> Fade<'a> {
-    /// None if the line's scene has no fade.
+    /// The fade of the line's scene along the line. None if the scene has no `region.fade`.
     pub fn of(line: &Line<'a>) -> Option<Fade<'a>> {
         let (low, high) = (line.scene.volume_view().low, line.scene.high);
         line.scene.region_fade().map(|length| Fade { line: *line, low, high, length })

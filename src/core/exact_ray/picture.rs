@@ -17,15 +17,15 @@ pub const TOLERANCE: f64 = 1e-12;
 /// The cost of the exact rays of a picture, and their estimated error.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Effort {
-    /// Root mean square, over the rays of a pass, of the estimated error of a ray: of a channel in pictures, of the distance in mm for surfaces.
-    /// The largest of all passes. The estimate is no bound.
+    /// Estimated error of the rays: the root mean square over the rays of a pass; of several passes, the largest. The unit is that of a channel
+    /// (0..1) for pictures and mm for distances of surfaces. The true error may be larger.
     pub estimate: f64,
     /// Number of pieces of rays that were integrated or searched.
     pub pieces: u64,
     pub rays: u64,
 }
 
-/// Why the scene's stage 2 has no exact reference, and what to set instead, as the end of a sentence. None if it has one. Every setting
+/// Why stage 2 (raycast) of the scene has no exact reference, and what to set instead. The text follows a colon. None if it has one. Every setting
 /// that a ray reads is either used by [`replace`] or named here (tests/unit_pure/ray_keys).
 pub fn fault(scene: &Scene) -> Option<String> {
     fault_of(scene).map(str::to_string)
@@ -51,7 +51,7 @@ fn fault_of(scene: &Scene) -> Option<&'static str> {
     scene.detects_surface().then(|| surface::fault(scene)).flatten()
 }
 
-/// Approximate number of segments of all rays of a scene. The time is proportional to it.
+/// Approximate number of segments ([`Segment`](super::Segment)) of all rays of a scene. The time that exact rays take is proportional to it.
 pub fn cost(scene: &Scene) -> f64 {
     let rays = scene.ray_size().iter().map(|n| f64::from(*n)).product::<f64>();
     // A ray crosses a face of a cell on each axis about once a texel.
@@ -60,8 +60,8 @@ pub fn cost(scene: &Scene) -> f64 {
     rays * 2.0 * across / pitch
 }
 
-/// Computes the outputs of a pass of stage 2 by exact rays, in place of the pass's own reference. Returns false, with `writes` unchanged, if the pass
-/// casts no ray through the volume.
+/// Computes the outputs `writes` of a pass of stage 2 (raycast) by exact rays, in place of the pass's own reference, and adds the cost to `effort`.
+/// Returns false, with `writes` unchanged, if the pass casts no ray through the volume.
 pub fn replace(scene: &Scene, pass: &str, reads: &Arrays, writes: &mut Arrays, effort: &mut Effort) -> bool {
     match pass {
         "raycast_volume" => {

@@ -26,17 +26,18 @@ const FOLLOW_LEVEL: f64 = 0.7;
 pub struct Found {
     /// Position of the surface, mm along the line.
     pub place: f64,
-    /// Mean field over the length of an edge (`surface.edge`) behind the place with the largest difference; behind the crossing of the threshold
-    /// where `surface.place` is the first crossing.
+    /// Mean field over one edge length (`surface.edge`) behind the place where the detector's difference is largest. If `surface.place` is the first
+    /// crossing, it is taken behind the crossing of the threshold.
     pub echo: f64,
-    /// Mean field over the depth behind the surface that skin shading averages, outside the insonified region counted as 0. 0 without such shading.
+    /// Mean field over the depth behind the surface that skin shading (`light.skin`) averages. Places outside the insonified region count as 0. It is
+    /// 0 without skin shading.
     pub behind: f64,
-    /// Estimated error of the position, mm. It follows from the error of the detector's difference where that crosses the threshold or has its
-    /// maximum.
+    /// Estimated error of the position, mm: the error of the detector's difference (or of its slope, at a maximum), divided by its slope there.
     pub off: f64,
 }
 
-/// Why the scene's detector is not defined without discrete samples, and what to set instead. None if it is.
+/// Why the scene's surface detector is not defined without discrete samples, and what to set instead. The text follows a colon. None if it is
+/// defined.
 pub fn fault(scene: &Scene) -> Option<&'static str> {
     let surface = &scene.settings.surface;
     match surface {
@@ -54,8 +55,8 @@ pub fn fault(scene: &Scene) -> Option<&'static str> {
     }
 }
 
-/// Finds the scene's surface on a line from 0 to `path` mm. None if there is none. `before`: how far the line may be followed in front of 0, mm. Adds
-/// the number of pieces that were integrated to `pieces`.
+/// Finds the scene's surface on a line, between 0 and `path` mm from its base. None if there is none. `before`: length of the line in front of the
+/// base that the detector may use, mm. Adds the number of pieces that were integrated to `pieces`.
 pub fn surface(line: &Line, volume: &Texels, path: f64, before: f64, pieces: &mut u64) -> Option<Found> {
     let scene = line.scene;
     let edge = scene.ring.step * f64::from(scene.ring.half);

@@ -63,8 +63,8 @@ pub struct Medium<'a> {
 }
 
 impl<'a> Medium<'a> {
-    /// The medium of a transfer function without fade or tint. `points`: control points in rising order, at least one; samples below `threshold` are
-    /// transparent; a piece is halved until both quadrature rules differ by no more than `tolerance`.
+    /// The medium of a transfer function without fade or tint, in which no ray has a hit ([`Light::hit`]). `points`: control points in rising order,
+    /// at least one; samples below `threshold` are transparent; a piece is halved until both quadrature rules differ by no more than `tolerance`.
     pub fn new(points: &[TransferPoint], threshold: f64, absorption: Absorption, tolerance: f64) -> Medium<'a> {
         let mut levels: Vec<f64> = [0.0, 1.0].into_iter().chain(points.iter().map(|p| p.at)).collect();
         levels.extend((threshold > 0.0).then_some(threshold));

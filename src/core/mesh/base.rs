@@ -3,8 +3,8 @@
 //! Rows of a slice run into the body. In each column the first crossing of the threshold stays where it is, and from there on everything is
 //! inside, up to one plane for all columns. A column that crosses nowhere stays empty.
 
-/// Fills everything behind the surface, as seen from the probe, down to a flat base, so that the mesh can be printed. It reads all slices twice:
-/// [`Base::survey`] finds the deepest point of the surface, [`Base::fill`] fills.
+/// Fills everything behind the surface, as seen from the probe, down to a flat base, so that the mesh can be printed. The caller passes all slices
+/// twice: first to [`Base::survey`], which finds the deepest point of the surface, then to [`Base::fill`].
 #[derive(Clone, Debug)]
 pub struct Base {
     width: usize,
@@ -32,8 +32,8 @@ impl Base {
         self.deepest
     }
 
-    /// Second reading: copies a slice to `out` and fills each column from its first value of at least the threshold down to the last row of `out`.
-    /// `out` may have more rows than `slice`; their values are NaN in columns that are not filled.
+    /// Second reading: copies a slice to `out`. In each column, from the first value of at least the threshold down to the last row of `out`, a value
+    /// becomes the largest one so far. `out` may have more rows than `slice`; these rows are NaN in columns without such a value.
     pub fn fill(&self, slice: &[f64], out: &mut [f64]) {
         for column in 0..self.width {
             let mut values = slice.iter().skip(column).step_by(self.width);

@@ -46,7 +46,8 @@ pub(crate) fn is_ambiguous(inside: u8, axis: usize, side: usize) -> bool {
     edges_of_face(axis, side).iter().all(|edge| is_crossed(inside, *edge))
 }
 
-/// The other crossed edge with which a crossed edge is joined on a face.
+/// The edge with which the crossed edge `edge` is joined on a face: the surface meets the face in a line from one to the other. If all four edges are
+/// crossed, it is the other edge at the same inside corner.
 pub(crate) fn partner(inside: u8, axis: usize, side: usize, edge: usize) -> usize {
     let crossed = |other: &usize| *other != edge && is_crossed(inside, *other);
     let edges = edges_of_face(axis, side);

@@ -21,7 +21,7 @@ pub enum MeshFile {
 /// Colours of vertices, sRGB.
 #[derive(Clone, Copy, Debug)]
 pub enum Colours<'a> {
-    /// One colour for all vertices, without light.
+    /// One colour for all vertices, which contains no light: the program that shows the mesh lights it.
     One([u8; 3]),
     /// A colour for each vertex, from a picture that already contains the light.
     OfPicture(&'a [[u8; 3]]),
@@ -55,7 +55,7 @@ impl MeshFile {
     /// Writes a mesh to a file.
     ///
     /// # Errors
-    /// The mesh is too large for the format, or the file cannot be written. No file is left then.
+    /// The mesh is too large for the format, or the file cannot be written. Whatever was at `path` before is then unchanged.
     pub fn write(self, mesh: &Mesh, colours: Colours, path: &Path) -> Result<(), InputError> {
         let write = || {
             let mut file = Unfinished::create(path)?;

@@ -24,7 +24,7 @@ pub struct Mesh {
     pub triangles: Vec<[u32; 3]>,
     /// How far the mesh is from closed; 0 for a closed surface. For [`nets`] it is the number of lattice edges at which the surface continues without
     /// a triangle, at the border of the known values; for [`quadrics`] and [`sheet`] the number of triangle edges that do not belong to two
-    /// triangles.
+    /// triangles. [`simplify`] keeps the number of the mesh that it simplifies.
     pub open_edges: u64,
 }
 

@@ -70,8 +70,9 @@ pub(crate) fn cells_of(size: [usize; 3], closed: bool) -> [usize; 3] {
 }
 
 impl<P: Fn(DVec3) -> DVec3> Builder<P> {
-    /// `place` maps fractional voxel indices to mm. If it mirrors, the order of the vertices is reversed, so that triangles are still anticlockwise
-    /// as seen from outside.
+    /// `closed`: whether the surface is closed at the border of the lattice ([`Surface::closed`](super::nets::Surface::closed)). `place` maps
+    /// fractional voxel indices to mm. If it mirrors, the order of the vertices is reversed, so that triangles are still anticlockwise as seen from
+    /// outside.
     pub fn new(closed: bool, place: P) -> Builder<P> {
         let turned = place(DVec3::X) - place(DVec3::ZERO);
         let turned = turned.cross(place(DVec3::Y) - place(DVec3::ZERO)).dot(place(DVec3::Z) - place(DVec3::ZERO));

@@ -31,8 +31,8 @@ impl Smoother {
         Smoother { width: size[0], kernels, depth: size[2], slices: VecDeque::new(), first: 0 }
     }
 
-    /// Writes the smoothed slice `z` to `out`. Slices must be requested in order. `raw` fills a slice with the values before smoothing, NaN where
-    /// they are not known; these stay NaN.
+    /// Writes the smoothed slice `z` to `out`. Slices must be requested in rising order. `raw(n, slice)` fills `slice` with the values of slice n
+    /// before smoothing, NaN where they are not known; these stay NaN.
     pub fn slice(&mut self, z: usize, out: &mut [f64], raw: impl Fn(usize, &mut [f64])) {
         let reach = self.kernels[2].len() - 1;
         let (from, to) = (z.saturating_sub(reach), (z + reach).min(self.depth.saturating_sub(1)));

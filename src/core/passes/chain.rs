@@ -90,18 +90,18 @@ impl Chain {
     }
 }
 
-/// The slot that holds the distance map after all filters of it.
+/// The slot that holds the distance map after all its filters; the unfiltered map ([`Slot::Distance`]) if no filter runs.
 pub fn distance_end(scene: &Scene) -> Slot {
     Chain::Distances.end(scene)
 }
 
-/// The slot that holds the picture after all filters of it.
+/// The slot that holds the picture after all its filters; the unfiltered picture ([`Slot::Picture`]) if no filter runs.
 pub fn picture_end(scene: &Scene) -> Slot {
     Chain::Pictures.end(scene)
 }
 
-/// The slot that frames are copied into as they arrive, without any pass: the only filter of slices would store its input without loss, and no other
-/// pass reads the frames. None if a pass converts or filters the frames.
+/// The slot that frames are copied into as they arrive, without any pass, because the only filter of slices would store its input without loss and no
+/// section volume is made from the frames. None if a pass converts or filters the frames.
 pub fn copied(scene: &Scene) -> Option<Slot> {
     if scene.has_sections() {
         return None;
@@ -142,8 +142,8 @@ impl Pass {
         }
     }
 
-    /// The slots (read, written) of a dispatch of a chain's filter. For an observer only the slot that is read counts: it writes slots of its own.
-    /// None for a pass that is no link of a chain.
+    /// The slots (read, written) of a dispatch of a chain's filter. For an observer ([`Link::Observer`]) only the first is meaningful: it writes
+    /// slots of its own. None for a pass that is no link of a chain.
     pub fn link_slots(&self, scene: &Scene, args: &DispatchArgs) -> Option<(Slot, Slot)> {
         let (chain, step) = match self.link {
             Link::Filter(filter) => (filter.chain, args.iteration / (filter.dispatches)(scene)),
@@ -187,8 +187,8 @@ impl Pass {
         (self.writes)(scene, &Dispatch::new(args, self.link_slots(scene, args)))
     }
 
-    /// Computes the outputs of a dispatch from the formula in f64, over all of the pass's extent. Texels that stay NaN are not written by the
-    /// dispatch. For the frame array, `reads` holds only the layers of the dispatch.
+    /// Computes the outputs of a dispatch by the formulas of the pass in f64, over all of the pass's extent. Texels that stay NaN are not written by
+    /// the dispatch. For the frame array, `reads` holds only the layers of the dispatch.
     pub fn reference(&self, scene: &Scene, args: &DispatchArgs, reads: &Arrays, writes: &mut Arrays) {
         let slots = self.link_slots(scene, args);
         if self.frequency != Frequency::Frame {
@@ -222,14 +222,14 @@ impl Pass {
         }
     }
 
-    /// Number of slices that one dispatch makes if frames are not batched: all of the volume for a pass over volumes, 1 for any other pass.
+    /// Number of slices that one dispatch writes if frames are not batched: all slices of the volume for a pass over volumes, 1 for any other pass.
     pub fn slices(&self, scene: &Scene) -> u32 {
         if self.frequency == Frequency::Volume { scene.slices() } else { 1 }
     }
 
-    /// The rectangle of each slice that a pass over slices has to compute: the visible part and as much around it as later filters read, or the whole
-    /// slice where the pass only observes it or a later filter reads all of it. None for passes that compute all of their extent: filters each of
-    /// whose texels depends on the complete slice (AOS, RKL1), and passes that are no part of the chains of slices.
+    /// The rectangle of each slice that a pass over slices has to compute: the visible part and as much around it as later filters read. It is the
+    /// whole slice if the pass only observes the slice or a later filter reads all of it. None for passes that compute all of their extent: filters
+    /// each of whose texels depends on the complete slice (AOS, RKL1), and passes that are no part of the chains of slices.
     pub fn rectangle(&self, scene: &Scene, args: &DispatchArgs) -> Option<Rectangle> {
         let all = Rectangle { first: [0; 2], size: scene.grid.size };
         let mut around = [0, 0];
@@ -287,8 +287,8 @@ impl Pass {
         }
     }
 
-    /// Computes the content of the outputs after a dispatch: the reference within the rectangle that the dispatch makes, and what `writes` held
-    /// before around it.
+    /// Computes the content of the outputs after a dispatch: the reference within the rectangle that the dispatch writes ([`Pass::rectangle`]), and
+    /// around it what `writes` held before the call.
     pub fn expected(&self, scene: &Scene, args: &DispatchArgs, reads: &Arrays, writes: &mut Arrays) {
         let before = writes.clone();
         self.reference(scene, args, reads, writes);

@@ -8,7 +8,8 @@ use std::ops::Range;
 pub struct Lattice<'a> {
     /// Columns, rows, slices.
     pub size: [usize; 3],
-    /// Two set texels belong together if they are at most this many slices, one column and one row apart: the reach of an interpolated sample.
+    /// How many slices apart two set texels of one part may be at most. Along columns and rows they may be one apart. This is the reach of an
+    /// interpolated sample.
     pub slices: usize,
     /// Size of a texel, in units of the caller, by row and slice: entry `slice * rows + row`.
     pub sizes: &'a [u64],

@@ -9,10 +9,10 @@ use crate::scene::{Input, Scene, SceneError, Settings};
 /// Number of samples that each invocation takes from the volume.
 pub const SAMPLES: u32 = 256;
 
-/// The passes that measure how fast the device samples a volume and copies a picture.
+/// The passes that measure how fast the device samples a volume (by its filter, by eight fetches, by one fetch) and copies a picture.
 pub const MEASURES: &[Pass] = &[FILTERED, EIGHT_FETCHES, ONE_FETCH, COPY];
 
-/// Takes samples by the device's trilinear filter.
+/// Takes [`SAMPLES`] samples for each pixel by the device's trilinear filter and writes their mean.
 pub const FILTERED: Pass = Pass {
     name: "measure_filtered",
     shader: |_, _| "measure/sampling",
@@ -29,7 +29,8 @@ pub const FILTERED: Pass = Pass {
     ..Pass::OF_RAYS
 };
 
-/// Takes samples by interpolation in the shader: eight texels each, fetched or loaded in the way that is fastest on the device.
+/// The same as [`FILTERED`], with interpolation in the shader: it takes eight texels for each sample, fetched or loaded in the way that is fastest on
+/// the device.
 pub const EIGHT_FETCHES: Pass = Pass {
     name: "measure_eight_fetches",
     reads: |_, _| vec![whole("volume", Slot::Volume)],

@@ -33,7 +33,7 @@ pub enum Change {
     Extent { pass: &'static str, by: fn(&mut [u32; 3]) },
     /// Changes the values of a table that the CPU makes from the scene.
     Table { slot: Slot, by: fn(&Scene, &mut [f32]) },
-    /// Changes the bytes of an uploaded frame; the function gets bytes per texel, texels per line and number of lines.
+    /// Changes the bytes of an uploaded frame. The function gets three numbers (bytes per texel, texels per line, number of lines) and the bytes.
     Frame(fn([usize; 3], &mut [u8])),
     /// Makes the sampler take the nearest texel instead of interpolating.
     Nearest,
@@ -64,8 +64,8 @@ pub enum Command {
 }
 
 impl Change {
-    /// Applies the fault to the parameters of a dispatch. Returns true if they differ afterwards. `constants`, `args`, `extent`, `table` and `frame`
-    /// do the same for their last argument.
+    /// Applies the fault to the parameters of a dispatch. Returns true if that changed them. `constants`, `args`, `extent`, `table` and `frame` do
+    /// the same with their last argument.
     pub fn numbers(&self, pass: &Pass, scene: &Scene, params: &mut Params) -> bool {
         match self {
             Change::Numbers { pass: name, by } if pass.name.starts_with(name) => changed(params, |p| by(scene, p)),
@@ -79,7 +79,7 @@ impl Change {
         found.is_some_and(|(_, value)| changed(value, |v| *v = by(*v)))
     }
 
-    /// Applies the fault to the SPIR-V words of a shader. Returns true if they differ afterwards.
+    /// Applies the fault to the SPIR-V words of a shader. Returns true if that changed them.
     ///
     /// # Errors
     /// The module is invalid, or lacks the instruction or name to change.
@@ -137,7 +137,8 @@ impl Change {
         before != bytes
     }
 
-    /// True if the fault can change the output of a pass for a scene.
+    /// True if the fault can change the output of this pass in a scene, so that a comparison of the pass with its reference may notice it. False for
+    /// `Clear`, `Specialize` and `Invalidate` of [`Command`], which other checks have to notice.
     pub fn concerns(&self, pass: &Pass, scene: &Scene) -> bool {
         let args = |iteration| DispatchArgs { layer: 2, slice: scene.slices() / 2, slices: 1, iteration, image: 0 };
         let turns: Vec<DispatchArgs> = (0..(pass.repeat)(scene)).map(args).collect();

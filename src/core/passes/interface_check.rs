@@ -51,8 +51,8 @@ const OPTIONAL: [&str; 37] = [
     "volume_layer",
 ];
 
-/// Rewrites a pass's shader for a scene: removes the textures and tables that the scene does not have, and makes an array image of each texture
-/// whose slot has layers in this scene.
+/// Rewrites a pass's shader for a scene. Optional textures and tables that the pass does not bind in this scene are removed. Textures whose slot is
+/// an array of layers in this scene become array images.
 ///
 /// # Errors
 /// The SPIR-V module is invalid.
@@ -64,8 +64,8 @@ pub fn for_scene(pass: &Pass, scene: &Scene, args: &DispatchArgs, words: &[u32])
     volumes_to_layers(&words, &layered).map_err(|e| e.to_string())
 }
 
-/// Rewrites a pass's shader for fast execution on a CPU: parameters are loaded once, textures that are only fetched become storage images, and tables
-/// become storage texel buffers where `stores` is true for their slot.
+/// Rewrites a pass's shader for fast execution on a CPU: parameters are loaded once. Of the slots for which `stores` is true, textures that are only
+/// fetched become storage images and tables become storage texel buffers. `stores`: whether the device can bind a slot in that way.
 ///
 /// # Errors
 /// The SPIR-V module is invalid.
@@ -113,7 +113,8 @@ fn image_format(format: Format) -> Option<ImageFormat> {
     })
 }
 
-/// Checks a pass's declaration against its shader's reflection.
+/// Checks a pass's declaration against its shader's reflection: bindings, parameters and constants, and that the width of a workgroup is a multiple
+/// of 8.
 ///
 /// # Errors
 /// The first disagreement, with what the declaration and the shader say.
@@ -215,7 +216,7 @@ fn type_name(member: &Member) -> String {
     if member.components == 1 { scalar.into() } else { format!("{scalar} x {}", member.components) }
 }
 
-/// Packs the parameters into the bytes of the block that the shader declares.
+/// Packs the parameters into the bytes of the parameter block that the shader declares. A member without a parameter of its name is 0.
 pub fn pack(module: &Module, params: &Params) -> Vec<u8> {
     let mut block = vec![0; module.params_size as usize];
     for member in &module.params {

@@ -8,9 +8,9 @@ pub(super) fn floats(values: impl IntoIterator<Item = f64>) -> Vec<f32> {
     values.into_iter().map(|v| v as f32).collect()
 }
 
-/// The fractional (sample, line) of every slice pixel, row by row, for scan conversion; (-1, -1) where a pixel is left out. With an apron of 0 the
-/// rule of the PLUS toolkit applies: both neighbours must exist in both directions, so that the last sample and line are left out. Empty for a
-/// Cartesian volume.
+/// The fractional (sample, line) of every slice pixel, row by row, for scan conversion; (-1, -1) where a pixel is left out. Pixels outside the sector
+/// are left out unless they are within the apron around it (`Scene::apron`, slice pixels). With an apron of 0 the rule of the PLUS toolkit applies:
+/// both neighbours must exist in both directions, so that the last sample and line are left out. Empty for a Cartesian volume.
 pub fn scan_lut(scene: &Scene) -> Vec<f32> {
     let Some(probe) = scene.probe() else { return Vec::new() };
     let [width, height] = scene.grid.size;
@@ -36,9 +36,9 @@ pub fn tgc(scene: &Scene) -> Vec<f32> {
     }))
 }
 
-/// Fractional (sample, line) that the slice pixel at (x, y), mm as of [`SliceGrid`](crate::scene::SliceGrid), shows. None outside the sector and its
-/// apron. Samples are counted after decimation: with the factor M, sample j is sample j M of the frame, and pixels beyond the last sample take the
-/// last.
+/// Fractional (sample, line) that a slice pixel shows. (x, y) is its place in the coordinates of [`SliceGrid`](crate::scene::SliceGrid), mm. None
+/// outside the sector and its apron. Samples are counted after decimation: with the factor M, sample j is sample j M of the frame, and pixels beyond
+/// the last sample take the last.
 pub fn scan_index(scene: &Scene, probe: &Probe, x: f64, y: f64) -> Option<(f64, f64)> {
     let (sample, line) = probe.plane_indices(x, y);
     let factor = f64::from(scene.decimation());
@@ -101,8 +101,9 @@ pub(super) fn sweep_border(probe: &Probe) -> [f64; 2] {
     [first - margin, last + margin].map(|position| sweep_parameter(probe.motion, position))
 }
 
-/// Position in the sweep, in mean slice pitches from slice 0, at `ray.entries` equidistant abscissae from the first slice to the last: the tangent of
-/// half the angle of a fan, otherwise mm. For a uniform sweep that is the fractional slice index. Empty for a Cartesian volume.
+/// Position in the sweep, in mean slice pitches from slice 0, at `ray.entries` equidistant abscissae from the first slice to the last. The abscissa
+/// is the tangent of half the angle of a fan, otherwise mm. For a uniform sweep the position is the fractional slice index. Empty for a Cartesian
+/// volume.
 pub fn sweep_lut(scene: &Scene) -> Vec<f32> {
     let Some(probe) = scene.probe() else { return Vec::new() };
     let entries = scene.settings.ray.entries;
@@ -113,9 +114,9 @@ pub fn sweep_lut(scene: &Scene) -> Vec<f32> {
     }))
 }
 
-/// Fractional line index divided by the number of lines, which is the share of the frame that was acquired before, at `ray.entries` equidistant
-/// abscissae from the first line to the last: the tangent of half the line's angle (of a quarter for a radial probe), or mm for a linear array. Empty
-/// for a Cartesian volume.
+/// Fractional line index divided by the number of lines, which is the share of the frame that was acquired before the line. It is given at
+/// `ray.entries` equidistant abscissae from the first line to the last: the tangent of half the line's angle (of a quarter for a radial probe), or mm
+/// for a linear array. Empty for a Cartesian volume.
 pub fn line_lut(scene: &Scene) -> Vec<f32> {
     let Some(probe) = scene.probe() else { return Vec::new() };
     let entries = scene.settings.ray.entries;
@@ -127,8 +128,8 @@ pub fn line_lut(scene: &Scene) -> Vec<f32> {
     }))
 }
 
-/// For every slice its position from slice 0 and the motor's travel during its frame, both in mean slice pitches. Empty for a Cartesian
-/// volume.
+/// For every slice two values: its position from slice 0, and the motor's travel during its frame ([`Advance`]), both in mean slice pitches. Empty
+/// for a Cartesian volume.
 pub fn slice_table(scene: &Scene) -> Vec<f32> {
     let Some(probe) = scene.probe() else { return Vec::new() };
     let pitch = probe.slices.pitch();
@@ -182,8 +183,8 @@ pub(super) fn transfer_integral_within(low: [f64; 4], high: [f64; 4], share: f64
     })
 }
 
-/// For each entry of the transfer function the number of entries before it that are not transparent, and at the end the number of all entries that
-/// are not.
+/// For each entry of the transfer function the number of entries before it that are not transparent. One more value follows at the end: the number of
+/// all entries that are not transparent.
 pub fn opaque_before(scene: &Scene) -> Vec<f32> {
     let absorption: Vec<f32> = transfer_table(scene).chunks_exact(4).map(|entry| entry[3]).collect();
     let mut before = vec![0.0];
@@ -194,7 +195,7 @@ pub fn opaque_before(scene: &Scene) -> Vec<f32> {
     before
 }
 
-/// Table over the sample values at the begin and the end of a step, that at the end fastest: mean colour and absorption of the step
+/// Table over the sample values at the begin and the end of a step, with the value at the end fastest: mean colour and absorption of the step
 /// ([`transfer::pre_integrated`]).
 pub fn pre_integrated_table(scene: &Scene) -> Vec<f32> {
     floats(transfer::pre_integrated(&transfer_of(scene)).into_iter().flatten())
@@ -253,7 +254,7 @@ fn shares(bytes: &[u8]) -> Vec<f32> {
     bytes.iter().map(|byte| f32::from(*byte) / 255.0).collect()
 }
 
-/// The colour of each of 256 labels: red, green and blue in 0..1, and 1.
+/// The colour of each of 256 labels: red, green and blue in 0..1, and 1. Labels without a colour have four zeros.
 pub(super) fn label_colours(scene: &Scene) -> Vec<f32> {
     let colours = scene.labels().map_or(&[][..], LabelVolume::colours);
     let entry = |n: usize| colours.get(n).map_or([0.0; 4], |[r, g, b]| [*r as f32, *g as f32, *b as f32, 1.0]);
@@ -291,8 +292,9 @@ fn side_code(side: Side) -> u32 {
     }
 }
 
-/// The table of bricks for shaders, x fastest, then y, four floats each: the ranges of tile columns, tile rows and slices that its samples may touch
-/// (packed as first * 4096 + last, exact in f32), and its [`Side`] as a number (0 outside, 1 across, 2 inside).
+/// The table of bricks (cubes in space that rays may skip) for shaders, x fastest, then y. Each brick has four floats: the ranges of tile columns,
+/// tile rows and slices that its samples may touch (packed as first * 4096 + last, exact in f32), and its [`Side`] as a number (0 outside, 1 across,
+/// 2 inside).
 pub fn brick_table(scene: &Scene) -> Vec<f32> {
     let packed = |[first, last]: [u32; 2]| (first * 4096 + last) as f32;
     let entry = |reach: &Reach| {

@@ -46,7 +46,7 @@ pub enum Frequency {
     Picture,
 }
 
-/// The numbers that differ between two dispatches of the same pass and scene. The default is one frame in slice 0.
+/// The arguments of a dispatch: the numbers in which two dispatches of the same pass and scene differ. The default is one frame in slice 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DispatchArgs {
     /// The layer of the frame array that holds the first frame of the dispatch.
@@ -57,7 +57,7 @@ pub struct DispatchArgs {
     pub slices: u32,
     /// Number of the dispatch, from 0, among those of a pass that repeats.
     pub iteration: u32,
-    /// Index of the volume image: which copy of multibuffered slots the dispatch uses.
+    /// Index of the volume image, of the two or three that are filled and shown in rotation: it selects the copy of multibuffered slots.
     pub image: u32,
 }
 
@@ -87,7 +87,7 @@ impl<'a> Dispatch<'a> {
         self.link().0
     }
 
-    /// The slot that this link of the chain writes.
+    /// The slot that this link of the chain writes. It is meaningless for an observer ([`Link::Observer`]), which writes slots of its own.
     ///
     /// # Panics
     /// If the pass is no link of a chain: [`Link::None`] or [`Link::AfterSlices`].
@@ -120,14 +120,14 @@ impl Deref for Dispatch<'_> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
     Whole,
-    /// Of a 3D texture the dispatch's slices; of an array of layers the first ones, one for each of these slices; of a 2D image or a buffer all of
-    /// it.
+    /// The part depends on the shape of the slot. Of a 3D texture it is the dispatch's slices, of an array of layers the first layers, one for each
+    /// of these slices, of a 2D image or a buffer all of it.
     Slices,
     /// The layers of the frame array from [`DispatchArgs::layer`] on, one for each frame of the dispatch.
     Layers,
     /// The dispatch's slices of a 3D texture, and this many more on either side.
     Around(u32),
-    /// The whole slot, which sets the size of an indirect dispatch: its first three texels are the number of workgroups along x, y and z, which the
+    /// The whole slot, which sets the size of an indirect dispatch. Its first three texels are the number of workgroups along x, y and z, which the
     /// device reads when it executes the dispatch.
     Groups,
 }
@@ -190,13 +190,13 @@ pub(super) fn filtered<'a>(
 /// A sequence of filters. Each reads the output of the one before it. Their order is that of [`PASSES`](super::PASSES).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Chain {
-    /// The slices of stage 1, from the frame to the 3D texture.
+    /// The slices of stage 1 (preprocess), from the frame to the 3D texture.
     Slices,
     /// The slices of the section volume ([`Slot::SectionVolume`]), which planes beside a rendering are cut from.
     Sections,
-    /// The distance maps of stage 3.
+    /// The distance maps of stage 3 (shade).
     Distances,
-    /// The pictures of stage 4.
+    /// The pictures of stage 4 (postprocess).
     Pictures,
 }
 
@@ -220,14 +220,14 @@ pub(super) fn of_sections(scene: &Scene, need: Need) -> Need {
 /// How a pass takes part in a filter chain. The slots that it reads and writes, and the part of a slice that it makes, follow from this.
 #[derive(Clone, Copy)]
 pub enum Link {
-    /// It takes no part: the pass names its own slots and computes all of its extent.
+    /// The pass takes no part: it names its own slots and computes all of its extent.
     None,
-    /// It filters the output of the link before it.
+    /// The pass filters the output of the link before it.
     Filter(Filter),
-    /// It reads what the chain holds at this place of [`PASSES`](super::PASSES) and writes slots of its own. If it stands after the last filter, it
-    /// reads the end of the chain.
+    /// The pass reads what the chain holds at its place in [`PASSES`](super::PASSES) and writes slots of its own. If it stands after the last filter,
+    /// it reads the end of the chain.
     Observer(Chain),
-    /// It reads the finished slices of the volume, and makes the visible part of each slice of its own output.
+    /// The pass reads the finished slices of the volume, and computes the visible part of each slice of its own output.
     AfterSlices,
 }
 
@@ -235,21 +235,23 @@ pub enum Link {
 #[derive(Clone, Copy)]
 pub struct Filter {
     pub chain: Chain,
-    /// Number of dispatches of one step. What they hand on to each other is in slots of the pass's own.
+    /// Number of dispatches of one step. They hand intermediate results on to each other in slots of the pass's own.
     pub dispatches: fn(&Scene) -> u32,
-    /// How many columns and rows around a texel one step reads; for slices only. None if each texel depends on the complete slice. The filters before
-    /// it compute that much more than the visible part.
+    /// How many columns and rows around a texel one step reads; used only for slices. None if each texel depends on the complete slice. The filters
+    /// before this one compute that much more than the visible part.
     pub reach: fn(&Scene) -> Option<[u32; 2]>,
     /// Number of adjacent texels that one invocation makes, along the axis along which the pass's extent is shorter than the slice.
     pub run: u32,
-    /// True if a step would store its input without loss. If it is the only filter of its chain it is left out, and frames are copied.
+    /// True if a step would store its input without loss. If it is then the only filter of [`Chain::Slices`], and no section volume is made, it is
+    /// left out and frames are copied.
     pub copies: fn(&Scene) -> bool,
-    /// True if the next filter could read this step's input instead of its output. If another filter follows, the step is left out.
+    /// True if the next filter could read this step's input instead of its output. If it is then the first of several filters of its chain, it is
+    /// left out.
     pub is_identity: fn(&Scene) -> bool,
 }
 
 impl Filter {
-    /// A filter of this chain that reads one texel for each that it writes, and takes one dispatch a step.
+    /// A filter of this chain that reads one texel for each that it writes, takes one dispatch a step and is never left out.
     pub const fn of(chain: Chain) -> Filter {
         Filter { chain, dispatches: once, reach: |_| Some([0; 2]), run: RUN, copies: |_| false, is_identity: |_| false }
     }
@@ -263,7 +265,7 @@ impl Filter {
 /// Whether a scene needs a pass: `Ok` with the reason, or `Err` with the reason why not. `--explain` prints it.
 pub type Need = Result<&'static str, &'static str>;
 
-/// The largest error that a pass may have against its reference on the test inputs.
+/// The largest error that a pass may have against its reference on the test inputs, beside the rounding of the output's format.
 #[derive(Clone, Copy, Debug)]
 pub struct Tolerance {
     /// Absolute error, in the units of the output.
@@ -299,30 +301,32 @@ impl Tolerance {
     }
 }
 
-/// The declaration of a compute pass, the only place where it is described. Callers use the methods with the names of the fields.
+/// The declaration of a compute pass, the only place where it is described. Callers use methods of the same names in place of the functions in fields
+/// (`invocations` for `extent`, `numbers` for `params`); only `repeat` has no method.
 pub struct Pass {
     /// Unique name: debug label, name of its time stamps and of its test case.
     pub name: &'static str,
     pub stage: Stage,
     pub frequency: Frequency,
-    /// The part that it has in a filter chain.
+    /// How the pass takes part in a filter chain.
     pub link: Link,
-    /// Path of the shader below glsl/, with its variant.
+    /// Path of the shader below glsl/, with the variant behind a dot if it has several.
     pub shader: fn(&Scene, &Dispatch) -> &'static str,
     pub needed: fn(&Scene) -> Need,
     pub reads: fn(&Scene, &Dispatch) -> Vec<Bind>,
     pub writes: fn(&Scene, &Dispatch) -> Vec<Bind>,
     /// Number of invocations (not workgroups) along x, y and z.
     pub extent: fn(&Scene, &DispatchArgs) -> [u32; 3],
-    /// Number of dispatches in a row; [`DispatchArgs::iteration`] counts them.
+    /// Number of dispatches in a row that a run of the pass takes; [`DispatchArgs::iteration`] counts them.
     pub repeat: fn(&Scene) -> u32,
     /// The parameters of a dispatch. They may change from picture to picture without a new pipeline.
     pub params: fn(&Scene, &DispatchArgs) -> Params,
-    /// Specialization constants: the structure of a dispatch. Another value is another pipeline.
+    /// Specialization constants, by name: they select the code that a dispatch runs. Another value makes another pipeline.
     pub constants: fn(&Scene, &Dispatch) -> Vec<(&'static str, i32)>,
     pub tolerance: Tolerance,
-    /// Computes the outputs of a dispatch from the formula in f64, in arrays named as in the shader: inputs, then outputs. Texels that it leaves NaN
-    /// are not written by the dispatch. For a pass over frames it is called once a frame, with that frame's layer of every array of layers.
+    /// Computes the outputs of a dispatch by the formulas of the pass in f64. The two [`Arrays`] are the inputs and the outputs, under their names in
+    /// the shader. Texels that it leaves NaN are not written by the dispatch. For a pass over frames it is called once a frame, with that frame's
+    /// layer of every array of layers.
     pub reference: fn(&Scene, &Dispatch, &Arrays, &mut Arrays),
 }
 
@@ -399,7 +403,7 @@ pub(super) fn rendering_extent(scene: &Scene, _: &DispatchArgs) -> [u32; 3] {
     [scene.rendering_size()[0], scene.rendering_size()[1], 1]
 }
 
-/// Number of adjacent texels that one invocation of most filters computes, because their windows share most texels: RUN of glsl/filter.
+/// Number of adjacent texels that one invocation of most filters computes, because the windows of adjacent texels overlap: RUN of glsl/filter.
 pub const RUN: u32 = 4;
 
 /// Number of invocations along each axis that make `texels`, each a run of [`RUN`] texels along `axis`.
@@ -407,7 +411,7 @@ pub(crate) fn in_runs(texels: [u32; 3], axis: usize) -> [u32; 3] {
     in_runs_of(RUN, texels, axis)
 }
 
-/// Number of invocations along each axis that make `texels`, each a run of `run` texels along `axis`.
+/// Number of invocations along each axis that compute `texels`, if each computes a run of `run` texels along `axis`.
 pub fn in_runs_of(run: u32, mut texels: [u32; 3], axis: usize) -> [u32; 3] {
     texels[axis] = texels[axis].div_ceil(run);
     texels
@@ -449,7 +453,8 @@ fn finite(value: f64) -> f32 {
 }
 
 impl Params {
-    /// Adds a float. Infinities become the largest finite float, so that shaders need not handle them.
+    /// Adds a float. Values beyond the range of f32, also infinities, become the largest finite float of their sign, so that shaders need not handle
+    /// infinities.
     pub fn f32(mut self, name: &'static str, value: f64) -> Params {
         self.0.push((name, Value::F32(finite(value))));
         self

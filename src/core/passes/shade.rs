@@ -482,8 +482,9 @@ fn place(scene: &Scene, distances: &Texels, x: i64, y: i64) -> Option<(DVec3, f6
 }
 
 /// Unit normal of the surface at a pixel, towards the viewer; None where nothing was hit. No difference is taken across a cliff (another surface). Of
-/// the two differences along an axis the steeper one counts less, by weights as in a WENO scheme of second order (Liu, Osher and Chan 1994). A pixel
-/// between two cliffs that rise the same way lies on a flank as steep as the lower one; between two others it faces the viewer.
+/// the two differences along an axis the steeper one counts less, by weights as in a WENO scheme of second order (Liu, Osher and Chan 1994). If both
+/// neighbours along an axis are beyond cliffs, the lower cliff gives the slope where the distance changes the same way across both; otherwise the
+/// slope is 0. A miss counts as an infinitely high cliff.
 pub fn normal(scene: &Scene, distances: &Texels, x: i64, y: i64) -> Option<DVec3> {
     let (here, distance) = place(scene, distances, x, y)?;
     let slope = |dx: i64, dy: i64, facing: DVec3| {

@@ -8,19 +8,20 @@ use crate::probe::StoredType;
 use crate::scene::planes::{TILE_VECTORS, cell};
 use crate::scene::{Propagation, Scene, SurfaceColour, VolumeFormat, WindowTexels};
 
-/// Largest number of batches of frames in flight, and of entries of the staging ring. The frame array has layers for each entry.
+/// Largest number of batches of frames in flight, which is also the number of entries of the staging ring. The frame array has a range of layers for
+/// each entry.
 pub const BATCHES_IN_FLIGHT: u32 = 4;
 
 /// Most frames that go through stage 1 at once. Submitting a batch of so many costs little more than a single frame.
 const MAX_FRAMES: u64 = 16;
 
-/// Largest size in bytes of the samples of a batch, and of each slot between its filters, unless a single frame is larger. A CPU's caches hold this
+/// Largest size in bytes of the samples of a batch, and of the slices between two filters, unless a single frame is larger. A CPU's caches hold this
 /// much; a GPU works on it several times longer than the host needs to submit it.
 pub fn batch_bytes(scene: &Scene) -> u64 {
     if scene.is_for_cpu() { 4 << 20 } else { 16 << 20 }
 }
 
-/// Largest number of consecutive frames that go through stage 1 together, each pass in one dispatch; at least 1.
+/// Largest number of consecutive frames that go through stage 1 (preprocess) together, each pass in one dispatch; at least 1.
 pub fn frames_per_batch(scene: &Scene) -> u32 {
     let bytes =
         |[width, height]: [u32; 2], format: Format| u64::from(width) * u64::from(height) * format.texel_bytes() as u64;
@@ -64,14 +65,14 @@ const COST: &str = "cost of a candidate above that of no surface";
 /// Of samples of the recording.
 const SHARE_OF_RANGE: &str = "share of the range of the recording's samples, 0..1, before the grey window";
 
-/// What fills a slot first.
+/// How a slot gets its content: passes write it, uploaded frames fill it, or the CPU computes it.
 #[derive(Clone, Copy)]
 pub enum Initializer {
     ByPasses,
     ByFrames,
     /// The CPU computes the content from the scene in f64 and stores it as f32.
     ByScene(fn(&Scene) -> Vec<f32>),
-    /// The CPU finds the content by a search in a complete volume.
+    /// The CPU computes the content by a search in a complete volume.
     ByVolume(Search),
 }
 
@@ -82,17 +83,17 @@ pub struct Search {
     pub name: &'static str,
     /// The slot of the volume that is searched.
     pub within: Slot,
-    /// The search. Its second argument is all texels of the slot `within`, in the format of that slot.
+    /// The search. Its second argument is all texels of the slot `within`, as bytes in the format of that slot.
     pub find: fn(&Scene, &[u8]) -> Found,
-    /// The same search in f64, by another method; it returns the content of the slot that is searched for.
+    /// The same search in f64, by another method. It returns the content of the slot that the search fills.
     pub reference: fn(&Scene, &Texels) -> Texels,
 }
 
 /// What a search found.
 pub struct Found {
-    /// Content of the slot, in its format.
+    /// Bytes of the slot that the search fills, in its format.
     pub texels: Vec<u8>,
-    /// The start surface, and whether fluid was recognised, if the search was for the render start; else None.
+    /// The start surface, and whether fluid was recognised, if the search was for the render start (`unveil`); otherwise None.
     pub unveiled: Option<Unveiled>,
 }
 
@@ -210,7 +211,7 @@ slots! {
     /// next pixel.
     SliceShares = D::image("slice_shares", slices, |_| Format::R32f).across_queues().of(GREY, "share, 0..1");
     SliceForward = D::image("slice_forward", slices, |_| Format::R32f).across_queues().of(GREY, SHARE_OF_RANGE);
-    /// A slice diffused along its rows.
+    /// AOS on slices: a slice after the diffusion along its rows.
     SliceRows = D::image("slice_rows", slices, |_| Format::R32f).across_queues().of(GREY, SHARE_OF_RANGE);
     /// AOS with Richardson's extrapolation: a slice after a complete step. `SliceHalfStep` is the slice after the first of two half steps.
     SliceStep = D::image("slice_step", slices, |_| Format::R32f).across_queues().of(GREY, SHARE_OF_RANGE);
@@ -293,8 +294,8 @@ slots! {
         lookup_tables::opaque_before,
         ByContent,
     ).of(GREY, "entries of the transfer function");
-    /// Position in the sweep in mean distances of slices from slice 0, which is the slice index if slices are equidistant, over the tangent of half
-    /// the angle of a fan, otherwise mm. The direction of the motor only stretches the span of positions.
+    /// Position in the sweep, in mean distances of slices from slice 0, which is the slice index if slices are equidistant. The abscissa is the
+    /// tangent of half the angle of a fan, otherwise mm. The table is the same for both directions of the motor.
     SweepLut = D::table(
         "sweep_lut",
         entries,
@@ -325,7 +326,8 @@ slots! {
         lookup_tables::transfer_integral,
         ByContent,
     ).of(&["red", "green", "blue", "absorption"], "colour 0..1; absorption of one slice pixel");
-    /// The mean colour and absorption of a step between every two sample values. It is compared by the transfer function, which is shorter.
+    /// The mean colour and absorption of a step between every two sample values. Whether two scenes differ in it is told by the transfer function,
+    /// which is shorter.
     PreIntegrated = D::table(
         "pre_integrated",
         |s| Shape::Buffer(16 * (s.transfer_entries().pow(2)) as u32),
@@ -377,8 +379,8 @@ slots! {
         .of(GREY, "share of the densest matter, 0..1");
     LightPyramid8 = D::image("light_pyramid_8", |s| light_level(s, 8), |_| Format::R16f)
         .of(GREY, "share of the densest matter, 0..1");
-    /// Light that leaves the last layer of cells that a dispatch lit, towards the next layer. Dispatches alternate between `LightFrontA` and
-    /// `LightFrontB`.
+    /// Light that leaves the last layer of cells that a dispatch lit, towards the next layer of the light volume. Dispatches alternate between
+    /// `LightFrontA` and `LightFrontB`.
     LightFrontA = D::image("light_front_a", |s| light_layer(s, false), |_| Format::Rgba32f)
         .of(COLOUR, "light; 1 is that of an unshadowed light of strength 1");
     LightFrontB = D::image("light_front_b", |s| light_layer(s, false), |_| Format::Rgba32f)
@@ -391,7 +393,7 @@ slots! {
         .of(&["red", "green", "blue", "density"], "light: share of what came; share of the densest matter");
     LightScatteredB = D::image("light_scattered_b", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f)
         .of(&["red", "green", "blue", "density"], "light: share of what came; share of the densest matter");
-    /// Back light that leaves the last layer of cells of twice the edge that a dispatch lit; dispatches alternate between `BackFrontA` and
+    /// Back light, in cells of twice the edge: what leaves the last layer of cells that a dispatch lit. Dispatches alternate between `BackFrontA` and
     /// `BackFrontB`. `BackLight` is the back light that arrives in each of these cells, and the density of its matter.
     BackFrontA = D::image("back_front_a", |s| light_layer(s, true), |_| Format::Rgba32f)
         .of(COLOUR, "light; 1 is that of an unshadowed light of strength 1");
@@ -399,8 +401,8 @@ slots! {
         .of(COLOUR, "light; 1 is that of an unshadowed light of strength 1");
     BackLight = D::image("back_light", |s| light_level(s, 1), |_| Format::Rgba16f)
         .of(&["red", "green", "blue", "density"], "light: share of what came; share of the densest matter");
-    /// Ambient light, which comes from the side of the probe, and back light, in cells of twice the edge: their sum by colour, and the ambient light
-    /// alone.
+    /// In cells of twice the edge: the sum of ambient light, which comes from the side of the probe, and back light (red, green, blue), and the
+    /// ambient light alone (alpha).
     LightAmbient = D::image("light_ambient", |s| light_level(s, 1), |_| Format::Rgba16f)
         .of(COLOUR, "light; 1 is that of an unshadowed light of strength 1");
     /// Light that white matter in each cell scatters towards the viewer, by colour, and the ambient light that arrives there.
@@ -460,15 +462,16 @@ slots! {
     /// Adaptive supersampling: the colour of one ray through the middle of each pixel. `EdgeMarks` is 1 in pixels that have all rays.
     PixelRays = D::image("pixel_rays", per_pixel_of_rendering, |_| Format::Rgba16f).of(COLOUR, "share, 0..1");
     EdgeMarks = D::image("edge_marks", per_pixel_of_rendering, |_| Format::R8).of(GREY, "1 in pixels that have several rays");
-    /// With a tolerance: the colours of the rays through every other pixel of every other row. `LatticeErrors` has their colours on the screen and
-    /// their errors.
+    /// With a tolerance (`ray.tolerance`): the colours of the rays through every other pixel of every other row. `LatticeErrors` has their colours on
+    /// the screen and their errors.
     Lattice = D::image("lattice", |s| Shape::Two(tolerance::lattice_size(s)), |_| Format::Rgba16f).of(COLOUR, "share, 0..1");
     LatticeErrors = D::image("lattice_errors", |s| Shape::Two(tolerance::lattice_size(s)), |_| Format::Rgba32f)
         .of(&["red", "green", "blue", "error"], "colour and error on the screen, 0..1; no error is certain");
-    /// With a tolerance: the error of each pixel, 0..1 of the screen; 0 is certain.
+    /// With a tolerance: the estimated error of each pixel, as a share of the screen's range 0..1. It is 0 only where the pixel is certain, for
+    /// example because its ray meets only empty bricks.
     PixelErrors = D::image("pixel_errors", per_ray, |_| Format::R32f).of(GREY, "error on the screen, 0..1; 0 is certain");
-    /// With a tolerance: a bit for each pixel of a tile of 8 x 8, set if its error is too large. `MarkedBefore` is the number of such pixels in the
-    /// tiles before.
+    /// With a tolerance: two words for each tile of 8 x 8 pixels, with a bit for each pixel that is set if its error is too large. `MarkedBefore` is
+    /// the number of such pixels in the tiles before.
     ErrorMarks = D::image("error_marks", |s| Shape::Two(tolerance::tiles(s)), |_| Format::Rg32u)
         .of(&["rows 0 to 3", "rows 4 to 7"], "bits of pixels of a tile");
     MarkedBefore = D::image("marked_before", |s| Shape::Two(tolerance::tiles(s)), |_| Format::R32u).of(GREY, "pixels");
@@ -486,7 +489,8 @@ slots! {
     PictureShares = D::image("picture_shares", per_pixel, |_| Format::R32f).of(GREY, "share, 0..1");
     PictureForward = D::image("picture_forward", per_pixel, |_| Format::Rgba32f).of(COLOUR, "share, 0..1");
     PictureRows = D::image("picture_rows", per_pixel, |_| Format::Rgba32f).of(COLOUR, "share, 0..1");
-    /// The labels of a scene that shows them, in the box that holds them all, and the share of the surroundings of each voxel that has one.
+    /// The number of the label of each voxel in the box that holds all labels, if the scene shows labels. `LabelCover` is the share of the
+    /// surroundings of each of these voxels that has a label.
     Labels = D::image("labels", per_label, |_| Format::R8).by_scene(lookup_tables::label_ids, By(lookup_tables::labels_differ))
         .of(GREY, "number of the label / 255; 0 is none");
     LabelCover = D::image("label_cover", per_label, |_| Format::R8).by_scene(lookup_tables::label_cover, By(lookup_tables::labels_differ))
@@ -511,8 +515,8 @@ fn frame_layers(scene: &Scene) -> Shape {
     Shape::Layers([width, height, BATCHES_IN_FLIGHT * frames_per_batch(scene)])
 }
 
-/// A frame array of `layers` layers has a range of layers for each entry of the staging ring. Returns the end (exclusive) of the range that holds
-/// `layer`.
+/// A frame array of `layers` layers has an equal range of layers for each entry of the staging ring ([`BATCHES_IN_FLIGHT`]). Returns the end
+/// (exclusive) of the range that holds `layer`.
 pub fn ring_entry_end(layers: u32, layer: u32) -> u32 {
     let entry = (layers / BATCHES_IN_FLIGHT).max(1);
     layer - layer % entry + entry
@@ -619,7 +623,7 @@ impl Slot {
         &DESCRIPTORS[self as usize]
     }
 
-    /// The search by which the CPU finds the content of this slot. None for slots that are filled otherwise.
+    /// The search by which the CPU computes the content of this slot. None for slots that are filled otherwise.
     pub fn search(self) -> Option<Search> {
         match self.initializer() {
             Initializer::ByVolume(search) => Some(search),
@@ -648,12 +652,12 @@ impl Slot {
         self.descriptor().initializer
     }
 
-    /// True if each volume image has its own copy of the slot.
+    /// True if each volume image (of the two or three volumes that are filled and shown in rotation) has its own copy of the slot.
     pub fn is_multibuffered(self) -> bool {
         self.descriptor().is_multibuffered
     }
 
-    /// True if texels that no pass writes are read as 0.
+    /// True if the slot is cleared to 0 when it is made, so that texels that no pass writes are read as 0.
     pub fn starts_clear(self) -> bool {
         self.descriptor().starts_clear
     }
@@ -663,8 +667,8 @@ impl Slot {
         self.descriptor().crosses_queues
     }
 
-    /// True if the CPU computes the slot's content, from the scene or by a search in the volume, and it differs between these two scenes. False for content
-    /// that passes or frames write.
+    /// True if the CPU computes the slot's content, from the scene or by a search in the volume, and it is not the same for these two scenes. False
+    /// for content that passes or frames write.
     pub fn differs(self, old: &Scene, new: &Scene) -> bool {
         match (self.initializer(), self.descriptor().differs) {
             (Initializer::ByScene(make), ByContent) => make(old) != make(new),
@@ -678,21 +682,20 @@ impl Slot {
         matches!(self.shape(scene), Shape::Layers(_))
     }
 
-    /// True if the slot has one texel for each texel of the volume; [`Slot::PackedNeighbours`] does not count. The device stores only the stored
-    /// bounds of it.
+    /// True if the slot has one texel for each texel of the volume. It is false for [`Slot::PackedNeighbours`]. The device stores only the texels
+    /// within [`Scene::stored_bounds`].
     pub fn is_volume(self) -> bool {
         let of_rays =
             matches!(self, Slot::Volume | Slot::SharpVolume | Slot::WholeVolume | Slot::Floating | Slot::CutVolume);
         of_rays || matches!(self, Slot::SectionVolume | Slot::SharpSectionVolume)
     }
 
-    /// The volume through which rays are cast; cuts and the start surface have been removed from it.
+    /// The volume that rays are cast through: [`Slot::CutVolume`] if cuts or a render start remove parts of the volume, otherwise [`Slot::Volume`].
     pub fn of_rays(scene: &Scene) -> Slot {
         if scene.removes() { Slot::CutVolume } else { Slot::Volume }
     }
 
-    /// The volume that planes are cut from: [`Slot::SectionVolume`] if the scene has it, otherwise the volume before cuts and with its floating
-    /// parts.
+    /// The volume that planes are cut from: [`Slot::SectionVolume`] if the scene has it, otherwise the volume before cuts, with its floating parts.
     pub fn of_planes(scene: &Scene) -> Slot {
         match (scene.has_sections(), scene.drops_floating()) {
             (true, _) => Slot::SectionVolume,
@@ -701,7 +704,7 @@ impl Slot {
         }
     }
 
-    /// The texel of the volume that is texel (0, 0, 0) of the slot's image. 0 for slots that are no volume.
+    /// The texel of the volume (column, row, slice) that is texel (0, 0, 0) of the slot's image. Three zeros for slots without texels of the volume.
     pub fn first_texel(self, scene: &Scene) -> [u32; 3] {
         match self {
             Slot::PackedNeighbours => scene.stored_bounds().low,
@@ -719,13 +722,14 @@ impl Slot {
         }
     }
 
-    /// Size in bytes, of one copy if each volume image has its own.
+    /// Size of the slot in bytes. Of a slot that each volume image has its own copy of, it is the size of one copy.
     pub fn bytes(self, scene: &Scene) -> u64 {
         self.shape(scene).texels() * self.format(scene).texel_bytes() as u64
     }
 }
 
-/// The slot that stages 2 and 3 render into: the picture, unless the picture is assembled from what they render ([`Scene::assembles`]).
+/// The slot that stages 2 (raycast) and 3 (shade) render into: the picture, unless the picture is assembled from what they render
+/// ([`Scene::assembles`]).
 pub fn rendered(scene: &Scene) -> Slot {
     if scene.assembles() { Slot::Rendered } else { Slot::Picture }
 }
@@ -794,7 +798,7 @@ impl Format {
     }
 }
 
-/// Values that the CPU computed from a scene, as texels of a format: bits of floats, or 8 bits of 0..1.
+/// Values that the CPU computed from a scene, as the bytes of texels of a format: 8 bits of 0..1 for `R8`, otherwise the bits of the f32 values.
 pub fn encoded(format: Format, values: &[f32]) -> Vec<u8> {
     match format {
         Format::R8 => values.iter().map(|value| (value * 255.0).round() as u8).collect(),

@@ -6,7 +6,7 @@ use half::f16;
 use std::borrow::Cow;
 use std::ops::Range;
 
-/// An array of texels with `channels` values each; x varies fastest.
+/// An array of texels with `channels` values each. The values of a texel are adjacent; of texels x varies fastest, then y.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Texels {
     pub size: [usize; 3],
@@ -101,7 +101,8 @@ impl Texels {
         }
     }
 
-    /// The opposite of [`Texels::stored_part`]: the slot's whole array, in which texels that the device does not store have the value `outside`.
+    /// The opposite of [`Texels::stored_part`]: from the stored part, the slot's whole array, in which texels that the device does not store have the
+    /// value `outside`.
     pub fn with_outside(self, slot: Slot, scene: &Scene, outside: f64) -> Texels {
         if self.size == slot.array_size(scene) {
             return self;
@@ -165,7 +166,8 @@ impl Texels {
         pair(0) + pair(2)
     }
 
-    /// The bytes that a slot of this format stores, each value rounded as a driver rounds: to nearest, ties to even.
+    /// The bytes that a slot of this format stores. Each value is rounded as a driver does it: to nearest, ties to even. Formats of unsigned integers
+    /// drop the fraction.
     pub fn encode(&self, format: Format) -> Vec<u8> {
         let mut bytes = Vec::with_capacity(self.values.len() * format.channel_bytes());
         for &v in &in_order(format, &self.values)[..] {
@@ -207,7 +209,8 @@ impl Texels {
         Texels::decode([1; 3], format, &one.encode(format)).values[0]
     }
 
-    /// The distance between neighbouring values of this format near `value`, of floats up to twice that; 0.9 for formats of integers.
+    /// The distance between neighbouring values of this format near `value`. For formats of floats it is an upper bound, at most twice the distance.
+    /// For those of unsigned integers, whose values are exact, it is 0.9.
     pub fn spacing(format: Format, value: f64) -> f64 {
         match format {
             Format::R8 | Format::Rgba8 | Format::Bgra8 => 1.0 / 255.0,

@@ -21,8 +21,8 @@ pub enum QueueRole {
 }
 
 impl QueueRole {
-    /// Index of the queue for this work, on a device with `queues` queues: 0 renders, 1 converts frames, 2 copies them. With two queues, copies share
-    /// that of the conversion; with one, all share it.
+    /// Index of the queue for this work, on a device with `queues` queues. Of three queues, 0 renders, 1 converts frames and 2 copies them. With two
+    /// queues, copies share queue 1; with one, all work shares queue 0.
     pub fn queue(self, queues: usize) -> usize {
         (self as usize).min(queues.clamp(1, MAX_QUEUES) - 1)
     }
@@ -74,7 +74,7 @@ impl QueueTracker {
         self.each.len()
     }
 
-    /// Records an operation on a queue. Returns the barrier that it needs in front of it; None if it needs none.
+    /// Records an operation on a queue. Returns the barrier that has to precede it; None if it needs none.
     pub fn record(&mut self, queue: usize, accesses: &[Access]) -> Option<Barrier> {
         let alone = self.count() == 1;
         let me = &mut self.each[queue];
@@ -86,8 +86,8 @@ impl QueueTracker {
         me.tracker.record(accesses)
     }
 
-    /// Begins the recording of a submission to this queue. If the last recording was not submitted, the next operation waits for
-    /// everything before it.
+    /// Begins the recording of a submission to this queue. If the last recording was not submitted, the next operation gets a barrier that waits for
+    /// everything before it on the queue.
     pub fn begin(&mut self, queue: usize) {
         let me = &mut self.each[queue];
         if std::mem::replace(&mut me.recording, true) {
@@ -96,7 +96,7 @@ impl QueueTracker {
         }
     }
 
-    /// The semaphore waits that the recorded submission to this queue needs, without those that other waits imply.
+    /// The semaphore waits that the submission that is being recorded for this queue needs, without those that other waits imply.
     pub fn waits(&self, queue: usize) -> Vec<Wait> {
         let me = &self.each[queue];
         let mut needed = Vec::new();
@@ -113,7 +113,7 @@ impl QueueTracker {
         needed.iter().map(|(wait, _)| *wait).filter(|wait| !implied(wait)).collect()
     }
 
-    /// Records that the recording of this queue was submitted with these waits. The submission signals `value` on the queue's timeline when it is
+    /// Notes that the recording of this queue was submitted with these waits. The submission signals `value` on the queue's timeline when it is
     /// complete.
     pub fn submitted(&mut self, queue: usize, waits: &[Wait], value: u64) {
         self.each[queue].recording = false;

@@ -24,13 +24,13 @@ pub enum Event {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Submission {
     pub queue: usize,
-    /// The value that its queue's timeline has when it is complete.
+    /// The value that the timeline of the queue has when the submission is complete.
     pub value: u64,
     pub waits: Vec<Wait>,
     pub events: Vec<Event>,
 }
 
-/// All submissions in order. It also holds the recordings that are not submitted yet.
+/// All submissions in the order in which they were submitted. It also holds the recordings that are not submitted yet.
 #[derive(Clone, Debug, Default)]
 pub struct SubmissionLog {
     pub submissions: Vec<Submission>,
@@ -53,7 +53,7 @@ impl SubmissionLog {
         self.open.push((queue, Vec::new()));
     }
 
-    /// Records an operation on a queue, behind its barrier if it has one.
+    /// Records an operation on a queue, after its barrier if it has one. Nothing happens if no recording of the queue has begun.
     pub fn record(&mut self, queue: usize, barrier: Option<Barrier>, accesses: &[Access]) {
         let Some((_, events)) = self.open.iter_mut().find(|(of, _)| *of == queue) else { return };
         events.extend(barrier.map(Event::Barrier));

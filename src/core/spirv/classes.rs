@@ -7,12 +7,12 @@ use std::collections::BTreeSet;
 const WORKGROUP: u32 = ::spirv::StorageClass::Workgroup as u32;
 const VOTES: &str = "votes of a subgroup";
 
-/// The classes of instructions that occur in a module, in words such as "arithmetic of floats". Empty if the words are no module.
+/// The classes of instructions that occur in a module, as names such as "arithmetic of floats". Empty if the words are no valid module.
 pub fn classes(words: &[u32]) -> BTreeSet<&'static str> {
     decode(words).unwrap_or_default().iter().filter_map(|i| class(i.opcode, i.operands)).collect()
 }
 
-/// True if the module uses votes among the invocations of a subgroup.
+/// True if the module has operations among the invocations of a subgroup (votes and others).
 pub fn has_votes(words: &[u32]) -> bool {
     classes(words).contains(VOTES)
 }

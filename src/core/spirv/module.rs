@@ -41,7 +41,7 @@ pub(super) const MAX_BOUND: u32 = 0x3f_ffff;
 pub(super) const HEADER_WORDS: usize = 5;
 pub(super) const BOUND: usize = 3;
 
-/// One line for each shader: the SHA-256, in hexadecimal, of compiler options, macros and expanded source; then its name in [`EMBEDDED`].
+/// One line for each shader: the SHA-256, in hexadecimal, of compiler options, macros and expanded source, then the shader's name in [`EMBEDDED`].
 pub const SOURCES: &str = include_str!("../../../spirv/SOURCES");
 
 /// Word of a module's header that names the tool that made it; the lower half is the tool's version.

@@ -23,7 +23,7 @@ enum Change {
     Rounded,
 }
 
-/// A way to translate the instructions of one class wrongly.
+/// A way in which a driver's compiler may translate the instructions of one class wrongly. `what` says how.
 pub struct Mutation {
     pub class: &'static str,
     pub what: &'static str,
@@ -48,7 +48,7 @@ const fn of(class: &'static str, what: &'static str, change: fn(Op, &[u32]) -> O
     Mutation { class, what, spares_loops: false, change }
 }
 
-/// One mutation for each class of instructions. A class without one has none that keeps every module valid.
+/// One mutation for each class of instructions. For some classes there is none, because none would keep every module valid.
 pub const MUTATIONS: &[Mutation] = &[
     of("comparisons of floats", "equal numbers compare the other way", |opcode, _| {
         paired(

@@ -14,7 +14,7 @@ pub const F_ADD: Op = Op::FAdd;
 /// The opcode for the subtraction of floats.
 pub const F_SUB: Op = Op::FSub;
 
-/// Replaces the last instruction `from` of the extended set by `to`, which takes the same operands.
+/// Replaces the last instruction of number `from` of the extended set GLSL.std.450 by number `to`, which takes the same operands.
 ///
 /// # Errors
 /// The module is invalid or has no such instruction.
@@ -97,10 +97,11 @@ pub fn add_to_writes(words: &[u32], image: &str, amount: [f32; 4]) -> Result<Vec
     if writes == 0 { error(format!("the module does not write to '{image}'")) } else { Ok(out) }
 }
 
-/// Rounds every sum, difference, product and quotient of floats in the module to half precision.
+/// Rounds the result of every addition, subtraction, multiplication and division of floats, also of a vector by a scalar, to half precision. Dot and
+/// matrix products are not rounded.
 ///
 /// # Errors
-/// The module is invalid or computes nothing with floats.
+/// The module is invalid or has no such instruction.
 pub fn round_to_half(words: &[u32]) -> Result<Vec<u32>, SpirvError> {
     let instructions = decode(words)?;
     let mut bound = words[BOUND];

@@ -8,8 +8,8 @@ use std::collections::{HashMap, HashSet};
 const ARRAYED: usize = 4;
 const DIMENSION_2D: u32 = 1;
 
-/// Replaces each array of 2D images in the module by a single 2D image, whatever layer the code names. It computes the same if it runs on an array of
-/// one layer.
+/// Replaces each array of 2D images in the module by a single 2D image; the layer that the code names is ignored. The module computes the same as
+/// before on an array of one layer.
 ///
 /// # Errors
 /// The module is invalid, or uses an array of images other than by texels read and written, and by queries of its size.

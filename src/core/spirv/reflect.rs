@@ -79,7 +79,7 @@ pub struct Module {
     pub bindings: Vec<Binding>,
     /// Members of the parameter block, the uniform block `Params`; empty if the module has none.
     pub params: Vec<Member>,
-    /// Size of the parameter block up to the end of its last member, bytes; 0 if the module has none.
+    /// Size of the parameter block up to the end of its last member, bytes; 0 if the module has no parameter block.
     pub params_size: u32,
     /// Specialization constants in the order of their ids.
     pub constants: Vec<Constant>,
@@ -137,7 +137,8 @@ struct Declarations {
 /// Reads the interface of a module.
 ///
 /// # Errors
-/// The module is invalid, or has a kind of binding, texel format or parameter that passes do not have.
+/// The module is invalid, or declares a kind of binding, a format of texel buffers or a type of parameter that this program does not support in any
+/// shader.
 pub fn reflect(words: &[u32]) -> Result<Module, SpirvError> {
     let declared = scan(words)?;
     let mut module = Module { local_size: declared.local_size, ..Module::default() };

@@ -12,11 +12,11 @@ enum Value {
     Word(u32),
 }
 
-/// Writes values of specialization constants, given by `SpecId`, into a module, and evaluates expressions of constants. Constants without a value
-/// keep their defaults.
+/// Writes values of specialization constants, as pairs of `SpecId` and value, into a module, and evaluates expressions of constants. Constants
+/// without a value keep their defaults.
 ///
 /// # Errors
-/// The module is invalid, or has an expression that no shader of this project has.
+/// The module is invalid, or has an expression of a kind that no shader of this project has.
 pub fn specialize(words: &[u32], values: &[(u32, i32)]) -> Result<Vec<u32>, SpirvError> {
     let instructions = decode(words)?;
     let (mut given, mut known) = (HashMap::new(), HashMap::new());

@@ -38,8 +38,8 @@ const LOD: u32 = 2;
 /// Image operands SignExtend and ZeroExtend.
 const EXTEND: u32 = 0x3000;
 
-/// Makes read-only storage images of the textures of these names. Their filtered samples, which a specialization constant prevents, become undefined
-/// values. Everything else computes the same values.
+/// Makes read-only storage images of the textures of these names. Filtered samples of them, in code that a specialization constant switches off,
+/// become undefined values. Everything else computes the same values.
 ///
 /// # Errors
 /// The module is invalid, a name is not that of a texture, or a texture is used other than by fetches without offset and size queries.

@@ -13,8 +13,8 @@ const MIN_POSITIONS: usize = 4096;
 /// Between two positions that are further apart the position is not known, s. At 9600 baud a position takes 20 ms, three requests 60.
 const MAX_GAP: f64 = 0.1;
 
-/// A motor that a thread of its own sweeps until it fails or this value is dropped. Dropping it stops the motor and waits for one request and
-/// its reply, or for all attempts to stop if the module no longer replies.
+/// A motor that a separate thread sweeps until the motor fails or this value is dropped. Dropping it stops the motor. That takes the time of one
+/// request and its reply, or of all attempts to stop if the module no longer replies.
 pub struct BackgroundSweep {
     port: String,
     positions: PositionLog,
@@ -40,10 +40,11 @@ struct State {
 }
 
 impl BackgroundSweep {
-    /// Starts a thread that finds home, unless `homed`, and sweeps until it is stopped. `volumes` of the sweep is ignored.
+    /// Starts a thread that finds home, unless `homed` is true, and sweeps until it is stopped. `volumes` of the sweep is ignored.
     ///
     /// # Errors
-    /// The sweep exceeds the limits of the motor; then nothing moved. Later faults are returned by [`BackgroundSweep::stop`].
+    /// The sweep exceeds the limits of the motor, or no thread can be started; then nothing moved. Later faults are returned by
+    /// [`BackgroundSweep::stop`].
     pub fn start(mut drive: Drive, sweep: Sweep, homed: bool) -> Result<BackgroundSweep, MotorError> {
         let sweep = Sweep { volumes: None, ..sweep };
         let speed = sweep.speed(&drive.table, drive.guard.port().settings().round_trip());
@@ -79,7 +80,7 @@ impl BackgroundSweep {
         self.angle
     }
 
-    /// True if the sweep has ended. [`BackgroundSweep::stop`] returns the reason.
+    /// True if the sweep has ended, also if [`BackgroundSweep::stop`] ended it. `stop` returns the fault, if one ended it.
     pub fn has_ended(&self) -> bool {
         self.thread.as_ref().is_none_or(JoinHandle::is_finished)
     }

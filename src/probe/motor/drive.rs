@@ -61,16 +61,16 @@ impl Drive {
     /// Reads position, speed, switches and watchdog. Moves nothing.
     ///
     /// # Errors
-    /// Any [`Fault`] of the port.
+    /// Any [`Fault`] of the port; a motor that is moving is then stopped if possible.
     pub fn status(&mut self) -> Result<MotorStatus, MotorError> {
         let status = self.read_status();
         self.done("status", status)
     }
 
-    /// Moves the motor until it has found home, from which positions are counted.
+    /// Moves the motor until it has found home, the position from which all others are counted.
     ///
     /// # Errors
-    /// Any [`Fault`]; the motor is then stopped.
+    /// Any [`Fault`]; the motor is then stopped if possible.
     pub fn home(&mut self) -> Result<(), MotorError> {
         let watchdog = self.set_watchdog();
         self.done("home", watchdog)?;
@@ -78,11 +78,11 @@ impl Drive {
         self.done("home", found)
     }
 
-    /// Moves to the start of the sweep and back and forth over it. Call [`Drive::home`] first. Each position that is read is passed to
-    /// `on_position`, with its time in s since `start`, in order of time. Returns the number of passes.
+    /// Moves to the start of the sweep and then back and forth over it. [`Drive::home`] has to be called before. Each position that is read during
+    /// the passes is passed to `on_position`, with its time in s since `start`, in order of time. Returns the number of passes.
     ///
     /// # Errors
-    /// Any [`Fault`], after which the motor is stopped. With [`Fault::OutOfRange`] nothing moved.
+    /// Any [`Fault`], after which the motor is stopped if possible. With [`Fault::OutOfRange`] nothing moved.
     pub fn sweep(
         &mut self,
         sweep: &Sweep,

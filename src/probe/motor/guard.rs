@@ -11,7 +11,7 @@ use crate::files::signals::Held;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Interrupts the operation of a motor from any thread, as a signal does. All clones control the same motor.
+/// Interrupts the operation of a motor from any thread. It has the same effect as a signal to the process. All clones control the same motor.
 #[derive(Clone, Debug, Default)]
 pub struct Interrupter(Arc<AtomicBool>);
 
@@ -113,7 +113,8 @@ impl Guard {
         }
     }
 
-    /// Stops the motor after a fault of `operation`, and returns the fault with whether the stop succeeded.
+    /// Stops the motor after a fault of `operation`, unless the fault is [`Fault::OutOfRange`] and no earlier request may have left the motor in
+    /// motion. Returns the fault, and whether the motor was stopped.
     pub fn fail(&mut self, operation: &'static str, fault: Fault) -> MotorError {
         // A motor that this program did not move is stopped, too: another program may have left it moving.
         let harmless = matches!(fault, Fault::OutOfRange(_)) && !self.moving;

@@ -61,9 +61,9 @@ pub enum Fault {
 /// Whether the motor was stopped after a fault.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Stopped {
-    /// It was never moved.
+    /// The failed operation did not move the motor and sent no command to stop it.
     NotMoved,
-    /// The module confirmed that it stopped.
+    /// The module confirmed the command to stop.
     Confirmed,
     /// The command to stop was sent, but the module did not confirm it for the given reason.
     Unconfirmed(String),
@@ -71,7 +71,7 @@ pub enum Stopped {
     Failed(String),
 }
 
-/// A fault, where it occurred, and whether the motor was stopped.
+/// A fault, the port and the operation at which it occurred, and whether the motor was stopped.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MotorError {
     pub port: String,

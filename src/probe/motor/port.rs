@@ -17,7 +17,8 @@ pub(super) const PERIOD: Duration = Duration::from_millis(5);
 /// Most attempts of a repeatable request.
 const MAX_TRIES: usize = 3;
 
-/// Settings of the serial port. [`PortSettings::new`] has the default of TMCL modules (9600 baud, no parity, one stop bit) and a time-out of 500 ms.
+/// Settings of the serial port. [`PortSettings::new`] makes the default ones of TMCL modules (9600 baud, no parity, one stop bit) with a time-out of
+/// 500 ms.
 #[derive(Clone, Debug)]
 pub struct PortSettings {
     /// Name of the serial port, for example `/dev/ttyUSB0` or `COM3`.
@@ -41,7 +42,7 @@ impl PortSettings {
         }
     }
 
-    /// Time that transmitting a request and its reply takes at this baud rate.
+    /// Time that the transmission of a request and its reply takes at this baud rate.
     pub fn round_trip(&self) -> Duration {
         let parity = u32::from(self.parity != Parity::None);
         let stop = if self.stop_bits == StopBits::Two { 2 } else { 1 };

@@ -34,7 +34,7 @@ pub enum FaultKind {
     Unplugged,
     /// The firmware reports the number of another module.
     WrongModule,
-    /// Noise precedes every reply; some of it are complete replies with a wrong checksum.
+    /// Noise precedes every reply. Some of the noise is complete replies with a wrong checksum.
     Noise,
     /// Every reply is three seconds late.
     Slow,
@@ -54,8 +54,8 @@ impl FaultKind {
     ];
 }
 
-/// A simulated fault and when it begins: `NAME` at once, `NAME@SECONDS` so many seconds after the first move to a position, with which a sweep
-/// begins.
+/// A simulated fault and when it begins. As text, `NAME` begins at once, and `NAME@SECONDS` that many seconds after the first request to move to a
+/// position; a sweep begins with one. `after` is None for a fault that begins at once.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SimulatedFault {
     pub kind: FaultKind,
@@ -79,7 +79,7 @@ impl FromStr for SimulatedFault {
     }
 }
 
-/// What the simulated module is like: its `[motor]` table, and a fault.
+/// The properties of a simulated module: its `[motor]` table, its watchdog, and the fault that is simulated, if any.
 #[derive(Clone, Debug, Default)]
 pub struct SimulatorOptions {
     pub table: MotorTable,
@@ -94,7 +94,7 @@ struct Shared {
     end: AtomicBool,
 }
 
-/// A simulated TMCL module on a pseudo-terminal, which runs until it is dropped.
+/// A simulated TMCL module on a pseudo-terminal. The simulation runs until this value is dropped.
 pub struct Simulator {
     path: PathBuf,
     shared: Arc<Shared>,
@@ -146,7 +146,7 @@ impl Simulator {
         locked(&self.shared.module).angle()
     }
 
-    /// True if the port was unplugged or has failed.
+    /// True if the simulation has ended, because the port was unplugged or has failed.
     pub fn ended(&self) -> bool {
         self.thread.as_ref().is_none_or(JoinHandle::is_finished)
     }

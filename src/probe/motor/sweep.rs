@@ -100,7 +100,7 @@ pub struct Position {
     pub pass: usize,
 }
 
-/// Position of the array at the time of a frame.
+/// Position of the array at a time, such as that of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ArrayState {
     /// Within a pass at the given angle, degrees.
@@ -119,7 +119,8 @@ pub struct Track {
 }
 
 impl Track {
-    /// A track without positions. Between two that are more than `longest_gap` seconds apart the position counts as not known.
+    /// A track without positions. At a time between two positions that are more than `longest_gap` seconds apart, the state of the array is
+    /// [`ArrayState::Unknown`].
     pub fn new(longest_gap: f64) -> Track {
         Track { positions: Vec::new(), longest_gap }
     }

@@ -10,7 +10,7 @@ const TMC429_CLOCK: f64 = 16e6;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Home {
-    /// The module does its own reference search (RFS), in the mode that is set in it.
+    /// The module does its own reference search (the TMCL command RFS), in the mode that is set in the module.
     #[default]
     ReferenceSearch,
     /// The motor rotates until the home switch closes, and slowly back until it opens; there is home.
@@ -81,8 +81,8 @@ pub struct MotorTable {
     /// Angle of the array at home, degrees; 0 is the middle of the sweep.
     #[serde(default)]
     pub home_angle_deg: f64,
-    /// Speed of the array while home is searched, deg/s. None: the module's own for its reference search; for a switch 10, or the largest
-    /// speed if that is lower.
+    /// Speed of the array while home is searched, deg/s. None: the module's own speed for its reference search; for a search by the switch 10, or the
+    /// largest speed if that is lower.
     pub search_speed_deg_per_s: Option<f64>,
     /// Largest angle of a sweep from end to end, degrees, up to 360.
     pub largest_angle_deg: f64,
@@ -207,7 +207,7 @@ impl MotorTable {
         if self.reversed { -1.0 } else { 1.0 }
     }
 
-    /// Speed of the array while home is searched, deg/s, with the default filled in.
+    /// Speed of the array while home is searched, deg/s: `search_speed_deg_per_s`, or if that is None 10, or the largest speed if that is lower.
     pub fn search_speed(&self) -> f64 {
         self.search_speed_deg_per_s.unwrap_or(self.largest_speed_deg_per_s.min(10.0))
     }

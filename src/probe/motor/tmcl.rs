@@ -56,7 +56,7 @@ pub const SUCCESS: u8 = 100;
 /// Status of a reply: the checksum of the request was wrong.
 pub(crate) const WRONG_CHECKSUM: u8 = 1;
 
-/// Words for the status code of a reply.
+/// What the status code of a reply means, in words.
 pub fn status_words(status: u8) -> &'static str {
     match status {
         SUCCESS => "carried out",
@@ -83,7 +83,7 @@ pub struct Request {
     /// Address of the module, 1 to 255.
     pub address: u8,
     pub command: u8,
-    /// Field "type" of the request: the number of a parameter, or how to move.
+    /// Field "type" of the request: the number of a parameter, the kind of a move (0: to an absolute position), or the action of a reference search.
     pub kind: u8,
     /// Number of the axis, or of the bank of global parameters or inputs.
     pub motor: u8,

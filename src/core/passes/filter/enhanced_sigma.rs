@@ -56,8 +56,8 @@ pub const PICTURE: Pass = Pass {
     ..Pass::OF_PICTURES
 };
 
-/// Records how many rings the filter's window grew at each pixel of a slice, which Tables 7-9 of the thesis count. It reads the same slice as the
-/// filter, which runs next.
+/// Records how many rings of pixels the window of the enhanced sigma filter grew at each pixel of a slice, which Tables 7-9 of the thesis count. It
+/// reads the same slice as the filter, which runs next.
 pub const GROWTH: Pass = Pass {
     name: "growth_slice",
     link: Link::Observer(Chain::Slices),

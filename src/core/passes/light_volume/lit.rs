@@ -57,8 +57,8 @@ fn ground_of(scene: &Scene, is_alone: bool) -> Option<Ground> {
     scene.lit_by_volume().filter(|_| is_alone)?.ground
 }
 
-/// Applies the response curve (`light.volume.exposure`) to the composited light of a ray, premultiplied. `at`: position in the picture, in rays from
-/// its upper left corner. Without a light volume the light is unchanged.
+/// Applies the response curve (`light.volume.exposure`) to the composited light of a ray, premultiplied; if `is_alone`, also composites it over the
+/// backdrop. `at`: position in the picture, in rays from its upper left corner. Without a light volume the light is unchanged.
 pub(in crate::passes) fn developed(scene: &Scene, is_alone: bool, rgba: [f64; 4], at: [f64; 2]) -> [f64; 4] {
     match scene.lit_by_volume() {
         Some(volume) => on_film(scene, volume.exposure, ground_of(scene, is_alone), rgba, at),
@@ -132,7 +132,8 @@ impl<'a> Lit<'a> {
         (self.shade.interpolated(at), DVec3::new(x, y, z), rest)
     }
 
-    /// Light (red, green, blue) that white matter at a place scatters towards the viewer, without a highlight. `along`: unit direction of the ray.
+    /// Light (red, green, blue) that white matter at a place in space, mm, scatters towards the viewer, without a highlight. `along`: unit direction
+    /// of the ray.
     pub fn scattered(&self, place: DVec3, along: DVec3) -> [f64; 3] {
         let (shade, direction, _) = self.at(place);
         let grazing = match direction.length() {

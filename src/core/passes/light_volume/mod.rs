@@ -150,7 +150,8 @@ fn level(n: u32) -> Slot {
     }
 }
 
-/// Smallest edge of a cell, mm, at which the light is as requested. With smaller cells, kernels and cones would have to be wider than they can be.
+/// Smallest edge of a cell of the light volume, mm, at which the light is as the settings request. Smaller cells would need wider kernels and cones,
+/// in cells, than the passes have.
 pub fn least_cell(scene: &Scene) -> f64 {
     let light = light_of(scene);
     let scattered = light.scatter_deviations().into_iter().fold(0.0, f64::max) / MAX_SCATTER;
@@ -227,7 +228,7 @@ fn scatter(scene: &Scene) -> [f64; 3] {
         .map(|deviation| (deviation / scene.light_lattice().cell).clamp(0.05, MAX_SCATTER))
 }
 
-/// Computes the ambient light from above and from behind in each cell.
+/// Computes, in cells of twice the edge, the ambient light that comes from the side of the probe, and adds the back light to it.
 pub(crate) const AMBIENT: Pass = Pass {
     name: "light_ambient",
     shader: |_, _| "light_volume/ambient",
@@ -330,7 +331,8 @@ fn cones() -> [DVec3; 7] {
     })
 }
 
-/// Computes the light that leaves each cell, and the cell's orientation: the unit vector towards weaker echoes, times its certainty (0..1).
+/// Computes for each cell of the light volume the light that it scatters towards the viewer, and its orientation: the unit vector towards weaker
+/// echoes, times its certainty (0..1).
 pub const SHADE: Pass = Pass {
     name: "light_shade",
     shader: |_, _| "light_volume/shade",

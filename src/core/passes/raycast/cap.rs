@@ -67,7 +67,7 @@ pub(crate) fn cut_at(scene: &Scene, reads: &Arrays, x: usize, y: usize) -> Optio
     (cut[1] > 0.0).then_some(Cut { echo: cut[0], opacity: cut[1] })
 }
 
-/// What a ray shows of a cut face: an echo as a grey value, and the opacity of the face.
+/// What a ray shows of a cut face, which is where a clip plane cuts tissue: its echo as a grey value, and its opacity, both 0..1.
 #[derive(Clone, Copy)]
 pub struct Cut {
     echo: f64,

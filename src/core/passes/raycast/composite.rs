@@ -14,8 +14,8 @@ pub enum Rule {
     CorrectedLeft,
     /// a = 1 - exp(-y), with the mean kappa between the sample values at the step's two ends, and the mean colour weighted by kappa.
     PreIntegrated,
-    /// The exact integral over the step of a transfer function between the sample values at its two ends: light and opacity, each place dimmed by the
-    /// matter in front of it in the same step.
+    /// Light and opacity are the exact integral over the step of the transfer function, while the sample value changes linearly between the step's
+    /// two ends: each place is dimmed by the matter in front of it in the same step.
     Exponential,
     /// The opacity of `PreIntegrated`, but the step's light is y times its colour, as if no part of a step lay in the shade of another (a shortcut of
     /// Engel, Kraus, Ertl 2001). No setting offers it: its error is one order larger.
@@ -33,7 +33,7 @@ impl From<Compositing> for Rule {
     }
 }
 
-/// A position on a ray: `offset` mm behind the ray's entry, after `n` steps.
+/// A position on a ray: `offset` mm behind the ray's entry, which is reached after `n` steps (`n` may be fractional).
 #[derive(Clone, Copy, Debug)]
 pub struct Place {
     pub offset: f64,
@@ -63,15 +63,15 @@ pub struct March {
     pub path: f64,
     /// The length that absorption refers to, mm.
     pub reference_length: f64,
-    /// The ray ends when its transmittance (0..1) falls below this. With 0 it never ends early.
+    /// The ray ends when its transmittance (0..1) has fallen to this or below. With 0 it never ends early.
     pub early_end: f64,
     /// Opacity (0..1) from which on the ray counts as having hit something.
     pub hit: f64,
 }
 
 impl March {
-    /// Returns premultiplied red, green, blue, and opacity, of the ray, and the offset, mm, at which its opacity reaches `hit`; None if it does not.
-    /// `offset` maps a number of steps to mm behind the entry, and rises with it.
+    /// Composites a ray. Returns its premultiplied red, green, blue, and opacity, and the offset behind the entry, mm, at which the opacity reaches
+    /// `hit`; None if it does not. `offset` maps a number of steps to mm behind the entry, and rises with that number.
     pub fn through(&self, medium: &impl Medium, offset: impl Fn(f64) -> f64) -> ([f64; 4], Option<f64>) {
         let mut light = [0.0; 3];
         let mut opacity = 0.0;

@@ -236,8 +236,8 @@ pub(super) struct Ray<'a> {
     direction: DVec3,
     /// Across the ray, unit length.
     across: [DVec3; 2],
-    /// Distances along the ray, mm, at which it enters and (`leave`) leaves the box and the near side of all clip planes. The ray misses if leave <
-    /// enter.
+    /// Distances along the ray, mm, between which it is in the box and on the kept side of all clip planes: it enters at `enter` and leaves at
+    /// `leave`. The ray misses if leave < enter.
     pub enter: f64,
     pub leave: f64,
     /// Ratio of the step at the entry to the scene's step, and the increase of this ratio per mm.
@@ -313,8 +313,8 @@ impl<'a> Ray<'a> {
         texel(self.scene, self.place(offset)).is_some()
     }
 
-    /// The sample after the grey window, 0..1, at an offset in mm behind the entry, which is that after `n` steps. None outside the insonified
-    /// region. With `ray.sliding` it is the weighted mean over a cube of samples around that place, without those outside the region.
+    /// The sample after the grey window, 0..1, at an offset in mm behind the entry. `n` is the number of steps to that offset. None outside the
+    /// insonified region. With `ray.sliding` it is the weighted mean over a cube of samples around that place, without those outside the region.
     pub fn sample(&self, offset: f64, n: f64) -> Option<f64> {
         let at = texel(self.scene, self.place(offset))?;
         let edge = i64::from(self.scene.settings.ray.sliding);
@@ -370,7 +370,8 @@ fn spread_range(probe: &Probe) -> f64 {
     probe.first_range().max(probe.last_range() / 8.0)
 }
 
-/// Distances along a ray, mm, at which it enters and leaves the region of `view` and the clip planes. The ray misses if leave < enter.
+/// Distances (enter, leave) along a ray from `origin`, mm, between which it is in the box of `view` and on the kept side of all clip planes. `enter`
+/// is at least 0. The ray misses if leave < enter.
 pub fn span(scene: &Scene, view: View, origin: DVec3, direction: DVec3) -> (f64, f64) {
     let (mut enter, mut leave) = (0.0f64, f64::MAX);
     for axis in 0..3 {
@@ -397,7 +398,8 @@ pub fn span(scene: &Scene, view: View, origin: DVec3, direction: DVec3) -> (f64,
     (enter, leave)
 }
 
-/// Fractional texel indices of a place in space, mm. Beyond the first and last slice it takes the nearest of them. None outside the scan lines.
+/// Fractional texel indices of a place in space, mm. Beyond the first and the last slice the nearest of them counts. None beyond the first or last
+/// sample or line of the frames; a Cartesian volume has indices everywhere.
 pub(in crate::passes) fn texel_beyond_sweep(scene: &Scene, place: DVec3) -> Option<[f64; 3]> {
     let Geometry::Sweep(probe) = &scene.geometry else { return texel(scene, place) };
     let (x, y, position) = probe.inverse_sweep_map(place);

@@ -12,11 +12,11 @@ const SAMPLES: f64 = 1024.0;
 /// Statistics of what the rays, or the points of planes, meet in the volume.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Survey {
-    /// Number of rays that pass through the rendered box on the near side of all clip planes. For planes, number of points there.
+    /// Number of rays that pass through the rendered box on the kept side of all clip planes. For planes, number of their points (pixels) there.
     pub met: usize,
     /// Number of samples in the insonified region that were taken on at most 4096 of those rays, or at all of those points.
     pub insonified: usize,
-    /// Smallest and largest of these samples, 0..1 before the grey window. None if there are none.
+    /// Smallest and largest of the samples that `insonified` counts, 0..1 before the grey window. None if there are none.
     pub values: Option<[f64; 2]>,
     /// Modes surface and mixed: the largest difference, on any surveyed ray, of the means of two neighbouring stretches of the ray. Each is as long as
     /// `surface.edge` (longer on rays of more than 1024 steps); after the grey window and with the sign of `surface.sign`. 0 in other modes.
@@ -34,8 +34,8 @@ pub fn view(scene: &Scene) -> View {
     }
 }
 
-/// Samples the volume along the scene's rays, or on its planes. `volume`: the texels of its volume, 0..1, of which those within the visible bounds
-/// are read.
+/// Samples the volume along the scene's rays, or on its planes. `volume`: the texels of the scene's volume, 0..1; only those within the visible
+/// bounds are read.
 pub fn survey(scene: &Scene, volume: &Texels) -> Survey {
     let mut survey = Survey::default();
     if scene.is_flat() {

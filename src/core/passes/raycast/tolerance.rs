@@ -21,7 +21,7 @@ use crate::passes::postprocess::{tone_constants, tone_params, toned};
 use crate::scene::{Scene, transfer};
 use glam::DVec3;
 
-/// Levels of a picture of 8 bits that make the range 0..1.
+/// Number of steps between 0 and 1 in a picture of 8 bits: an error of one level is 1 / 255.
 pub const LEVELS: f64 = 255.0;
 
 /// How often a step is halved, at most.
@@ -82,8 +82,8 @@ fn brightest(scene: &Scene) -> f64 {
     }
 }
 
-/// Casts a ray through every other pixel of every other row, with the scene's step (at most a slice pixel) at first and with shorter ones where the
-/// estimated error is too large.
+/// Casts a ray through every other pixel of every other row. It begins with the scene's step, at most a slice pixel, and repeats a ray with shorter
+/// steps if its estimated error is too large.
 pub const FIRST: Pass = Pass {
     name: "tolerance_first",
     shader: |_, _| "tolerance/cast.first",
@@ -200,7 +200,8 @@ fn marked(marks: &Texels, tile: usize) -> u32 {
     marks.values[2 * tile..2 * tile + 2].iter().map(|word| (*word as u32).count_ones()).sum()
 }
 
-/// Counts the marked pixels in the tiles before each tile, and the workgroups that `REFINE` needs for all of them. It is a single workgroup.
+/// Counts the marked pixels in the tiles before each tile, and the workgroups that `REFINE` needs for all marked pixels. It runs as a single
+/// workgroup.
 pub const LIST: Pass = Pass {
     name: "tolerance_list",
     shader: |_, _| "tolerance/list",

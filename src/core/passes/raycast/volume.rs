@@ -215,9 +215,10 @@ fn is_exponential(scene: &Scene) -> bool {
 
 /// What compositing looks up: the transfer function and the light volume.
 pub(super) struct Tables<'a> {
-    /// The transfer function over the sample value or, with pre-integration, over the sample values at both ends of a step.
+    /// The table by which a step is looked up: the transfer function over the sample value or, with `volume.compositing` pre-integrated or
+    /// exponential, a table over the sample values at both ends of a step.
     pub of_steps: &'a Texels,
-    /// The transfer function over the sample value, from which a step of another length is integrated. Empty unless `volume.compositing` is
+    /// The transfer function over the sample value, from which an incomplete last step is integrated. Empty unless `volume.compositing` is
     /// exponential.
     pub curve: Vec<[f64; 4]>,
     pub lit: Option<Lit<'a>>,

@@ -11,7 +11,8 @@ use glam::DVec3;
 /// Cells along each edge of a tile between whose corners a line is straight: surface and curve are smooth.
 const CELLS: usize = 72;
 
-/// The line on one tile along which its plane cuts the start surface or start curve, in straight pieces.
+/// The line on one tile (the part of the picture that shows one plane) along which its plane cuts the start surface or start curve, in straight
+/// pieces.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StartLine {
     /// Upper left corner and size of the tile, pixels of the picture.

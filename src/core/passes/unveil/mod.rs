@@ -40,35 +40,35 @@ const LEAST_CONTRAST: u32 = LEVELS / 8;
 /// Least share of the columns in view that have a near face, per cent.
 const LEAST_SHARE: u32 = 40;
 
-/// The start surface that the search for the pocket of fluid found in a volume.
+/// The start surface, at which rendering starts in each column of the volume, as the search for the pocket of fluid in front of a face found it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Unveiled {
     pub outcome: Outcome,
-    /// Row, which may be fractional, at which rendering starts, by the near face of the pocket of fluid: for each column and slice of the volume, the
-    /// column fastest. All 0 if the pocket was not recognised, or if nothing lies in front of it.
+    /// Row at which rendering starts, which may be fractional, for each column and slice of the volume, the column fastest. It follows from the near
+    /// face of the pocket of fluid. All 0 if the pocket was not recognised, or if nothing lies in front of it.
     pub rows: Vec<f32>,
 }
 
 /// Whether the search recognised the pocket of fluid in front of a face.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// It was recognised: rendering starts at its near face.
+    /// The pocket was recognised: rendering starts at its near face.
     Found(Evidence),
     /// No fluid lies in front of tissue.
     NoPocket,
-    /// The pocket is hardly darker than the tissue around it, so that it is not used.
+    /// The pocket is less than an eighth of the grey range darker than the tissue around it, so that it is not used.
     NoContrast(Evidence),
-    /// Too few of the columns in view meet the pocket, so that it is not used.
+    /// Too few of the columns in view meet the pocket ([`Evidence::share`] is below 40), so that it is not used.
     TooSmall(Evidence),
 }
 
-/// What was measured on the pocket. Grey levels are 0..=1024, for sample values of 0..1.
+/// What was measured on the pocket. Grey levels are whole numbers, 0..=1023 for sample values of 0..1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Evidence {
-    /// Grey level of the tissue in front of the pocket or behind it, whichever is darker.
+    /// Mean grey level of the tissue in front of the pocket or behind it, whichever is darker; `pocket` is that of the pocket.
     pub tissue: u32,
     pub pocket: u32,
-    /// Per cent of the columns in view, of all slices together, in which the pocket's near face was found, or that begin inside the pocket.
+    /// Share of the columns in view, of all slices together, in which the pocket's near face was found or which begin inside the pocket, per cent.
     pub share: u32,
 }
 
