@@ -10,7 +10,8 @@ use glam::DVec3;
 
 /// Edge of a brick where no setting says another, texels.
 const EDGE: u32 = 8;
-/// Edge of the tiles of a slice whose minimum and maximum are stored, texels.
+/// Edge length, texels, of the square tiles that each slice is divided into. The minimum and the maximum of every tile are stored for empty-space
+/// skipping.
 pub const TILE: u32 = 4;
 /// Maximum number of bricks of a scene: a table of 8 MB.
 const MAX_BRICKS: f64 = 524_288.0;
@@ -20,7 +21,7 @@ const MARGIN: f64 = 4e-3;
 const MIN_ENTRIES: u32 = 65;
 const SLICE_MARGIN: f64 = 0.01;
 
-/// The grid of bricks, along the axes of space.
+/// The grid of bricks: boxes of a few texels, aligned with the axes of space, which rays skip where nothing in them can change the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bricks {
     /// Lower corner of brick (0, 0, 0), mm in space.
@@ -52,8 +53,8 @@ impl Side {
     }
 }
 
-/// What samples within a brick may touch, first and last inclusive: columns and rows of tiles (`tiles`), and slices. `side` tells where the brick
-/// lies.
+/// The texels that samples within a brick may read, as inclusive ranges [first, last]: `tiles` has those of the columns and rows of tiles ([`TILE`]),
+/// `slices` that of the slices. `side` is the brick's position relative to the insonified region.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Reach {
     pub tiles: [[u32; 2]; 2],
@@ -72,12 +73,13 @@ impl Bricks {
 }
 
 impl Scene {
-    /// Edge of a brick by the setting `ray.brick`, texels; 0 if the setting switches bricks off.
+    /// Edge of a brick, texels: the setting `ray.brick`, or 8 where it is absent; 0 if the setting switches bricks off.
     pub fn brick(&self) -> u32 {
         self.settings.ray.brick.unwrap_or(EDGE)
     }
 
-    /// True if rays skip bricks. It needs a mode that casts rays through samples, and positions that f32 resolves finely enough.
+    /// True if rays skip bricks: they are switched on (`ray.brick`, or `bricks_pay` where it is absent), and the mode renders the volume by rays.
+    /// False where the look-up table of the sweep, or positions in f32, are too coarse for bricks.
     pub fn skips(&self) -> bool {
         let casts = self.composites() || self.detects_surface() || self.projects();
         let swept = self.probe().is_some_and(|p| !matches!(p.motion, Motion::Still { .. }));

@@ -8,8 +8,9 @@ use glam::DVec3;
 /// for a fetal head; the least that keeps a ray's entry above 0 by more than f32 loses.
 const OFF: f64 = 1.0 / 128.0;
 
-/// The rays of a picture. The ray through (px, py), in rays from the upper left corner, has the origin `origin + px origin_dx + py origin_dy`; its
-/// direction is computed likewise and normalised. Lengths are in mm.
+/// The rays of a picture. A position (px, py) counts rays, not pixels, from the upper left corner of the rendering, and may be fractional. The ray
+/// there has the origin `origin + px origin_dx + py origin_dy`; its direction is `direction + px direction_dx + py direction_dy`, normalised. Places
+/// are in mm in space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rays {
     pub origin: DVec3,

@@ -11,7 +11,8 @@ use super::{
 use crate::probe::{Advance, Geometry, Motion};
 use glam::{DVec2, DVec3};
 
-/// A cut, placed in space.
+/// A cut, placed in space. Seen from where it was drawn, it removes what is within a contour (a prism, or in perspective a cone) or what is outside;
+/// or it removes what is near the strokes of a brush.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CutShape {
     /// Origin of the contour's plane, mm in space.
@@ -40,7 +41,8 @@ pub struct BrushShape {
 }
 
 impl BrushShape {
-    /// True if a place is within the radius of a stroke: in a ball about one of its points, or in a cylinder about the line between two.
+    /// True if a place is within the radius of a stroke: in a ball about one of its points, or in a cylinder about the line between two consecutive
+    /// ones.
     pub fn holds(&self, place: DVec3) -> bool {
         let is_near = |from: DVec3, to: DVec3| {
             let (along, off) = (to - from, place - from);
@@ -80,8 +82,8 @@ impl CutShape {
         }
     }
 
-    /// The point at which the line of sight through `place` crosses the contour's plane, mm, and the distance of `place` behind the plane.
-    /// The point is None behind the eye.
+    /// The point at which the line of sight through `place` crosses the contour's plane, mm along `right` and `up`, and the distance of `place`
+    /// behind the plane, mm, negative in front of it. The point is None if `place` is not in front of the eye.
     pub fn project(&self, place: DVec3) -> (Option<DVec2>, f64) {
         let from = place - self.at;
         let behind = from.dot(self.forward);
@@ -116,7 +118,8 @@ impl CutShape {
             && point.is_some_and(|point| self.winds_about(point)) == self.removes_inside
     }
 
-    /// Lower and upper corner of the bounds of the contour in its plane, mm.
+    /// Lower and upper corner of the bounds of the contour in its plane, mm along `right` and `up`. For an empty contour the lower corner is infinite
+    /// and the upper one minus infinite.
     pub fn bounds(&self) -> [DVec2; 2] {
         let ends = [DVec2::INFINITY, DVec2::NEG_INFINITY];
         self.contour.iter().fold(ends, |[low, high], corner| [low.min(*corner), high.max(*corner)])
@@ -135,7 +138,8 @@ impl Scene {
         self.composites() || self.detects_surface() || self.projects()
     }
 
-    /// True if parts of the volume are removed before rays are cast: by cuts, or in front of the render start.
+    /// True if parts of the volume are removed before rays are cast: by cuts, or in front of the start surface (`unveil`) or the start curve
+    /// (`region.start_curve`). A start depth removes nothing: rays begin there.
     pub fn removes(&self) -> bool {
         self.has_cuts() || self.unveils() || self.starts_at_curve()
     }
@@ -157,8 +161,9 @@ impl Scene {
         })
     }
 
-    /// The cut along a contour that was drawn on the rendering. `outline`: its corners, pixels of the picture; `keep`: the side that stays. Its plane
-    /// faces the viewer and goes through the nearest place of the region that the contour meets. None if it encloses nothing or misses the region.
+    /// The cut along a contour that was drawn on the rendering, of any depth. `outline`: the corners of the contour, pixels of the picture; `keep`:
+    /// the side that stays. The plane of the cut faces the viewer, at the nearest place where the ray of a corner enters the region. None if the
+    /// outline encloses nothing, or if all its corners miss the region.
     pub fn cut_along(&self, outline: &[[f64; 2]], keep: KeptSide) -> Option<Cut> {
         let (picker, rays) = (Picker::of(self), &self.rays);
         let corners = simplified(outline.iter().map(|at| DVec2::from(*at)).collect());
@@ -194,7 +199,7 @@ impl Scene {
         Some(Cut { contour: contour.collect(), view, keep, depth: None, brush: None })
     }
 
-    /// The value that removed texels get so that the rendering draws nothing of them: 0, or 1 where dark matter is drawn. In mode mean it counts as
+    /// The value that removed texels get so that the rendering draws nothing of them: 0, or 1 where dark matter is drawn. In mode mean they count as
     /// dark matter. None if the rendering draws something of either value.
     pub fn removed_value(&self) -> Option<f64> {
         let is_drawn = |value: f64| {

@@ -55,15 +55,16 @@ const REGION: [&str; 4] = ["region.lateral", "region.depth", "region.elevation",
 const UNKNOWN: EchoLevels =
     EchoLevels { dark: 0.05, threshold: 0.4, bright: 0.68, mean: 0.3, low: 0.02, high: 0.95, start: None };
 
-/// Settings completed by defaults. `said` has a line for each default, which tells how it was found.
+/// Settings completed by defaults that follow from the recording. `said` has one line of text for each of these defaults, which tells how it was
+/// found.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Completed {
     pub settings: Settings,
     pub said: Vec<String>,
 }
 
-/// Standard deviation along every axis, mm, of the default Gaussian of a volume: in proportion to the longest edge of the box around its
-/// insonified region, within limits.
+/// Standard deviation, mm, of the Gaussian that smooths a volume by default, the same along every axis: 0.9 % of the longest edge of the box around
+/// the insonified region, but at least 0.3 and at most 1.2.
 pub fn smoothing(geometry: &Geometry) -> f64 {
     let (low, high) = insonified_box(geometry);
     let [least, most] = SMOOTHING_RANGE;
@@ -71,7 +72,7 @@ pub fn smoothing(geometry: &Geometry) -> f64 {
     if wanted.is_finite() { wanted.clamp(least, most) } else { most }
 }
 
-/// Edge of the blocks over whose means [`EchoHistogram`] finds the levels of a volume's echoes, mm.
+/// Edge length, mm, of the blocks of samples whose means [`EchoHistogram`] divides into a darker and a brighter class.
 pub fn block_edge(geometry: &Geometry) -> f64 {
     BLOCK * smoothing(geometry)
 }
@@ -126,8 +127,8 @@ impl Recorded {
         Ok(EchoHistogram::new(&self.geometry, samples, block_edge(&self.geometry)))
     }
 
-    /// The scene of these layers of settings on the recording. They are completed by defaults if `is_completed`, unless defaults depend on levels of
-    /// echoes that the recording does not have.
+    /// The scene of these layers of settings on the recording. If `is_completed`, defaults complete the settings, unless they depend on levels of
+    /// echoes ([`Recorded::needs_levels`]) and `levels` is None.
     ///
     /// # Errors
     /// The layers together are no valid settings, or a setting cannot be rendered with this geometry.
@@ -169,8 +170,8 @@ impl Defaults {
         Some(layers.completed(&self.geometry, self.levels.as_ref()).ok()?.settings)
     }
 
-    /// Completes `to`, settings whose mode or layout differs from that of `from`: values that still equal the defaults of `from` become the defaults
-    /// of the new mode. Values that the user changed stay.
+    /// `to`, with the values that still equal the defaults of the mode and layout of `from` replaced by those of its own mode and layout. Other
+    /// values, which the user changed, stay. If mode and layout are the same, or if no defaults can be computed, `to` is returned as it is.
     pub fn switched(&self, from: &Settings, to: Settings) -> Settings {
         if (from.mode, from.layout) == (to.mode, to.layout) {
             return to;
@@ -193,13 +194,14 @@ impl Layers {
         Some(self)
     }
 
-    /// True if defaults depend on the levels of the echoes, because no preset was chosen.
+    /// True if defaults depend on the levels of the echoes, because no built-in preset was chosen.
     pub fn needs_levels(&self) -> bool {
         self.presets().is_empty()
     }
 
     /// The settings of the layers for a geometry, completed by defaults. Without a preset, the ramp of volume rendering and the grey windows follow
-    /// from `levels`. None takes the ramp of a face in fluid, and leaves the windows of surfaces, projections and planes at their defaults.
+    /// from `levels` where no layer sets them. If `levels` is None, the ramp is that of a face in fluid, and the windows of surfaces, projections and
+    /// planes stay at their defaults.
     ///
     /// # Errors
     /// One line: the layers together are no valid settings.

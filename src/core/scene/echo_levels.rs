@@ -25,14 +25,14 @@ const BEHIND: f64 = 0.2;
 const DARKEST: f64 = 0.02;
 const BRIGHTEST: f64 = 0.003;
 
-/// How dark and how bright the echoes of a volume are. Values are shares (0..1) of the value range of the samples.
+/// How dark and how bright the echoes of a volume are. All values but `start` are shares (0..1) of the value range of the samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EchoLevels {
-    /// Median of the darker class of blocks (parts of a frame, of which the mean echo is taken): fluid, or soft tissue next to bone.
+    /// Median of the means of the darker class of blocks (rectangles of samples of a frame): fluid, or soft tissue next to bone.
     pub dark: f64,
     /// Otsu's threshold between the darker and the brighter class of blocks.
     pub threshold: f64,
-    /// Median of the brighter class of blocks: tissue, or bone.
+    /// Median of the means of the brighter class of blocks: tissue, or bone.
     pub bright: f64,
     /// Mean of all blocks.
     pub mean: f64,
@@ -40,12 +40,12 @@ pub struct EchoLevels {
     pub low: f64,
     /// The value above which three of a thousand samples lie.
     pub high: f64,
-    /// Depth at which the default region of interest begins, mm below the probe's face: the middle of the first clear layer behind a bright one next
-    /// to the probe. None if there is no such layer.
+    /// Depth at which the default region of interest begins, mm below the probe's face: the middle of the first dark layer behind a bright layer next
+    /// to the probe. None if there are no such layers, or nothing bright behind the dark one.
     pub start: Option<f64>,
 }
 
-/// Collects the samples of a volume, frame by frame.
+/// Collects the samples of a volume, frame by frame, to find its [`EchoLevels`].
 #[derive(Clone, Debug)]
 pub struct EchoHistogram {
     input: Input,
@@ -64,7 +64,8 @@ pub struct EchoHistogram {
 }
 
 impl EchoHistogram {
-    /// For frames of a geometry, with blocks whose edges are about `edge` mm.
+    /// An empty histogram for frames of a geometry, whose samples have the type and the value range of `input`. The edges of its blocks are about
+    /// `edge` mm long, and at most half a frame.
     pub fn new(geometry: &Geometry, input: Input, edge: f64) -> EchoHistogram {
         let pitch = match geometry {
             Geometry::Cartesian(grid) => [grid.spacing[0], grid.spacing[1]],
@@ -96,7 +97,8 @@ impl EchoHistogram {
         }
     }
 
-    /// Adds the stored samples of a frame. Of a frame that is too short, the samples that it has are counted.
+    /// Adds the stored samples of a frame, block by block. Of a frame that is too short, the blocks before the first incomplete one count. Of a
+    /// Cartesian volume, blocks of nothing but the lowest value do not count.
     pub fn take(&mut self, bytes: &[u8]) {
         let [low, high] = self.input.range;
         let scaled = |value: f64| ((value - low) / (high - low)).clamp(0.0, 1.0);
@@ -131,7 +133,8 @@ impl EchoHistogram {
         }
     }
 
-    /// The levels of the samples so far. None if they are too few, or all equal.
+    /// The levels of the samples so far. None if there are fewer than 16 blocks, or if the means of all blocks differ by less than about 0.001 of the
+    /// value range.
     pub fn levels(&self) -> Option<EchoLevels> {
         let all: u64 = self.blocks.iter().sum();
         if all < FEWEST {

@@ -3,8 +3,8 @@
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// The version of a file of settings, its key `version`: 1, also where the file states none. A later version has changed what a key means, or
-/// has keys by which nothing is drawn as before; it is refused. New keys alone are no new version.
+/// The version of a file of settings, its key `version`: 1, also where the file states none. A file of any other version is refused, because its keys
+/// may have other meanings. New keys that change nothing where they are absent do not make a new version.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FileVersion;
 

@@ -17,7 +17,7 @@ const OPEN: u8 = 255 - COVERED;
 const COLOURS: [u32; 10] =
     [0xff7f0e, 0x1f77b4, 0x2ca02c, 0xd62728, 0x9467bd, 0x17becf, 0xe377c2, 0xbcbd22, 0x8c564b, 0x7f7f7f];
 
-/// Labels of voxels, 0 for none, and how much of the surroundings of each has one.
+/// The labels of the voxels of a lattice, 0 for none, and for each voxel the share of its surroundings that has a label.
 #[derive(PartialEq)]
 pub struct LabelVolume {
     /// Voxels of the box that holds all labels.
@@ -61,11 +61,12 @@ impl From<LabelVolume> for SharedLabels {
 }
 
 impl LabelVolume {
-    /// Labels of `size` voxels, x fastest. `to_space`: from the index of a voxel to the place of its centre, mm. `own`: the colour of a label,
-    /// if it has one.
+    /// The labels of a lattice of `size` voxels. `voxels` has the label of each, x fastest, 0 for none. `to_space` maps the index of a voxel to the
+    /// place of its centre, mm. `own` gives the colour of a label (0..=1), or None for one of the default colours.
     ///
     /// # Errors
-    /// One line: no voxel has a label, too many lie between those that have one, or the lattice has no volume.
+    /// The end of a sentence about the labels: no voxel has one, the box around the labelled voxels has more than 2^26 voxels, `voxels` does not have
+    /// `size`, or `to_space` has no inverse.
     pub fn new(
         size: [usize; 3],
         voxels: &[u8],
@@ -139,7 +140,7 @@ impl LabelVolume {
         (0..3).map(|n| axes.col(n).length()).fold(f64::INFINITY, f64::min)
     }
 
-    /// True if the box of the labels meets that of what the probe saw.
+    /// True if the box around the labelled voxels meets the box around the insonified region. Both are aligned with the axes of space.
     pub fn overlaps(&self, geometry: &crate::probe::Geometry) -> bool {
         let to_space = self.to_index.inverse();
         let last = DVec3::from(self.size.map(|n| n as f64 - 1.0));

@@ -18,7 +18,7 @@ const NARROWEST: [f64; 2] = [-4.0, 3.0];
 /// The lattice of cubic cells of the light volume, over the rendered box.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightLattice {
-    /// Corner of the first cell, mm in space.
+    /// Lower corner of the first cell, mm in space.
     pub low: DVec3,
     /// Edge of a cell, mm.
     pub cell: f64,
@@ -42,14 +42,15 @@ impl LightLattice {
     }
 }
 
-/// The levels of the pyramid of densities that the cones of ambient light are sampled in, at four positions along each cone. The cells of a level are
-/// as wide as the cone there, so that another lattice has the same cones. Cones narrower or wider than all cells are sampled in the narrowest or
-/// widest ones.
+/// The levels of the pyramid of densities in which cones of ambient light are sampled, at four positions along each cone. The cells of the level for
+/// a position are as wide as the cone there, so that another lattice has the same cones. Cones narrower or wider than the cells of every level are
+/// sampled in the finest or the coarsest one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AmbientCones {
-    /// Level (0 is the finest of the pyramid) for the position nearest to the lit cell. Below 0 its cells would be narrower than any of the pyramid.
+    /// Level (0 is the finest of the pyramid) for the position nearest to the lit cell. It is negative if the cone is narrower there than the finest
+    /// cells; level 0 then takes its place.
     pub narrowest: i32,
-    /// Weight (0..1) of the next coarser level, mixed with that level so that the variance of the cone's width is met.
+    /// Weight (0..1) of the next coarser level in the mixture of a level with it. The mixture has the variance of the cone's width.
     pub wider: f64,
 }
 
@@ -65,32 +66,33 @@ impl AmbientCones {
         AmbientCones { narrowest: whole as i32, wider }
     }
 
-    /// Level for position `n` along the cone, from 0.
+    /// Level of the pyramid for position `n` along a cone, 0 to 3 from the lit cell on; at least 0, which is the finest.
     pub fn level(&self, n: i32) -> u32 {
         (self.narrowest + n).max(0) as u32
     }
 
-    /// Number of levels that the pyramid needs for all positions, including the next level of the farthest one.
+    /// Number of levels that the pyramid needs for all positions, including the next coarser level of the farthest one.
     pub fn levels(&self) -> u32 {
         1 + self.level(4).max(1)
     }
 }
 
-/// How light goes through the lattice: layer by layer across one axis.
+/// How light goes through the lattice: from layer to layer of cells along one axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Propagation {
-    /// The axis whose direction is nearest to that of the light.
+    /// The axis (0, 1 or 2) whose direction is nearest to that of the light. The layers are perpendicular to it.
     pub axis: usize,
     /// True if the light comes from the upper end of that axis.
     pub(crate) from_high: bool,
-    /// Offset along the other two axes, in cells and in the order of the axes, from a place to where its light crosses the layer before it.
+    /// Offset along the other two axes, in cells and in the order of the axes, from a place to where its light crosses the neighbouring layer on the
+    /// side of the light.
     pub shift: [f64; 2],
     /// Length of the light's path through one layer, cells.
     pub path: f64,
 }
 
 impl Propagation {
-    /// `towards`: unit direction to the light.
+    /// The propagation of a light in the direction `towards`, a unit vector in space that points from matter to the light.
     pub fn new(towards: DVec3) -> Propagation {
         let sizes = towards.abs();
         let axis = if sizes.z >= sizes.x && sizes.z >= sizes.y {
@@ -153,7 +155,8 @@ impl LightVolume {
 }
 
 impl Scene {
-    /// The settings of the light volume, if it lights something that is composited. None without one, or for a still, which computes light itself.
+    /// The settings of the light volume, if it lights something that is composited. None if they are absent, if nothing is composited, or for a still
+    /// ([`Scene::still`]), which computes light itself.
     pub fn lit_by_volume(&self) -> Option<LightVolume> {
         self.settings.light.volume.filter(|_| self.composites() && self.still().is_none())
     }
@@ -239,12 +242,13 @@ impl Scene {
         }
     }
 
-    /// Length over which matter fades towards the faces of the region, mm. None if it does not fade.
+    /// Length over which matter fades towards the faces of the region, except the one nearest to the probe, mm. None if it does not fade.
     pub fn region_fade(&self) -> Option<f64> {
         Some(self.settings.region.fade).filter(|fade| *fade > 0.0)
     }
 
-    /// Factor (0..1) of the matter at a place in space, mm, by which it fades near the faces of the region; 1 without a fade.
+    /// Factor (0..1) by which matter at a place in space, mm, fades near the faces of the region, except the one nearest to the probe. It is 1
+    /// without a fade.
     pub fn faded(&self, place: DVec3) -> f64 {
         let Some(fade) = self.region_fade() else { return 1.0 };
         let (low, high) = (place - self.volume_view().low, self.high - place);

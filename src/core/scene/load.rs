@@ -14,7 +14,7 @@ use toml::{Table, Value};
 /// Maximum size of a settings file, bytes.
 const MAX_BYTES: u64 = 1 << 20;
 
-/// The presets: name and TOML text of each.
+/// The built-in presets: name and TOML text of each.
 pub const PRESETS: &[(&str, &str)] = &[
     ("bmode", include_str!("presets/bmode.toml")),
     ("bone", include_str!("presets/bone.toml")),
@@ -48,7 +48,7 @@ pub enum LoadError {
     Layer { layer: String, fault: String },
 }
 
-/// Layers of settings as TOML tables, merged key by key.
+/// Layers of settings as TOML tables, merged key by key: each layer overrides the ones before.
 #[derive(Clone, Debug, Default)]
 pub struct Layers {
     merged: Table,
@@ -61,7 +61,7 @@ pub struct Layers {
 }
 
 impl Layers {
-    /// Adds labels to the settings.
+    /// Sets the labels that the settings show, in place of any before.
     pub fn show_labels(&mut self, labels: SharedLabels) {
         self.labels = Some(labels);
     }
@@ -82,12 +82,13 @@ impl Layers {
         Layers { presets: over.presets.clone(), given: over.given.clone(), labels: over.labels.clone(), ..self }
     }
 
-    /// The names of the presets that were added, in their order.
+    /// The names of the built-in presets in the order in which they were added ([`Layers::preset`]). Presets of the user ([`Layers::look`]) are not
+    /// among them.
     pub fn presets(&self) -> &[String] {
         &self.presets
     }
 
-    /// True if a layer other than a preset sets the value at `path`, a value in the table at `path`, or the table that contains it.
+    /// True if a layer other than a built-in preset sets the value at `path`, a value in the table at `path`, or the table that contains it.
     pub fn gives(&self, path: &str) -> bool {
         self.given.iter().any(|given| {
             let (longer, shorter) =
@@ -115,7 +116,7 @@ impl Layers {
     /// for messages.
     ///
     /// # Errors
-    /// The settings cannot be written as TOML.
+    /// The layers so far are no valid settings, or the settings cannot be written as TOML.
     pub fn look(&mut self, name: &str, settings: &Settings) -> Result<(), LoadError> {
         let fault =
             |e: &dyn std::fmt::Display| LoadError::Layer { layer: format!("preset {name}"), fault: e.to_string() };
@@ -127,8 +128,8 @@ impl Layers {
         Ok(())
     }
 
-    /// Adds the presets of the built-in phantom: the face as a lit surface. If `is_plain` (the user chose no look), it is shown by volume rendering
-    /// with a light volume instead.
+    /// Adds the presets of the built-in phantom: `face-classic`, which shows the face as a lit surface. If `is_plain` (the user chose no look), it
+    /// adds `face` over it, volume rendering with a light volume.
     ///
     /// # Errors
     /// None in practice: the presets are embedded, and a test reads them.
@@ -239,8 +240,8 @@ impl Layers {
     }
 }
 
-/// `current` with every value that changed from `before` to `after`, unless `current` already differs from `before` there. A table in which `current`
-/// differs stays, even if `after` lacks it. None if the result is no valid settings.
+/// `current`, with every value that differs between `before` and `after` set to that of `after`, unless `current` itself differs from `before` there.
+/// A table in which `current` differs stays, even if `after` lacks it. None if the result is no valid settings.
 pub fn rebase(current: &Settings, before: &Settings, after: &Settings) -> Option<Settings> {
     let table = |settings: &Settings| settings.to_table().ok();
     let mut rebased = table(current)?;
@@ -304,15 +305,15 @@ fn remove(table: &mut Table, path: &str) {
     }
 }
 
-/// Reads a small text file. `what` names the kind of file in messages.
+/// Reads a text file of at most 1 MiB. `what` names the kind of file in messages.
 ///
 /// # Errors
-/// The file cannot be read, is too large, or is no UTF-8.
+/// The file cannot be read, is larger than 1 MiB, or is no UTF-8.
 pub fn read(path: &Path, what: &str) -> Result<String, LoadError> {
     files::read_text(path, MAX_BYTES, what).map_err(|fault| LoadError::File { path: path.display().to_string(), fault })
 }
 
-/// The file name that `volume.transfer` of a layer's table has. None if it names no file.
+/// The name of the file of transfer function points that `volume.transfer` of a layer's table states. None if it is no name that ends with `.toml`.
 pub fn transfer_file(table: &Table) -> Option<String> {
     let name = table.get("volume")?.get("transfer")?.as_str()?;
     name.ends_with(".toml").then(|| name.to_string())

@@ -79,7 +79,7 @@ impl Settings {
         }
     }
 
-    /// The look of these settings with defaults for everything else, such as another examination begins with.
+    /// The look of these settings with defaults for everything else, as at the start of another examination.
     pub fn look(&self) -> Settings {
         self.look_over(&Settings::default())
     }

@@ -21,7 +21,7 @@ pub enum VolumeAxis {
 }
 
 impl Marks {
-    /// The patient's sides at the ends of an axis of the volume.
+    /// The sides of the patient at the low and the high end of an axis of the volume.
     pub fn sides(&self, axis: VolumeAxis) -> Sides {
         match axis {
             VolumeAxis::Lateral => self.lateral,
@@ -43,9 +43,9 @@ impl Marks {
         self.lateral.direction().dot(self.depth.direction().cross(self.elevation.direction())) < 0.0
     }
 
-    /// These marks with `sides` along an axis. If another axis had that pair of sides it loses it. Two axes determine the third. If all three are
-    /// known and the result would be mirrored, a second axis is reversed too, as if the probe were turned: lateral and elevation, or depth and
-    /// elevation.
+    /// These marks with `sides` along an axis. Another axis that had this pair of sides loses it. The sides of a third axis that are not known follow
+    /// from the other two. If all three are known and fit only a mirrored patient, a second axis is reversed, as if the probe were turned: elevation,
+    /// or lateral if `axis` is elevation.
     pub fn with_sides(mut self, axis: VolumeAxis, sides: Sides) -> Marks {
         for other in [&mut self.lateral, &mut self.depth, &mut self.elevation] {
             if *other == sides || *other == sides.exchanged() {
@@ -70,7 +70,8 @@ impl Marks {
         self.turned_with(axis)
     }
 
-    /// These marks with L and R exchanged, as for a probe turned by 180 degrees about its axis.
+    /// These marks with L and R exchanged on the axis that has them. If the result would be mirrored, a second axis is reversed too, as in
+    /// [`Marks::with_sides`].
     pub fn left_and_right_exchanged(mut self) -> Marks {
         let is_across = |axis: &VolumeAxis| matches!(self.sides(*axis), Sides::LeftRight | Sides::RightLeft);
         let Some(axis) = [VolumeAxis::Lateral, VolumeAxis::Depth, VolumeAxis::Elevation].into_iter().find(is_across)
@@ -110,7 +111,7 @@ impl Edge {
         }
     }
 
-    /// The middle of this edge, relative to the middle of the tile, in halves of its width and height.
+    /// The middle of this edge: right and down from the middle of the tile, in halves of the tile's width and height.
     pub fn offset(self) -> [f64; 2] {
         match self {
             Edge::Left => [-1.0, 0.0],
@@ -121,7 +122,7 @@ impl Edge {
     }
 }
 
-/// What is marked on one tile of the picture.
+/// What is marked on one tile of the picture, which shows a plane or a rendering.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TileMarks {
     /// Upper left corner (`corner`) and width and height of the tile, pixels of the picture.
@@ -134,9 +135,10 @@ pub struct TileMarks {
     /// Depth below the probe's face of the tile's upper edge, mm. None if depth does not run straight down on the tile.
     pub depth_from: Option<f64>,
     pub letters: Vec<(Edge, &'static str)>,
-    /// The edge at which the dot for the probe's marker is drawn. None if it is not shown.
+    /// The edge at which the dot for the probe's marker is drawn. None if the marker is hidden, or if its side points more towards or away from the
+    /// viewer than to any edge.
     pub probe: Option<Edge>,
-    /// Letter and colour of the plane. None for a rendering, for the slices of tomography, and if only one plane is shown.
+    /// Letter (S for a curved plane) and colour of the plane. None for a rendering, for the slices of tomography, and if only one plane is shown.
     pub plane: Option<(&'static str, [f64; 3])>,
     /// For a curved plane the length of its line, mm; else None.
     pub along: Option<f64>,
@@ -150,8 +152,8 @@ impl Scene {
         self.marks_with(&self.settings.marks)
     }
 
-    /// The marks of every tile, in the order of the tiles, the rendering last; by `marks` in place of those in the scene's settings, which a viewer
-    /// may have changed since.
+    /// The marks of every tile like [`Scene::marks`], but from `marks` instead of the marks in the scene's settings, which a viewer may have changed
+    /// since the scene was made.
     pub fn marks_with(&self, marks: &Marks) -> Vec<TileMarks> {
         let mut all = Vec::new();
         if self.cuts_planes() {
@@ -264,8 +266,8 @@ impl PlaneName {
 }
 
 impl TileMarks {
-    /// Where the plane's letter is drawn: a corner at the upper edge, away from the probe's marker, relative to the middle of the tile in halves of
-    /// its width and height.
+    /// Where the plane's letter is drawn: the upper corner that is away from the probe's marker, right and down from the middle of the tile, in
+    /// halves of the tile's width and height.
     pub fn plane_corner(&self) -> [f64; 2] {
         match self.probe {
             Some(Edge::Right) => [-1.0, -1.0],

@@ -148,14 +148,16 @@ impl Slider {
         (self.applies)(settings)
     }
 
-    /// The present value of its setting. It may be outside the range if a scene file set it so. 0 if the setting is absent.
+    /// The present value of the slider's setting, or the first value if it changes several. It may be outside the range if a scene file set it so. 0
+    /// if the setting is absent.
     pub fn get(&self, settings: &Settings) -> f64 {
         let mut found = None;
         (self.each)(settings, &mut |value| found = found.or(Some(value)));
         found.unwrap_or(0.0)
     }
 
-    /// Sets its setting to the value, clamped to the slider's range. NaN changes nothing.
+    /// Sets the slider's setting to the value, clamped to `range`. A value too small to be anything but off becomes 0, which removes an optional
+    /// setting. NaN changes nothing.
     pub fn set(&self, settings: &mut Settings, value: f64) {
         if !value.is_nan() {
             let value = value.clamp(self.range[0], self.range[1]);

@@ -22,7 +22,8 @@ const WAY_STEP: f64 = 1.0 / 256.0;
 /// Size of a tile in the table for shaders, in vectors of four floats.
 pub(crate) const TILE_VECTORS: u32 = 9;
 
-/// A plane through the volume: a point on it, mm in space, and unit vectors: two in the plane and its normal.
+/// A plane through the volume: `at` is a point on it, mm in space. `right` and `down` are unit vectors in the plane, along the axes of its tile;
+/// `normal` is its unit normal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane {
     pub at: DVec3,
@@ -52,7 +53,8 @@ pub struct Tile {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Section {
     pub line: Line,
-    /// The place in space, mm, of the point (0, 0) of the line's coordinates, at the height that the middle of the tile shows.
+    /// The place in space, mm, of the point (0, 0) of the line's coordinates. Along the normal of the reference plane it lies where the middle of the
+    /// tile does.
     pub origin: DVec3,
     /// Unit vectors in space along which the line's coordinates increase: right and down on the reference plane.
     pub axes: [DVec3; 2],
@@ -96,15 +98,15 @@ pub const CURVE_COLOUR: [f64; 3] = [0.9, 1.0, 0.85];
 /// Colour between the tiles of tomography.
 const BETWEEN: [f64; 3] = [0.35, 0.35, 0.35];
 
-/// Pixel at which the n-th of `count` cells begins along an axis of `edge` pixels. Cell sizes differ by at most one pixel; of two cells the last is
-/// the larger one, like the rendering in a 4-up picture.
+/// Pixel at which cell `n` (from 0) of `count` cells begins along an axis of `edge` pixels. Cell sizes differ by at most one pixel; of two cells the
+/// last is the larger one, like the rendering in a 4-up picture.
 pub fn cell(edge: u32, n: u32, count: u32) -> u32 {
     (u64::from(edge) * u64::from(n) / u64::from(count.max(1))) as u32
 }
 
 impl Scene {
-    /// True if there are planes beside a rendering, cut from the section volume, which has the whole sector whatever region is rendered. False: there are
-    /// none, or they are cut from the rendered volume.
+    /// True if there are planes beside a rendering that are cut from the section volume, which has the whole sector whatever region is rendered.
+    /// False if there are no such planes, or if they are cut from the rendered volume.
     pub fn has_sections(&self) -> bool {
         self.settings.layout.has_planes() && !self.is_flat() && self.section_smooth.is_some()
     }
@@ -196,7 +198,7 @@ impl Scene {
             * DMat3::from_rotation_z(-settings.roll.to_radians())
     }
 
-    /// Smallest distance, mm, at which points of the line of a curved plane may be drawn from each other.
+    /// Least distance, mm, from a point to the next one while the line of a curved plane is drawn.
     pub fn least_apart(&self) -> f64 {
         let (low, high) = self.planes_box();
         NEXT_POINT * (high - low).length()
@@ -237,8 +239,8 @@ impl Scene {
     }
 
     /// The place in space, mm, of a point given by its coordinates on a plane, mm right and down: lateral and depth on A, elevation and depth on B,
-    /// lateral and -elevation on C, counted from lateral, depth (below the probe's face) and elevation 0. A plane that is turned turns them about the
-    /// middle of the insonified region.
+    /// lateral and -elevation on C. They count from lateral 0, the probe's face and elevation 0. Where planes are turned, the coordinates turn about
+    /// the middle of the insonified region.
     pub fn place_on_plane(&self, name: PlaneName, [across, along]: [f64; 2]) -> DVec3 {
         let (plane, origin) = (self.plane(name), self.plane_origin(name));
         let place = origin + plane.right * across + plane.down * along;
@@ -328,8 +330,8 @@ impl Scene {
         Tiling { columns, rows, pixel, tiles }
     }
 
-    /// Where the line of the curved plane lies on the tile of the plane that it is drawn on. None if there is no curved plane or no such tile. It is
-    /// there even if the curved plane itself is not shown.
+    /// Where the line of the settings' curved plane lies on the tile of the plane that it is drawn on, even if the curved plane itself is not shown.
+    /// None if there is no curved plane or no such tile.
     pub fn curve_line(&self, tiling: &Tiling) -> Option<CurveLine> {
         self.line_on_tile(tiling, self.settings.planes.curve.as_ref()?)
     }
@@ -349,9 +351,9 @@ impl Scene {
         })
     }
 
-    /// Places in space, mm, along the way between two places of the curved plane that is straight on its tile. None if one of them is not on the
-    /// curved plane, or if the line passes there twice. The curved plane is straightened without stretching, so that the length of this way is its
-    /// length on the tile.
+    /// Places in space, mm, along the way between two places of the curved plane that its tile shows as a straight line. The curved plane is
+    /// straightened without stretching, so that the way is as long as on the tile. None if no curved plane is shown, a place is not on it, or its
+    /// line passes a place twice.
     pub fn way_on_section(&self, from: DVec3, to: DVec3) -> Option<Vec<DVec3>> {
         let tiling = self.tiling();
         let tile = tiling.tiles.last().filter(|tile| tile.section.is_some())?;
@@ -393,7 +395,8 @@ impl Scene {
     }
 }
 
-/// The line of a curved plane on a tile of the picture: the number of the tile, and points to draw the line through, pixels of the picture.
+/// The line of a curved plane on a tile of the picture: the index of the tile in [`Tiling::tiles`], and points to draw the line through, pixels of
+/// the picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CurveLine {
     pub tile: usize,
@@ -485,8 +488,8 @@ impl Tile {
 }
 
 impl Tiling {
-    /// The lines at which the planes of the other tiles cut the first one, which is perpendicular to them: two ends each, pixels of the picture. They
-    /// reach beyond the tile.
+    /// The lines at which the planes of the other tiles cut the plane of the first one: two ends each, pixels of the picture. They reach beyond the
+    /// tile. The first tile must be perpendicular to the others ([`Scene::has_reference`]).
     pub fn slice_lines(&self) -> Vec<[[f64; 2]; 2]> {
         let Some((reference, slices)) = self.tiles.split_first() else { return Vec::new() };
         let middle = reference.middle();
@@ -534,8 +537,8 @@ impl Tiling {
         }
     }
 
-    /// Where a point in space lies on a tile: its position on the picture, pixels, and its distance from the plane, mm: along the normal, negative on
-    /// the other side; of a curved plane never negative.
+    /// Where a point in space lies on a tile: its position on the picture, pixels, and its distance from the tile's plane, mm. The distance is
+    /// positive on the side that the plane's normal points to, else negative; from a curved plane it is never negative.
     pub fn project(&self, tile: &Tile, point: DVec3) -> ([f64; 2], f64) {
         let from = point - tile.plane.at;
         let (along, off) = match &tile.section {

@@ -56,8 +56,9 @@ impl Scene {
         format!("format of the volume: {}, {why}", self.volume_format().name())
     }
 
-    /// The scene with `ray.sampling = "auto"` replaced by `fastest`, the fastest sampling of the device, and without bricks where they cost more time
-    /// than they save. Their cost is only known for a CPU, which is recognised by packed neighbours as its fastest sampling.
+    /// The scene with `ray.sampling = "auto"` replaced by `fastest`, the fastest sampling of the device, or by exact sampling where packed neighbours
+    /// do not pay. Bricks are left out where they cost more time than they save. That is only known for a CPU, which is recognised by packed
+    /// neighbours as its fastest sampling.
     pub fn sampled(mut self, fastest: Sampling) -> Scene {
         self.bricks_pay = fastest != Sampling::PackedNeighbours || self.settings.slices.still || {
             let [cost, saving] = self.brick_balance();

@@ -43,7 +43,7 @@ pub(super) struct Pitches {
     pub sample: f64,
     /// Distance of neighbouring pixels of a slice, mm: the mean of both axes.
     pub slice_pixel: f64,
-    /// Mean distance of neighbouring slices at the middle of the region, mm; 0 if there is only one.
+    /// Mean distance of neighbouring slices at the middle of the region, mm; 0 for a single frame of a probe.
     pub slice: f64,
     /// Distance of neighbouring rays of a picture with full resolution at the middle of the region, mm.
     pub ray: f64,

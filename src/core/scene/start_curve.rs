@@ -116,7 +116,7 @@ impl Scene {
     }
 }
 
-/// True if a place in space, mm, is nearer to the probe than the curve, which is one of [`Scene::start_curve`].
+/// True if a place in space, mm, is nearer to the probe than `curve`, whose depths are Y in space like those of [`Scene::start_curve`].
 pub fn is_before(curve: &StartCurve, place: DVec3) -> bool {
     place.y < curve.depth(place.x)
 }

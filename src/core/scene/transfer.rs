@@ -18,23 +18,22 @@ pub fn absorption(opacity: f64) -> f64 {
     (-(-opacity.clamp(0.0, 1.0)).ln_1p()).min(OPAQUE)
 }
 
-/// The rule by which an opacity of the transfer function becomes absorption. Look-up tables, exact rays and proven bounds take the same rule,
-/// though they interpolate between different values.
+/// The rule by which an opacity of the transfer function becomes absorption. Tables and exact integrals of rays use the same rule.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Absorption {
     /// Absorption where the opacity is 1, 1/mm; elsewhere in proportion to the opacity. None: opacities are those of one `reference_length`.
     pub extinction: Option<f64>,
-    /// Reference length, mm.
+    /// The length that opacities refer to where `extinction` is None, and over which [`Absorption::over_length`] gives the absorption, mm.
     pub reference_length: f64,
 }
 
 impl Absorption {
-    /// Absorption by opacities that refer to one reference length, mm.
+    /// The rule for opacities that refer to one reference length, mm.
     pub fn of_length(reference_length: f64) -> Absorption {
         Absorption { extinction: None, reference_length }
     }
 
-    /// The absorption that the settings of volume rendering ask for. `reference_length`: mm.
+    /// The rule that the settings of volume rendering ask for (`volume.extinction`). `reference_length`: mm.
     pub fn of(volume: &Volume, reference_length: f64) -> Absorption {
         Absorption { extinction: volume.extinction, reference_length }
     }
@@ -47,13 +46,14 @@ impl Absorption {
         }
     }
 
-    /// The opacity from which on the absorption is [`OPAQUE`] and does not rise further; 1 or more if it never is.
+    /// The opacity from which on the absorption is [`OPAQUE`], its maximum; above 1 if no opacity reaches it.
     pub fn opaque_from(self) -> f64 {
         self.extinction.map_or(1.0, |extinction| OPAQUE / (extinction * self.reference_length))
     }
 }
 
-/// Opacity of a step of absorption y = kappa ds / ds0: 1 - exp(-y).
+/// Opacity of a step whose optical depth is y: 1 - exp(-y). A step of length ds has y = kappa ds / ds0, with the absorption kappa over one reference
+/// length ds0.
 pub fn opacity(y: f64) -> f64 {
     -(-y).exp_m1()
 }

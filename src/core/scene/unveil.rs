@@ -59,7 +59,7 @@ impl Scene {
         row.round().clamp(0.0, f64::from(self.grid.size[1] - 1)) as u32
     }
 
-    /// For each texel of a slice, the column fastest: true if it lies within the sector.
+    /// For each texel of a slice, the column fastest: true if it lies within the sector. All are true for a Cartesian volume.
     pub fn sector_mask(&self) -> Vec<bool> {
         let [columns, rows] = self.grid.size;
         let texels = (0..rows).flat_map(|row| (0..columns).map(move |column| (column, row)));

@@ -89,7 +89,8 @@ impl Scene {
         self
     }
 
-    /// The frames (as slices) that stage 1 needs: those of the visible slices, and the neighbours that smoothing across slices reads.
+    /// The frames that stage 1 needs, by the numbers of their slices: those of the visible slices, and the neighbours that smoothing across slices
+    /// reads.
     pub fn visible_frames(&self) -> Range<u32> {
         let reach = self.reach_across_slices();
         let Range { start, end } = self.visible_bounds.slices();
@@ -113,8 +114,9 @@ impl Scene {
         Rectangle { first: [columns.0, rows.0], size: [columns.1, rows.1] }
     }
 
-    /// The texels of the volume that the device stores: the visible rectangle of all slices that stage 1 needs, at least one texel. Texel coordinates
-    /// everywhere are those of the whole volume; only where an image is accessed, its first texel is subtracted.
+    /// The texels of the volume that the device stores, at least one: the visible rectangle, in complete workgroups, of all slices that stage 1
+    /// needs, and the `kept_bounds` of the scene. Coordinates of texels are those of the whole volume everywhere; only where an image is accessed,
+    /// its first texel is subtracted.
     pub fn stored_bounds(&self) -> VisibleBounds {
         let (Rectangle { first, size }, slices) = (self.visible_rectangle([0; 2]), self.visible_frames());
         let shown = VisibleBounds {

@@ -16,7 +16,7 @@ pub const BODY_MARK_SIZES: [f64; 2] = [0.06, 0.5];
 pub struct BodyMark {
     /// The part of the body.
     pub body: Body,
-    /// Left and right are exchanged: the left breast, a fetus whose back is on the other side.
+    /// Exchanges left and right, for example for the left breast, or for a fetus whose back is on the other side.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub mirrored: bool,
     /// Its centre, as shares of the picture's width and height from the upper left corner. The whole mark stays on the picture. Absent: 0.12, 0.8.

@@ -9,11 +9,12 @@ pub const MAX_CUTS: usize = 32;
 /// Most corners of the contour of a cut.
 pub const MAX_CUT_POINTS: usize = 512;
 
-/// Most points of a brush.
+/// Most points of a brush, those of all its strokes together.
 pub const MAX_BRUSH_POINTS: usize = 512;
 
-/// A cut. What lies within its contour, seen from where that was drawn, is removed from renderings. The cut keeps its place in the volume whatever
-/// the view: a prism of a parallel view, a cone of one in perspective. Or, with `brush`, what lies near its strokes.
+/// A cut. What lies within its contour, seen from where that was drawn, is removed from renderings; with `keep = 'inside'` it is what lies outside.
+/// The cut keeps its place in the volume whatever the view: a prism of a parallel view, a cone of one in perspective. With `brush`, what lies near
+/// its strokes is removed instead.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Cut {
@@ -30,7 +31,7 @@ pub struct Cut {
     /// How deep the cut is: nothing is removed more than so many mm behind the contour's plane. Absent: it goes through everything.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depth: Option<f64>,
-    /// A brush in place of a contour; `keep` and `depth` are then absent.
+    /// A brush in place of a contour; `contour`, `view`, `keep` and `depth` are then absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub brush: Option<Brush>,
 }

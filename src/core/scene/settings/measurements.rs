@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 pub const MAX_MEASURES: usize = 64;
 /// Largest number of points of a measurement, or of one of its contours.
 pub const MAX_POINTS: usize = 512;
-/// Largest number of points of all measurements of a scene.
+/// Largest number of points of all measurements of a scene together.
 pub const MAX_ALL_POINTS: usize = 20_000;
 /// Largest number of contours of a volume measurement.
 pub const MAX_CONTOURS: usize = 64;
@@ -24,12 +24,12 @@ pub(crate) const MAX_MADE: usize = 200;
 pub struct Measurement {
     /// What is measured.
     pub kind: MeasureKind,
-    /// Its points in mm: lateral, depth (from the probe's face), elevation. A distance and an arrow (tip first) have 2, an angle has 3 (its vertex is
-    /// the second), an ellipse has 3 (the ends of one axis and one of the other), a text has 1, an automatic volume has 2 corners of its box; a
-    /// trace and a distance on the surface have 2 to 512.
+    /// Its points in mm: lateral, depth (from the probe's face), elevation. A text has 1; a distance and an arrow (tip first) have 2, and an
+    /// automatic volume has 2 corners of its box. An angle has 3 (its vertex is the second), and so has an ellipse (the ends of one axis and one of
+    /// the other). A trace has 3 to 512, a distance on the surface 2 to 512, a volume by contours none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub points: Vec<[f64; 3]>,
-    /// Of a volume: its contours, each of 3 to 512 points in mm, in parallel planes or in planes through one axis. At most 64.
+    /// Of a volume: its 2 to 64 contours, each of 3 to 512 points in mm, in parallel planes or in planes through one axis.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub contours: Vec<Vec<[f64; 3]>>,
     /// Text beside it, at most 80 characters.
@@ -38,22 +38,22 @@ pub struct Measurement {
     /// Of an automatic volume: the echo at the surface of the body, as a share of the sample range.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub threshold: Option<f64>,
-    /// Of an automatic volume: what was found, mm^3. It belongs to the volume that was shown then.
+    /// Of an automatic volume: its result, mm^3. It belongs to the volume of the recording that was shown then.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub counted: Option<f64>,
-    /// Of an automatic volume: both ends of its interval of 95 %, mm^3. Absent: it is a count of all voxels of the box whose echo reaches the threshold, as
-    /// former versions made it.
+    /// Of an automatic volume: both ends of its interval of 95 %, mm^3. Absent: the result is the volume of all voxels of the box whose echo reaches
+    /// the threshold, and has no interval.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub interval: Option<[f64; 2]>,
     /// Its points were picked on the rendered surface: it is drawn on renderings. Others are drawn on the planes that they lie in.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub on_surface: bool,
-    /// On what it was made. Absent: on nothing in particular; on other volumes than its own it is drawn dimmed.
+    /// What it was made on. Absent: nothing in particular. While another volume than that in `made` is shown, the measurement is drawn dimmed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub made: Option<Made>,
 }
 
-/// On what a measurement was made. The viewer writes it.
+/// What a measurement was made on: the volume, the plane or view, and the settings. The viewer writes it.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Made {
@@ -96,7 +96,8 @@ pub enum MeasureKind {
 }
 
 impl Measurement {
-    /// The number of the volume that it was made on, if that is not the volume `shown`; else None.
+    /// The number of the volume that the measurement was made on, if that is known and differs from the volume `shown`. None otherwise, and if
+    /// `shown` is None.
     pub fn other_volume(&self, shown: Option<u32>) -> Option<u32> {
         self.made.as_ref().map(|made| made.volume).filter(|volume| shown.is_some_and(|shown| shown != *volume))
     }

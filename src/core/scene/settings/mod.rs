@@ -63,16 +63,16 @@ pub struct Settings {
     pub clip: Vec<Clip>,
     /// The cut faces of clip planes.
     pub cap: Cap,
-    /// Cuts: parts of the volume within contours drawn on a rendering, at most 32. Renderings lose them; planes and the block of mode cube show
-    /// everything. Their edges are as fine as the texels of the volume.
+    /// Cuts, at most 32: each removes a part of the volume from renderings, by a contour that was drawn on one or by a brush. Planes and the block of
+    /// mode cube show everything. The edges of cuts are as fine as the texels of the volume.
     pub cuts: Vec<Cut>,
-    /// The render start that follows the fluid before a face.
+    /// The automatic render start, at the fluid in front of a face.
     pub unveil: Unveil,
     /// Stage 2: the camera.
     pub camera: Camera,
-    /// Stage 2: the rays of every mode.
+    /// Stage 2: the rays of every mode that casts some.
     pub ray: Ray,
-    /// Stage 2: volume rendering (modes volume and mixed).
+    /// Stage 2: volume rendering (modes volume and mixed, layout pair, and surfaces that it gives their colour).
     pub volume: Volume,
     /// Stage 2: surface rendering (modes surface and mixed).
     pub surface: Surface,
@@ -86,7 +86,7 @@ pub struct Settings {
     pub distance: Distance,
     /// Stage 3: light, shadow, occlusion and skin.
     pub light: Light,
-    /// Stage 2: volume rendering by paths of light. Absent: by emission and absorption.
+    /// Stage 2: volume rendering by random paths of light. Absent: by emission and absorption.
     pub still: Option<Still>,
     /// Stage 4: filters, tone and colour of the picture.
     pub post: Post,
@@ -103,8 +103,7 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// The settings while the view moves: one ray for four pixels, or as few as `ray.subsampling` says if that is more than 2. Stage 1 stays the
-    /// same.
+    /// The settings while the view moves: `ray.rays` is 1 and `ray.subsampling` at least 2, which is one ray for four pixels. Stage 1 stays the same.
     pub fn moving(&self) -> Settings {
         let subsampling = self.ray.subsampling.max(2);
         Settings { ray: Ray { subsampling, rays: 1, ..self.ray.clone() }, ..self.clone() }
@@ -122,7 +121,7 @@ impl Settings {
         self.with_drawings_of(&Settings::default())
     }
 
-    /// Changes the mode, and the layout if it does not fit: modes of planes have layout single, and layout pair needs mode surface.
+    /// Changes the mode. The layout becomes single if it does not fit: modes of planes take no other, and layout pair needs mode surface.
     pub fn set_mode(&mut self, mode: Mode) {
         self.mode = mode;
         if mode.is_flat() || (self.layout == Layout::Pair && mode != Mode::Surface) {
@@ -164,7 +163,7 @@ pub enum Mode {
 }
 
 impl Mode {
-    /// All modes, in the order of their keys in the view.
+    /// All modes, in the order of the viewer's keys for them (1 to 9, then 0).
     pub const ALL: [Mode; 10] = [
         Mode::Surface,
         Mode::Volume,
@@ -188,7 +187,7 @@ impl Mode {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Layout {
-    /// One picture.
+    /// One picture: the rendering or the planes of the mode.
     #[default]
     Single,
     /// 4-up: the three orthogonal planes and the rendering of the mode.
@@ -218,8 +217,8 @@ impl Default for Picture {
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Samples {
-    /// The values of the file that become 0 and 1; samples beyond are clamped. Absent: those of the probe file, or 0 and 255 for 8 bits, or
-    /// the smallest and largest sample, without far outliers.
+    /// The values of the file that become 0 and 1; samples beyond are clamped. Absent: those that the probe file states, otherwise 0 and 255 for 8
+    /// bits, otherwise the smallest and largest sample, without far outliers.
     pub range: Option<[f64; 2]>,
 }
 
@@ -264,9 +263,9 @@ pub struct Clip {
 pub struct Cap {
     /// Show the echoes of cut faces.
     pub enabled: bool,
-    /// The echo from which on there is tissue, before any grey window: a mean over the length of an edge (`surface.edge`). Absent: of surfaces the echo at
-    /// `surface.threshold` within `surface.window`, of volume rendering the least echo from which on all are opaque. A lower level fills darker tissue, too,
-    /// such as the brain within a skull.
+    /// The echo from which on there is tissue, before any grey window. It is compared with means over a disc of the cut face; the disc's radius is
+    /// the length of an edge (`surface.edge`). Absent: of surfaces the echo at `surface.threshold` within `surface.window`, of volume rendering the
+    /// least echo from which on all are opaque. A lower level fills darker tissue, too, such as the brain within a skull.
     pub level: Option<f64>,
 }
 
@@ -276,7 +275,7 @@ impl Default for Cap {
     }
 }
 
-/// All numbers of the settings that have a [`Number`], in the order of their sliders.
+/// The [`Number`]s of the settings. Within each [`Group`], those with a slider are in the order in which the viewer shows the sliders.
 pub fn numbers() -> impl Iterator<Item = &'static Number> {
     NUMBERS.iter().copied().flatten()
 }

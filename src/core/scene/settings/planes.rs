@@ -9,9 +9,9 @@ use crate::scene::{Mode, Scene, Settings};
 use serde::{Deserialize, Serialize};
 
 /// Modes plane, orthogonal and tomography, and the planes of layouts four and beside. A position and three angles define one coordinate frame for all
-/// planes: A is the B-mode plane (lateral to the right, depth down), B is perpendicular to it (elevation to the right, depth down), C is the coronal
-/// plane (lateral to the right, elevation up). All tiles have the same scale and are centred on the middle of the region, so that scrolling does not
-/// shift them.
+/// planes. A is the B-mode plane (lateral to the right, depth down), B is perpendicular to it (elevation to the right, depth down), C is the coronal
+/// plane (lateral to the right, elevation up). All tiles are centred on the middle of the region, so that scrolling does not shift them, and have the
+/// same scale unless the line of a curved plane is too long for it.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Planes {
@@ -19,7 +19,7 @@ pub struct Planes {
     pub window: [f64; 2],
     /// The common point of the three planes: lateral, depth, elevation in mm as in `region`. Absent: the middle of the region.
     pub position: Option<[f64; 3]>,
-    /// Rotation about the depth axis, deg: +90 turns the right of plane A towards elevation.
+    /// Rotation about the depth axis, deg: +90 turns the right of plane A towards +elevation.
     pub azimuth: f64,
     /// Rotation about the resulting lateral axis, deg: moves the lower edge of plane A towards +elevation.
     pub tilt: f64,
@@ -31,17 +31,17 @@ pub struct Planes {
     pub slab: Slab,
     /// Zoom factor, 0.001..=1000; 1 fits the region into a tile.
     pub zoom: f64,
-    /// The plane of mode plane and of tomography.
+    /// The plane that mode plane shows, and that the slices of tomography are parallel to.
     pub plane: PlaneName,
     /// Columns of tomography; at most 64 tiles in all.
     pub columns: u32,
     /// Rows of tomography.
     pub rows: u32,
-    /// Distance between the planes of neighbouring tiles, mm. The middle tile is at `position`. A moves towards +elevation, B towards
-    /// +lateral, C along depth. Absent: the planes divide the region evenly.
+    /// Distance between the planes of neighbouring tiles, mm. The middle tile is at `position`; of an even number of tiles the middle two are equally
+    /// far from it. From tile to tile A moves towards +elevation, B towards +lateral, C along depth. Absent: the planes divide the region evenly.
     pub spacing: Option<f64>,
-    /// The first tile of tomography is a reference: the plane across the slices, with a line where each of them is. The viewer and `render` draw the
-    /// lines.
+    /// The first tile of tomography is a reference: a plane across the slices (B if they are of plane A, else A), with a line where each of them is.
+    /// The viewer and `render` draw the lines.
     pub reference: bool,
     /// Draws cross-lines where the other planes cut a tile, and a frame in the plane's colour: A yellow, B magenta, C cyan. Tomography has
     /// thin grey lines between tiles.
@@ -61,10 +61,11 @@ pub struct Planes {
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Curve {
-    /// The plane that it is drawn on. It turns with that plane, and stays when the plane is stepped.
+    /// The plane that the line is drawn on. The line turns with that plane, and stays in the volume when the plane is stepped.
     pub plane: PlaneName,
-    /// 2 to 64 points of the plane, mm: lateral and depth on A, elevation and depth on B, lateral and -elevation on C, as in `region`. Planes that are turned turn
-    /// them about the middle of the insonified region. The line is a smooth cubic through them; two points make a straight line.
+    /// 2 to 64 points of the plane, mm: lateral and depth on A, elevation and depth on B, lateral and -elevation on C, as in `region`. Where planes
+    /// are turned, the points turn about the middle of the insonified region. The line is a smooth cubic through them; two points make a straight
+    /// line.
     pub points: Vec<[f64; 2]>,
 }
 
@@ -94,7 +95,8 @@ impl Default for Planes {
     }
 }
 
-/// How the samples through a slab are combined. Only samples inside the insonified region count.
+/// How the samples through a slab are combined. Only samples that are inside the insonified region and are not cut off by region or clip planes
+/// count.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Slab {

@@ -15,7 +15,7 @@ pub struct Conditioning {
     pub tgc: Vec<Gain>,
     /// Dynamic range of log compression, dB, for linear envelopes (20 dB per decade). Absent: the samples are compressed already.
     pub dynamic_range: Option<f64>,
-    /// Dynamic range that 0..1 stands for in samples that are compressed already, dB. Scales the effect of a gain.
+    /// Dynamic range, dB, that 0..1 stands for in samples that are compressed already: a gain of so many dB adds 1 to a sample.
     pub compressed_range: f64,
     /// Standard deviation of the Gaussian low pass along each line, 0..=32 samples; 0 for none. Absent: half the decimation factor if
     /// lines are decimated, else none.
@@ -100,7 +100,7 @@ pub struct Slices {
     /// Slight Gaussian blur of 3x3 against wood grain, the trace of the pixel lattice on a tilted surface (thesis Fig. 32, 33); `rendered`: in modes that
     /// cast rays, and not in planes. Has no effect where `smooth` blurs slices already.
     pub blur: Blur,
-    /// Storage of the volume.
+    /// Texel format of the volume.
     pub format: VolumeFormat,
     /// Converts and filters the whole volume, not only the part that the region, start depths and clip planes leave visible, or that the
     /// shown planes cross. The picture is the same; a region that grows or a plane that moves then needs no new frames. The viewer sets it
@@ -161,7 +161,8 @@ impl VolumeFormat {
     }
 }
 
-/// Lee's sigma filter: the mean of the pixels of a window whose values lie within 2 sigma of the centre.
+/// Lee's sigma filter: the mean of the pixels of a window whose values lie within 2 sigma of the centre. Where too few do, it is the mean of the four
+/// neighbours.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Sigma {
@@ -195,8 +196,8 @@ pub enum Noise {
     Multiplicative,
 }
 
-/// The enhanced sigma filter (thesis 5.4): the window grows where too few neighbours are similar to the centre, and the centre is
-/// estimated first.
+/// The enhanced sigma filter (thesis 5.4): a sigma filter that estimates the centre first. Its window grows, ring by ring, until as many pixels are
+/// within 2 sigma of the estimate as the starting window holds, or until it has its largest size.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct EnhancedSigma {
@@ -204,7 +205,7 @@ pub struct EnhancedSigma {
     pub window: u32,
     /// Largest window size, pixels. Thesis Tables 7-9: 17, 19, 19 (21 in Table 8), 21, 21, 23 for starts of 3, 5, 7, 9, 11, 13.
     pub largest: u32,
-    /// Starting window size in mm, in place of `window`: the nearest odd number of pixels. Not in `post`.
+    /// Starting window size in mm, in place of `window`: the nearest odd number of pixels, at least 3 and at most 63. Not in `post`.
     pub window_mm: Option<f64>,
     /// Largest window size in mm, in place of `largest`: at least that of the starting window; less than two pixels are no filter. Not in `post`.
     pub largest_mm: Option<f64>,
@@ -276,8 +277,8 @@ pub struct PeronaMalik {
     pub edge: f64,
     /// Conductance function: how the diffusion falls with the difference of neighbouring values.
     pub conductance: Conductance,
-    /// Diffusion time of one step, pixels^2: lambda of the explicit scheme, at most 1/4, where a checkerboard, the highest frequency, only flips its sign at
-    /// each step; at 1/5 three fifths of it are left. tau of AOS, unlimited; of RKL1 at most 200.
+    /// Diffusion time of one step, pixels^2. Lambda of the explicit scheme is at most 1/4, where a checkerboard, the highest frequency, only flips
+    /// its sign at each step; at 1/5 three fifths of it are left. Tau of AOS is at most 1e9, that of RKL1 at most 200.
     pub step: f64,
     /// Number of steps.
     pub repeat: u32,
@@ -335,8 +336,8 @@ pub enum Scheme {
     Rkl1,
 }
 
-/// Conductance as a function of the difference g of two neighbours: the two of Perona and Malik (1990, section V), which the thesis takes
-/// over (5.4.2). The paper says what each of them favours.
+/// Conductance as a function of the difference g of two neighbours, with the edge constant k: the two of Perona and Malik (1990, section V), which
+/// the thesis takes over (5.4.2). The paper says what each of them favours.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Conductance {

@@ -6,7 +6,8 @@ use crate::scene::number::{ANGLE, LENGTH, Number, PLACE, SHARE, number, start_de
 use crate::scene::{Mode, Settings};
 use serde::{Deserialize, Serialize};
 
-/// The camera. With all angles zero it looks from the probe into the body, with lateral to the right.
+/// The camera. With all angles zero it looks from the probe into the body, with lateral to the right. A single frame is seen from the side instead,
+/// like a B-mode picture.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Camera {
@@ -53,20 +54,22 @@ pub struct Ray {
     pub sliding: u32,
     /// How the slice index at a position of the sweep is computed.
     pub slice_index: SliceIndex,
-    /// Entries of the look-up tables of the sweep (where it has one) and the lines. Linear interpolation between entries h apart is off by at most
-    /// h^2/8 times the second derivative of the index: with 1025 entries by less than 1e-6 slices for a sweep of 142 frames over 85 deg.
+    /// Entries of the look-up table of the slice index, where no polynomial replaces it, and of the table of the lines. Linear interpolation between
+    /// entries h apart is off by at most h^2/8 times the second derivative of the index: with 1025 entries by less than 1e-6 slices for a sweep of
+    /// 142 frames over 85 deg.
     pub entries: u32,
     /// Rays per pixel along each axis: the picture is rendered larger and averaged.
     pub rays: u32,
     /// Adaptive supersampling: all of `rays` only in pixels at edges, where the colour bends by more than two levels of 8 bits; one in each of the
-    /// others. The picture is that of all rays within a level. In mode volume without first-hit shading and without cut faces; other pictures have all
-    /// rays.
+    /// others. The picture differs by at most a level from that of all rays. Only in mode volume, and not with first-hit shading, cut faces or
+    /// `still`: other pictures have all rays.
     pub adaptive: bool,
-    /// Largest error of a pixel that its rays and their steps may leave, 0.01..=64 levels of 8 bits of the finished picture; 0 takes the same steps in all
-    /// pixels. A ray through every other pixel of every other row begins with `step`, at most a slice pixel. It takes shorter steps, down to a 32nd of that,
-    /// where its light differs by more than the tolerance from that of steps of twice the length. The pixels between are means of these rays where the
-    /// picture bends little from ray to ray, and have rays of their own elsewhere. Light is integrated between samples whatever `volume.compositing` says.
-    /// The error is an estimate; only of pixels whose rays meet nothing but empty bricks it is known to be 0. In mode volume without first-hit shading.
+    /// Largest error of a pixel that its rays and their steps may leave, 0.01..=64 levels of 8 bits of the finished picture; 0 takes the same steps
+    /// in all pixels. A ray through every other pixel of every other row begins with `step`, at most a slice pixel. It takes shorter steps, down to a
+    /// 32nd of that, where its light differs by more than the tolerance from that of steps of twice the length. The pixels between are means of these
+    /// rays where the picture bends little from ray to ray, and have rays of their own elsewhere. Light is integrated between samples whatever
+    /// `volume.compositing` says. The error is an estimate; only of pixels whose rays meet nothing but empty bricks it is known to be 0. Only in mode
+    /// volume, and not with first-hit shading or `still`.
     pub tolerance: f64,
     /// Brick size of empty-space skipping, texels; 0 takes every sample. Rays skip bricks that cannot change the picture, so
     /// that it stays the same bit for bit. Absent: 8; a CPU skips only where this saves more time in one picture of a volume than computing
@@ -132,7 +135,7 @@ impl Sampling {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum SliceIndex {
-    /// By a polynomial of up to 10 terms with an error of at most 1e-6 slices; a fan wider than 180 degrees takes the table.
+    /// By a polynomial with an error of at most 1e-6 slices; by the table for a fan so wide that the polynomial would need more than 10 terms.
     #[default]
     Auto,
     /// By a look-up table of `entries` entries.
@@ -159,7 +162,7 @@ pub enum Elevation {
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Volume {
-    /// Grey window: samples in this interval are stretched to 0..1 first.
+    /// Grey window: samples in this interval are stretched to 0..1 before the transfer function is applied.
     pub window: [f64; 2],
     /// Start depth, mm below the probe's face (Cartesian: along the depth axis): rays ignore everything nearer to the probe. Absent: the region's
     /// near face.
@@ -170,13 +173,13 @@ pub struct Volume {
     pub colour: Option<TransferName>,
     /// Opacities of this function in place of those of `transfer`.
     pub opacity: Option<TransferName>,
-    /// Extinction where the transfer function's opacity is 1, 1/mm; elsewhere in proportion to the opacity. Absent: opacities are those of one voxel
-    /// (one slice pixel).
+    /// Extinction where the transfer function's opacity is 1, 1/mm; elsewhere it is in proportion to the opacity. Absent: an opacity is that of
+    /// matter as thick as one voxel (one slice pixel).
     pub extinction: Option<f64>,
-    /// Entries of the transfer function's table, 16..=4096 (at most 1024 with pre-integrated compositing); absorption is linear between two. Absent:
-    /// 256, or as many as it takes to meet points of the transfer function that are closer than an entry.
+    /// Entries of the transfer function's table, 16..=4096 (at most 1024 with compositing pre-integrated or exponential); absorption is linear
+    /// between two. Absent: 256, or as many as it takes to meet points of the transfer function that are closer than an entry.
     pub entries: Option<u32>,
-    /// Samples below this are transparent, after the window.
+    /// Samples that are below this after the window are transparent.
     pub threshold: f64,
     /// Compositing rule.
     pub compositing: Compositing,
@@ -237,7 +240,7 @@ pub enum Shading {
     /// Colours of the transfer function alone.
     #[default]
     None,
-    /// Colours change from a near tint to a far tint.
+    /// Colours are multiplied by a tint that goes from `near_tint` at the nearest point of the box to `far_tint` at the farthest.
     DepthCoded,
     /// The point where a ray's opacity reaches `hit` is lit like a surface, by stage 3.
     FirstHit,
@@ -276,11 +279,11 @@ pub enum TransferName {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct TransferPoint {
-    /// Sample value, 0..1.
+    /// Sample value after the grey window, 0..1.
     pub at: f64,
     /// Colour, red, green and blue in 0..1.
     pub colour: [f64; 3],
-    /// Opacity of one voxel (one slice pixel), 0..1; with `volume.extinction` the share of that instead.
+    /// Opacity of matter as thick as one voxel (one slice pixel), 0..1; with `volume.extinction` the share of that extinction instead.
     pub opacity: f64,
 }
 
@@ -288,25 +291,26 @@ pub struct TransferPoint {
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Surface {
-    /// Grey window: samples in this interval are stretched to 0..1 first.
+    /// Grey window: samples in this interval are stretched to 0..1 before the surface is detected.
     pub window: [f64; 2],
     /// Start depth, mm below the probe's face: rays ignore everything nearer to the probe. Absent: the region's near face.
     pub start_depth: Option<f64>,
     /// Detection rule.
     pub detector: Detector,
-    /// Detectors `adaptive` and `lasting`: how many standard deviations of the noise in front of an edge its difference must exceed, 0..=10. A weaker
-    /// edge counts only if the ray has no other.
+    /// Detectors `adaptive` and `lasting`: the difference at an edge must exceed this many standard deviations of the noise in front of the edge. A
+    /// weaker edge counts only if the ray has no other.
     pub noise: f64,
-    /// Length of an edge, mm: the difference is the mean echo over this length behind a place minus the mean echo over this length in front
-    /// of it, at any step of the rays. The detector takes at least 4 and at most 256 samples of this length. `samples`: 4 steps of the
-    /// rays, as in the thesis, so that the step decides which edges are found. Absent: 4 slice pixels.
+    /// Length of an edge, mm. The detector's difference at a place is the mean echo over this length behind the place minus the mean echo over this
+    /// length in front of it, at any step of the rays. The detector takes at least 4 and at most 256 samples of this length. `samples`: 4 steps of
+    /// the rays, as in the thesis, so that the step decides which edges are found. Absent: 4 slice pixels.
     pub edge: Option<Edge>,
-    /// Detection threshold on the difference of the means of the newer and the older half of the ring of samples, 1e-6..=1.
+    /// Detection threshold: an edge is where the detector's difference (see `edge`), after the window, exceeds it.
     pub threshold: f64,
-    /// Threshold of the rough detector, 1e-6..=1. Absent: that of the fine one.
+    /// Threshold of the rough detector (`rough`). Absent: `threshold`.
     pub rough_threshold: Option<f64>,
-    /// Step of the rough detector in fine steps, 1..=8; 1 disables it. It passes over specks and some noise, and misses walls that are weak or
-    /// thinner than its ring. The thesis has one of 2.
+    /// Step of the rough detector in steps of the fine one; 1 disables it. The rough detector searches first. Where it fires, the ray steps back and
+    /// the fine detector finds the place. The rough one passes over specks and some noise, and misses walls that are weak or thinner than its ring of
+    /// samples. The thesis has one of 2.
     pub rough: u32,
     /// Sign of the edge.
     pub sign: Sign,
@@ -314,7 +318,7 @@ pub struct Surface {
     pub place: Place,
     /// Which surface along the ray; 1 is the outermost.
     pub number: u32,
-    /// What is lit: a constant colour, or the volume through the transfer function.
+    /// The colour of the lit surface: a constant one, or that of the volume through the transfer function.
     pub colour: SurfaceColour,
     /// Depth, mm, of the volume behind the surface that gives the surface its colour with `colour = "behind"`.
     pub colour_depth: f64,
@@ -406,8 +410,8 @@ pub enum Sign {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Place {
-    /// The maximum of the difference, refined by a parabola: a place that does not depend on the edge's height. The difference is followed until it falls
-    /// below 0.7 of its maximum, over at most the edge's length times max(1, 0.25 / threshold).
+    /// The maximum of the difference, refined by a parabola: a place that does not depend on the edge's height. The difference is followed until it
+    /// falls below 0.7 of its maximum, over at most the edge's length times 0.25 / threshold, which counts as at least 1 and at most 16.
     #[default]
     Peak,
     /// The middle between the two places where the difference is 0.7 of its maximum: more accurate for low edges in samples of 8 bits.
@@ -420,7 +424,7 @@ pub enum Place {
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Projection {
-    /// Grey window: samples in this interval are stretched to 0..1 first.
+    /// Grey window: samples in this interval are stretched to 0..1 before the projection.
     pub window: [f64; 2],
     /// Start depth, mm below the probe's face: rays ignore everything nearer to the probe. Absent: the region's near face.
     pub start_depth: Option<f64>,

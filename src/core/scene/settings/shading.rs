@@ -21,9 +21,9 @@ pub struct Distance {
     pub bilateral: Option<Bilateral>,
     /// Sigma filter; sigma in mm.
     pub sigma: Option<Sigma>,
-    /// Enhanced sigma filter; sigma and edge in mm. A miss stays a miss and does not count.
+    /// Enhanced sigma filter; sigma and edge in mm. A miss (a ray that meets no surface) stays a miss and does not count.
     pub enhanced_sigma: Option<EnhancedSigma>,
-    /// Perona-Malik diffusion; edge in mm, explicit scheme. Nothing flows to or from a miss.
+    /// Perona-Malik diffusion; edge in mm, explicit scheme. Nothing flows to or from a miss (a ray that meets no surface).
     pub perona_malik: Option<PeronaMalik>,
 }
 
@@ -58,7 +58,7 @@ impl Distance {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Bilateral {
-    /// Standard deviation in the picture, pixels.
+    /// Standard deviation in the picture, pixels of the distance map.
     #[serde(default)]
     pub pixels: f64,
     /// Standard deviation in the picture in mm at the middle of the region, in place of `pixels`. It is limited to 10 pixels; below a tenth of a pixel
@@ -90,7 +90,7 @@ pub struct Light {
     pub direction: DVec3,
     /// What the direction is relative to.
     pub follows: Follows,
-    /// Position of a near (point) light, mm from the camera's target. Absent: the light is distant.
+    /// Position of a near (point) light, mm from the camera's target along right, up and towards the viewer. Absent: the light is distant.
     pub position: Option<DVec3>,
     /// Ambient coefficient of Blinn-Phong shading; it may exceed 1.
     pub ambient: f64,
@@ -154,9 +154,9 @@ impl Default for Light {
 }
 
 /// Light volume: light is propagated through a lattice of cells over the region, absorbed by what the transfer function makes opaque, red least,
-/// spread as it goes, and scattered on in tissue. The coefficients of the light are those of `light`; surfaces,
-/// which have no film curve, divide those by the sum of ambient and diffuse where that exceeds 1. Colours are linear light: Narkowicz's fit (2015)
-/// of the ACES film curve compresses them, so that no highlight is cut off, and a gamma of 2.2 encodes them for a screen.
+/// spread as it goes, and scattered on in tissue. The coefficients of the light are those of `light`. Surfaces have no film curve: for them ambient
+/// and diffuse are divided by their sum where that exceeds 1. Colours are linear light: Narkowicz's fit (2015) of the ACES film curve compresses
+/// them, so that no highlight is cut off, and a gamma of 2.2 encodes them for a screen.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct LightVolume {
@@ -178,8 +178,8 @@ pub struct LightVolume {
     pub scatter: f64,
     /// Reach of ambient light, mm: matter farther away than this does not occlude it.
     pub reach: f64,
-    /// Slope of the echo (0..1) per mm from which on the orientation of a surface is certain: half that of skin in fluid after a Gaussian of 1.5 mm.
-    /// Where the echo is flatter, light depends less on the orientation.
+    /// Slope of the echo (0..1) per mm from which on the orientation of a surface is certain. The default is half the slope of skin in fluid after a
+    /// Gaussian of 1.5 mm. Where the echo is flatter, light depends less on the orientation.
     pub slope: f64,
     /// How much light depends on the orientation of the tissue's surface: 0 not at all, 1 fully.
     pub relief: f64,
@@ -191,18 +191,18 @@ pub struct LightVolume {
     pub back_direction: DVec3,
     /// Colour of the back light, 0..=10.
     pub back_colour: [f64; 3],
-    /// Exposure: factor of the light before the response curve, 0..=100.
+    /// Exposure: factor of the light before the film curve, 0..=100.
     pub exposure: f64,
-    /// The backdrop behind a volume that fills the picture. Absent: black.
+    /// The backdrop that fills the picture behind the volume. Absent: black.
     pub ground: Option<Ground>,
 }
 
-/// A backdrop that is bright in the middle of the picture, a little above it, and falls off to its edges. Colours are linear light, like those of the
+/// A backdrop that is brightest a little above the middle of the picture and falls off to its edges. Colours are linear light, like those of the
 /// transfer function, and may exceed 1.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Ground {
-    /// Colour in the middle.
+    /// Colour where it is brightest.
     pub middle: [f64; 3],
     /// Colour at the edges.
     pub edge: [f64; 3],
@@ -241,15 +241,15 @@ impl Default for LightVolume {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Shadow {
-    /// Shadow coefficient: the share of what it dims that a shadow removes.
+    /// Share of the light named by `dims` that a full shadow removes.
     pub strength: f64,
     /// Width of the shadow's edge per mm of distance to the obstacle, 0..=10; 0 is a hard edge.
     pub softness: f64,
-    /// Maximum distance of an obstacle, mm.
+    /// Maximum distance of an obstacle from the place that it shades, mm.
     pub reach: f64,
-    /// Assumed thickness of the visible surface, mm.
+    /// Assumed thickness of the visible surface, mm: light that passes farther behind it is not blocked.
     pub thickness: f64,
-    /// Bias, mm: obstacles lower than this cast no shadow, so that noise of the distance map does not.
+    /// Bias, mm: light is blocked only where it passes more than this behind the visible surface, so that noise of the distance map casts no shadow.
     pub bias: f64,
     /// What a shadow dims.
     pub dims: Dims,
@@ -276,9 +276,9 @@ impl Default for Shadow {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Occlusion {
-    /// Radius, mm.
+    /// Radius around a place on the surface within which the surface occludes it, mm.
     pub radius: f64,
-    /// Strength, 0..=4; 1 is the share of the hemisphere that is hidden.
+    /// Strength, 0..=4: factor of the share of the hemisphere that is hidden. Ambient light loses the product.
     pub strength: f64,
 }
 
@@ -296,7 +296,7 @@ pub struct Skin {
     pub wrap: f64,
     /// Translucency: factor, 0..1, of the light that passes through thin tissue.
     pub translucency: f64,
-    /// Depth behind the surface over which echoes are averaged, mm.
+    /// Depth behind the surface over which echoes are averaged to tell thin tissue, mm.
     pub depth: f64,
     /// Colour of the light that passes through tissue, 0..=10.
     pub colour: [f64; 3],
@@ -318,8 +318,9 @@ pub struct Post {
     pub enhanced_sigma: Option<EnhancedSigma>,
     /// Perona-Malik diffusion.
     pub perona_malik: Option<PeronaMalik>,
-    /// Antialiasing of surfaces, and of cut faces, that have one ray a pixel. A pixel at an outline or a fold, a step in distance of `light.cliff`, mixes what is
-    /// near and what is far by the share of its area that each covers. The edge between them follows from the distances of the pixels around it.
+    /// Antialiasing of surfaces, and of cut faces, that have one ray a pixel. A pixel at an outline, or at a fold where distances differ by
+    /// `light.cliff`, mixes what is near and what is far by the share of its area that each covers. At folds this begins at half of `light.cliff`.
+    /// The edge between them follows from the distances of the pixels around it.
     pub antialias: bool,
     /// Added to the brightness, whose range is 0..1, after the contrast: -1..=1.
     pub brightness: f64,

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Still {
-    /// Paths of a pixel. The standard error of the picture goes as one over the root of it.
+    /// Paths of a pixel. The standard error of the picture falls with the square root of their number.
     pub samples: u32,
     /// Seed of the random numbers. The same seed and number of samples give the same picture.
     pub seed: u32,
@@ -23,7 +23,7 @@ pub struct Still {
     pub anisotropy: f64,
     /// Most collisions of a path; what light would do after them is missing.
     pub events: u32,
-    /// Samples of a dispatch; more where all of them would take over 64 dispatches. It changes no bit of the picture.
+    /// Paths of a pixel in each dispatch; more where all of them would take over 64 dispatches. The value changes no bit of the picture.
     pub batch: u32,
 }
 
