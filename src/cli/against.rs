@@ -174,8 +174,8 @@ pub fn end_turn() {
 }
 
 /// Measures this program with its own arguments and `other` alternately, in the order A B B A, and compares the times. `repeats`: number of measured
-/// volumes of each side, at least; they are divided into blocks of equal size. Each block is a pair of processes, which first draw `warm_up` volumes
-/// that are not measured. An error if a process fails or ends early.
+/// volumes of each side, at least. They are divided into blocks; only the first block may be larger, because the number of blocks follows from its
+/// passes. Each block is a pair of processes, which first draw `warm_up` volumes that are not measured. An error if a process fails or ends early.
 pub fn compared(other: &Other, repeats: u32, warm_up: u32, options: &CompareOptions) -> Result<Comparison, Failure> {
     let mut sides = sides(other)?;
     let folder = WorkFolder::new(&std::env::temp_dir(), "echolume-profile-").map_err(failed)?;

@@ -19,7 +19,7 @@ const INK: RGBColor = RGBColor(214, 221, 229);
 const LEAST_END: u16 = 16;
 /// Share of the pixels that may lie beyond the scale's end.
 const BEYOND: f64 = 0.01;
-/// Most tiles of a picture.
+/// Maximum number of tiles in a picture of compared volumes; a tile of their difference counts.
 pub const MAX_TILES: usize = 4;
 
 /// Name of the tile that shows the difference of two pictures.

@@ -108,7 +108,7 @@ pub fn read(file: &Path) -> Result<Vec<UserPreset>, String> {
     Ok(kept.preset)
 }
 
-/// Replaces the presets in a file. If this fails, the file stays unchanged.
+/// Replaces the presets in a file, which need not exist. If this fails, the file stays unchanged.
 ///
 /// # Errors
 /// One line: the existing file is damaged, there are more than [`MAX_PRESETS`] presets, or the file cannot be written.

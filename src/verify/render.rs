@@ -13,7 +13,7 @@ use std::sync::Arc;
 /// a shader reads (0..1).
 ///
 /// # Errors
-/// The device fails.
+/// Those of [`Renderer::new`], [`Renderer::frame`] and [`Renderer::show`]: for example, a frame of another size, or more frames than slices.
 pub fn sent(
     context: &Arc<Context>,
     scene: &Scene,
@@ -28,7 +28,7 @@ pub fn sent(
 /// Sends the frames of a volume into volume image `image`, alone and in batches of two and three, and selects that image for the next picture.
 ///
 /// # Errors
-/// The device fails.
+/// Those of [`Renderer::frame`] and [`Renderer::show`]: for example, a frame of another size, or more frames than slices.
 pub fn send(renderer: &mut Renderer, frames: &[Texels], image: u32) -> Result<(), GpuError> {
     let format = Slot::Frames.format(renderer.scene());
     for (k, frame) in frames.iter().enumerate() {
@@ -43,7 +43,7 @@ pub fn send(renderer: &mut Renderer, frames: &[Texels], image: u32) -> Result<()
 /// Renders one picture with a new renderer. `frames`: one array for each slice in geometric order, with the values that a shader reads (0..1).
 ///
 /// # Errors
-/// The device fails.
+/// Those of [`sent`], or the device fails.
 pub fn picture(context: &Arc<Context>, scene: &Scene, frames: &[Texels]) -> Result<Picture, GpuError> {
     sent(context, scene, frames, &RendererOptions::default())?.picture()
 }
@@ -51,7 +51,7 @@ pub fn picture(context: &Arc<Context>, scene: &Scene, frames: &[Texels]) -> Resu
 /// The content of a slot after a new renderer has drawn a picture.
 ///
 /// # Errors
-/// The device fails, or no pass writes the slot.
+/// Those of [`sent`], the device fails, or no pass writes the slot.
 pub fn slot(context: &Arc<Context>, scene: &Scene, frames: &[Texels], slot: Slot) -> Result<Texels, GpuError> {
     let mut renderer = sent(context, scene, frames, &RendererOptions::default())?;
     renderer.picture()?;

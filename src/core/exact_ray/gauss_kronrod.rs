@@ -42,7 +42,7 @@ pub struct Rule {
     pub inner: [[f64; COUNT]; COUNT],
 }
 
-/// The 15-point Gauss-Kronrod rule with its embedded 7-point Gauss rule.
+/// The 15-point Gauss-Kronrod rule over -1..1, with its embedded 7-point Gauss rule. The nodes ascend.
 pub static RULE: LazyLock<Rule> = LazyLock::new(|| {
     let positive = |i: usize| if i < 8 { i } else { COUNT - 1 - i };
     let nodes: [f64; COUNT] = std::array::from_fn(|i| if i < 8 { -POSITIVE[i] } else { POSITIVE[positive(i)] });

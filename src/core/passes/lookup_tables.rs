@@ -102,8 +102,8 @@ pub(super) fn sweep_border(probe: &Probe) -> [f64; 2] {
 }
 
 /// Position in the sweep, in mean slice pitches from slice 0, at `ray.entries` equidistant abscissae from the first slice to the last. The abscissa
-/// is the tangent of half the angle of a fan, otherwise mm. For a uniform sweep the position is the fractional slice index. Empty for a Cartesian
-/// volume.
+/// is the tangent of half the angle of a fan, otherwise mm. For a uniform sweep the position is the fractional slice index; for others,
+/// [`slice_table`] has the position of each slice. Empty for a Cartesian volume.
 pub fn sweep_lut(scene: &Scene) -> Vec<f32> {
     let Some(probe) = scene.probe() else { return Vec::new() };
     let entries = scene.settings.ray.entries;

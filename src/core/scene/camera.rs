@@ -47,7 +47,7 @@ pub fn ray_size(settings: &Settings) -> [u32; 2] {
     full_size(settings).map(|n| n.div_ceil(settings.ray.subsampling))
 }
 
-/// Number of rays along each axis without `ray.subsampling`.
+/// Number of rays along each axis without `ray.subsampling`: the pixels of the rendering times `ray.rays`.
 pub fn full_size(settings: &Settings) -> [u32; 2] {
     settings.layout.rendering(settings.picture.size).size.map(|n| n * settings.ray.rays)
 }

@@ -25,7 +25,7 @@ const BEHIND: f64 = 0.2;
 const DARKEST: f64 = 0.02;
 const BRIGHTEST: f64 = 0.003;
 
-/// How dark and how bright the echoes of a volume are. All values but `start` are shares (0..1) of the value range of the samples.
+/// How dark and how bright the echoes of a volume are. All values but `start` are shares (0..1) of the samples' [`Input::range`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EchoLevels {
     /// Median of the means of the darker class of blocks (rectangles of samples of a frame): fluid, or soft tissue next to bone.
@@ -34,7 +34,7 @@ pub struct EchoLevels {
     pub threshold: f64,
     /// Median of the means of the brighter class of blocks: tissue, or bone.
     pub bright: f64,
-    /// Mean of all blocks.
+    /// Mean of the means of all blocks.
     pub mean: f64,
     /// The value below which two per cent of the samples lie.
     pub low: f64,

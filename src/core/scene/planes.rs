@@ -5,7 +5,7 @@ use super::curve::Line;
 use super::{Curve, Layout, MAX_POINTS, Mode, PlaneName, Scene, Slab, View, depth_offset, insonified_box};
 use glam::{DMat3, DVec2, DVec3};
 
-/// Maximum number of tiles of a picture.
+/// Maximum number of tiles of planes in a picture, such as `planes.columns` times `planes.rows` in tomography.
 pub const MAX_TILES: u32 = 64;
 /// Maximum number of samples through a slab (a thick plane).
 pub(crate) const MAX_SLAB: f64 = 4096.0;

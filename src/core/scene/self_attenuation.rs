@@ -113,6 +113,7 @@ fn place_of(near: f64, far: f64, depth: f64) -> f64 {
 }
 
 /// One row of the table of steps of `length` reference lengths: premultiplied colour and opacity for steps from entry `front` to every entry.
+/// `table` is the one that [`step`] takes.
 pub fn row(table: &[[f64; 4]], front: usize, length: f64) -> Vec<[f64; 4]> {
     let value = |n: usize| n as f64 / (table.len() - 1) as f64;
     (0..table.len()).map(|back| step(table, value(front), value(back), length)).collect()

@@ -59,7 +59,8 @@ impl Volumes {
         self.unprocessed = vec![vec![true; scene.slices() as usize]; self.count as usize];
     }
 
-    /// Notes that a slice of a volume image is replaced by a new frame.
+    /// Notes that a new frame replaces a slice of a volume image: passes over the volume have to process the slice, and the CPU has to search the
+    /// image again.
     pub fn replaced(&mut self, image: u32, slice: u32) {
         self.unprocessed[image as usize][slice as usize] = true;
         self.found.retain(|(_, of)| *of != image);

@@ -85,7 +85,7 @@ impl OwnError {
 pub enum Kind {
     /// The settings compute the same picture more or less accurately. A choice may vary the dial together with others.
     Numerical,
-    /// The settings change what several numerical dials change, all at once. A choice may vary the dial, but not together with others.
+    /// The settings change what several numerical dials change, all at once. A choice may vary the dial, but then no other dial.
     Several,
     /// The settings change the number of pixels, or of rays in a pixel: another picture, with an error of its own. No choice varies the dial.
     Pixels,

@@ -213,8 +213,8 @@ pub fn in_turn(old: &[Profile], new: &[Profile], options: &CompareOptions) -> Re
     compare_repeats(&old?, &new?, options, Repeats::InTurn)
 }
 
-/// The number of blocks of each profile that [`in_turn`] needs to detect differences of `passes` passes, plus two blocks that may disagree; 10 to
-/// 100. It is even, so that each profile goes first equally often. `alpha`: probability of a false alarm in the whole report.
+/// The number of blocks of each profile that [`in_turn`] needs to detect differences of `passes` passes if all blocks agree, plus two; 10 to 100.
+/// It is even, so that each profile goes first equally often. `alpha`: probability of a false alarm in the whole report.
 pub fn blocks_in_turn(passes: usize, alpha: f64) -> usize {
     let lines = passes as f64 + 1.0;
     (10..100).step_by(2).find(|n| min_signed_p(n - 2) * lines <= alpha).unwrap_or(100)

@@ -96,16 +96,17 @@ pub struct PassProfile {
     pub name: String,
     /// Stage of the pass; `copies` for uploads and readbacks, `host` for a host span.
     pub stage: String,
-    /// Number of dispatches in the first measured repeat; of a copy or a host span, how often it occurs there.
+    /// Number of runs in the first measured repeat: one for each dispatch or copy, or for each frame of a batch; for a host span, how often it
+    /// occurs there.
     pub runs_per_picture: u32,
     /// Time of all runs together, ns, for each repeat. Empty without time stamps.
     pub samples_ns: Vec<f64>,
     /// CPU time of all threads in each repeat, ns, if the device is the CPU; otherwise empty.
     #[serde(default)]
     pub cpu_ns: Vec<f64>,
-    /// Least number of bytes that a repeat reads: every texel of every bound slot (image or buffer) once.
+    /// Least number of bytes that a repeat reads. Each run counts every texel once that it can reach in a bound slot (image or buffer).
     pub bytes_read: u64,
-    /// Least number of bytes that a repeat writes, counted in the same way.
+    /// Least number of bytes that a repeat writes, counted like `bytes_read`.
     pub bytes_written: u64,
     /// Number of unfiltered texel fetches in a repeat. None if they cannot be counted.
     #[serde(default)]

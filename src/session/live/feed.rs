@@ -219,7 +219,7 @@ impl Feed {
         Some(arrived)
     }
 
-    /// True if the source loses nothing while its events are not taken.
+    /// True if the source loses nothing while its events are not taken, and without a source.
     pub fn can_wait(&self) -> bool {
         self.can_wait
     }

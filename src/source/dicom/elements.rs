@@ -209,7 +209,7 @@ impl Elements {
     }
 
     /// The names of the elements that no reader used; call it when everything was read. Elements that could change a picture are added to
-    /// `remarks` as warnings.
+    /// `remarks` as warnings (title and text). `path`: the file or folder that the log names.
     pub fn unused(self, path: &Path, remarks: &mut Vec<(String, String)>) -> Unused {
         let Skipped { mut names, known } = self.skipped;
         for element in self.root.elements.iter().filter(|element| !element.asked.get()) {

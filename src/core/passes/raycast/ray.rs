@@ -237,7 +237,7 @@ pub(super) struct Ray<'a> {
     /// Across the ray, unit length.
     across: [DVec3; 2],
     /// Distances along the ray, mm, between which it is in the box and on the kept side of all clip planes: it enters at `enter` and leaves at
-    /// `leave`. The ray misses if leave < enter.
+    /// `leave`. `enter` is at least 0. The ray misses if leave < enter.
     pub enter: f64,
     pub leave: f64,
     /// Ratio of the step at the entry to the scene's step, and the increase of this ratio per mm.

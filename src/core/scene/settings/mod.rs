@@ -70,7 +70,7 @@ pub struct Settings {
     pub unveil: Unveil,
     /// Stage 2: the camera.
     pub camera: Camera,
-    /// Stage 2: the rays of every mode that casts some.
+    /// Stage 2: the rays of every mode that casts some, and how rays and planes sample the volume.
     pub ray: Ray,
     /// Stage 2: volume rendering (modes volume and mixed, layout pair, and surfaces that it gives their colour).
     pub volume: Volume,

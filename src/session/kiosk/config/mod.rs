@@ -22,7 +22,7 @@ use toml::de::{DeTable, DeValue};
 pub const DEFAULT_PATH: &str = "/etc/echolume/echolume.toml";
 /// Path of the log file in the example configuration.
 pub(crate) const DEFAULT_LOG: &str = "/var/log/echolume/echolume.log";
-/// Value of `source` that stands for the built-in phantom.
+/// Value of [`Config::source`] that stands for the built-in phantom.
 pub const PHANTOM: &str = "phantom";
 
 /// The configuration of a kiosk, such as the program on an ultrasound cart.
