@@ -130,7 +130,7 @@ fn a_picture_that_differs_by_one_bit_is_detected() {
 #[test]
 fn an_output_that_is_not_written_is_detected() {
     let mut bench = prepared(Some(|context| context.faults.slow_down("light", 0)));
-    let seen = failures(&mut bench, &named(verify::memory::checks(Level::Quick), "every mode on poisoned memory"));
+    let seen = failures(&mut bench, &named(verify::memory::checks(Level::Quick), "every variant on poisoned memory"));
     assert!(seen.iter().any(|fault| fault.contains("'picture' are never written")), "{seen:?}");
 }
 

@@ -114,7 +114,7 @@ fn the_same_program_measured_in_turn_is_not_slower() {
 
 /// `--against` runs a folder of shaders: one that works a hundred times as long is found.
 #[test]
-fn a_slow_shader_measured_in_turn_is_found_and_what_cannot_be_run_refused() {
+fn a_slow_shader_measured_in_turn_is_found() {
     let _alone = alone();
     let folder = Folder::new("against");
     copy_tree(&repository("glsl"), &folder.join("slow"));
@@ -129,7 +129,13 @@ fn a_slow_shader_measured_in_turn_is_found_and_what_cannot_be_run_refused() {
     assert_eq!(err.lines().last(), Some("echolume: slower by more than the threshold: light"), "{out}{err}");
     assert!(out.contains("compared: CPU time of each pass") || !cfg!(target_os = "linux"), "{out}");
     assert!(out.contains("Wilcoxon's signed ranks"), "{out}");
-    refused(&[&ask[..], &["--against", &folder.path("none")]].concat(), 2, &["against/none", "No such file"]);
+}
+
+#[test]
+fn what_cannot_be_measured_in_turn_is_refused() {
+    let folder = Folder::new("no-turn");
+    let ask = [&["profile"], &SMALL[..], &IN_TURN].concat();
+    refused(&[&ask[..], &["--against", &folder.path("none")]].concat(), 2, &["/none", "No such file"]);
     refused(&[&ask[..], &["--against", "no such device"]].concat(), 3, &["no such device"]);
     refused(&[&ask[..], &["--against", BONE]].concat(), 2, &["bone.mha"]);
     refused(&["profile", "-", "--against", PROGRAM], 2, &["standard input"]);
@@ -176,14 +182,14 @@ fn a_report_is_written_plotted_and_advises() {
     assert_eq!(points.iter().filter(|point| point["label"] == name).count(), 1, "{name} stands twice");
     // The scene of the report is the one that is rendered, with a preset and without.
     let picture = folder.path("picture.png");
-    for preset in [&["--preset", "bone"][..], &[]] {
-        let scene = [&[BONE, "--size", "48x32", "--mode", "vr"][..], preset].concat();
+    for (look, dial) in [(&["--mode", "vr", "--preset", "bone"][..], "termination"), (&["--mode", "mip"], "step")] {
+        let scene = [&[BONE, "--size", "48x32"][..], look].concat();
         let dir = folder.path("same");
-        done(&[&["report", "error"], &scene[..], &["--dial", "termination", "--repeat", "1", "-o", &dir]].concat());
+        done(&[&["report", "error"], &scene[..], &["--dial", dial, "--repeat", "1", "-o", &dir]].concat());
         let report = format!("{dir}/error.json");
         let said =
             done(&[&["render"], &scene[..], &["--budget", "100s", "--report", &report, "-o", &picture]].concat());
-        assert!(said.contains("with this scene"), "{preset:?}: {said}");
+        assert!(said.contains("with this scene"), "{look:?}: {said}");
     }
     // The same again without measuring.
     let again = done(&["report", "error", "--from", &json, "--under-time", "10s"]);

@@ -229,8 +229,11 @@ fn every_test_of_the_nightly_part_exists() {
     assert!(!named.is_empty(), "the table is empty");
     for (binary, name) in named {
         let (modules, test) = name.rsplit_once("::").expect("a module");
-        let place = format!("tests/{binary}/{}", modules.replace("::", "/"));
-        let text = sources(&format!("tests/{binary}"))
+        // The tests of a member of the workspace are in its code.
+        let mut folders = ["src", "tests"].map(|top| format!("{top}/{binary}")).into_iter();
+        let folder = folders.rfind(|folder: &String| repository(folder).is_dir()).expect("a folder");
+        let place = format!("{folder}/{}", modules.trim_end_matches("::tests").replace("::", "/"));
+        let text = sources(&folder)
             .into_iter()
             .filter(|(path, _)| *path == format!("{place}.rs") || *path == format!("{place}/mod.rs"))
             .map(|(_, text)| text)

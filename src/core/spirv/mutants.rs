@@ -285,12 +285,13 @@ mod tests {
         let mut seen = BTreeSet::new();
         for (name, bytes) in EMBEDDED {
             let before = words(bytes);
+            let interface = reflect(&before).unwrap();
             for mutation in MUTATIONS {
                 let all = count(&before, mutation);
                 for number in [0, all.saturating_sub(1)].into_iter().take(all) {
                     let after = mutant(&before, mutation, number).unwrap();
                     assert_ne!(before, after, "{name}, {}", mutation.class);
-                    assert_eq!(reflect(&before).unwrap(), reflect(&after).unwrap(), "{name}, {}", mutation.class);
+                    assert_eq!(interface, reflect(&after).unwrap(), "{name}, {}", mutation.class);
                     seen.insert(mutation.class);
                 }
                 assert!(mutant(&before, mutation, all).is_err());

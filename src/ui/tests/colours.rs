@@ -43,8 +43,9 @@ fn opaque([r, g, b, _]: Colour) -> [f64; 3] {
     [r, g, b].map(f64::from)
 }
 
+#[allow(clippy::manual_range_contains)] // Millions of calls, of code that is not optimised.
 fn holds([left, top, right, bottom]: Area, [x, y]: [f32; 2]) -> bool {
-    (left..=right).contains(&x) && (top..=bottom).contains(&y)
+    left <= x && x <= right && top <= y && y <= bottom
 }
 
 fn middle([left, top, right, bottom]: Area) -> [f32; 2] {

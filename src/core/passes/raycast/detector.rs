@@ -472,7 +472,7 @@ mod tests {
                 let settings = Surface { threshold, place, rough: 1, ..Surface::default() };
                 for (half, sd) in [4, 5, 8, 16, 64]
                     .into_iter()
-                    .flat_map(|half| [0.125, 0.25, 0.5, 1.0, 1.5, 2.0, 2.5].into_iter().map(move |sd| (half, sd)))
+                    .flat_map(|half| [0.125, 0.5, 1.0, 2.0, 2.5].into_iter().map(move |sd| (half, sd)))
                 {
                     for height in [1.0, 0.95, 0.6, 0.3, 0.15] {
                         if height * largest_difference(sd, 1.0) <= 1.25 * threshold {
@@ -496,7 +496,7 @@ mod tests {
                 }
             }
             println!("{place:?}: {worst:.4} of an edge at most, over {edges} edges");
-            assert!(edges > 1000, "{edges}");
+            assert!(edges > 600, "{edges}");
         }
     }
 
