@@ -10,7 +10,7 @@ use crate::gpu::context::list;
 use crate::gpu::{Candidate, Context, ContextOptions, Deadline, DeviceChoice, GpuError, TexelAccess, device_selection};
 use crate::marked::Demo;
 use crate::scene::default_look::Recorded;
-use crate::scene::load::{Layers, LoadError};
+use crate::scene::load::{Layers, LoadError, PRESETS};
 use crate::scene::{Input, Scene};
 use crate::source::phantom::{self, Phantom, PhantomSource};
 use crate::source::{Frame, Source};
@@ -195,15 +195,20 @@ impl InputArgs {
         source.is_synthetic().then_some(if is_workspace { Demo::Always } else { Demo::WithOthers })
     }
 
-    /// All files that are read for the source and the settings, in any order. The value of `--transfer` is one of them, although it may be a built-in
-    /// name.
+    /// All files that are read for the source and the settings, in any order. One of them is the file of the user's presets if `--preset` names one of
+    /// these.
     pub fn read_files(&self, source: &dyn Source) -> Vec<PathBuf> {
         let mut read = source.files();
         read.extend(self.geometry.probe.clone());
         read.extend(self.input.clone().filter(|file| workspace::is_named(file)));
         read.extend(self.stored.as_ref().map(|(file, _)| file.clone()));
         read.extend(self.labels().ok().flatten());
-        read.extend(self.scene.files());
+        read.extend(self.scene.scene.clone());
+        // Settings that are refused are named where the scene is made.
+        let layers = self.scene.layers_over(Layers::default(), &[]);
+        read.extend(layers.iter().flat_map(Layers::transfer_files).map(Path::to_path_buf));
+        let is_built_in = |name: &String| PRESETS.iter().any(|(built_in, _)| built_in == name);
+        read.extend(presets_file().filter(|_| !self.scene.preset.iter().all(is_built_in)));
         read
     }
 

@@ -53,7 +53,7 @@ pub struct SourceArgs {
     #[arg(long)]
     real_time: bool,
     /// Number of times that a recording is played
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     rounds: u32,
     /// OpenIGTLink: the device (TRANSFORM) or tool (TDATA) that tracks 2D frames; "image": the matrix of each IMAGE [default: any TRANSFORM]
     #[arg(long, value_name = "NAME")]

@@ -44,9 +44,9 @@ pub fn parse(text: &str) -> Result<u64, String> {
         unit => ["K", "M", "G", "T"].iter().position(|name| *name == unit).map(|n| n as u32 + 1),
     };
     let number = text[..unit].trim_end().parse().ok().filter(|number: &f64| number.is_finite() && *number > 0.0);
-    let bytes = number.zip(power).map(|(number, power)| number * 1024f64.powi(power as i32));
+    let bytes = number.zip(power).map(|(number, power)| (number * 1024f64.powi(power as i32)) as u64);
     bytes
-        .map(|bytes| bytes as u64)
+        .filter(|bytes| *bytes > 0)
         .ok_or_else(|| "must be a size such as 8G, 500M or a number of bytes, or none".into())
 }
 
@@ -106,7 +106,7 @@ mod tests {
         ] {
             assert_eq!(parse(text), Ok(bytes), "{text}");
         }
-        for wrong in ["", "G", "-1G", "0", "8X", "8 G 8", "inf", "nan", "1e400"] {
+        for wrong in ["", "G", "-1G", "0", "0.5", "8X", "8 G 8", "inf", "nan", "1e400"] {
             assert!(parse(wrong).is_err_and(|why| why.contains("8G")), "{wrong}");
         }
     }

@@ -119,10 +119,7 @@ pub struct View {
 }
 
 impl View {
-    pub fn run(mut self) -> Result<(), Failure> {
-        if self.kiosk && self.config.is_none() && Path::new(config::DEFAULT_PATH).exists() {
-            self.config = Some(config::DEFAULT_PATH.into());
-        }
+    pub fn run(self) -> Result<(), Failure> {
         if self.kiosk {
             // Panics go to the log, where the support bundle finds them.
             let usual = std::panic::take_hook();
@@ -224,8 +221,14 @@ impl View {
         Some((files.log?, u64::from(files.log_size_mb) << 20, files.log_files))
     }
 
+    /// The value of `--config`, or the usual path of a kiosk if there is a file.
+    fn config_path(&self) -> Option<&Path> {
+        let usual = Path::new(config::DEFAULT_PATH);
+        self.config.as_deref().or((self.kiosk && usual.exists()).then_some(usual))
+    }
+
     fn config(&self) -> Option<Result<Config, config::ConfigError>> {
-        self.config.as_deref().map(Config::read)
+        self.config_path().map(Config::read)
     }
 
     /// The configuration of the console, read anew from the file and the flags.

@@ -250,8 +250,8 @@ impl Upload {
 pub struct Readback {
     context: Arc<Context>,
     pieces: Vec<(Piece, Buffer)>,
-    /// Size of the image, bytes.
-    pub size: u64,
+    /// The image that they are for, and the bytes of its texels.
+    image: (Shape, usize),
 }
 
 impl Readback {
@@ -266,7 +266,12 @@ impl Readback {
             Buffer::new(context, name, bytes, Purpose::Readback).map(|buffer| (piece, buffer))
         };
         let pieces = cut.into_iter().map(made).collect::<Result<_, _>>()?;
-        Ok(Readback { context: context.clone(), pieces, size: shape.texels() * texel_bytes as u64 })
+        Ok(Readback { context: context.clone(), pieces, image: (shape, texel_bytes) })
+    }
+
+    /// True if the buffers are for an image of this shape, with texels of as many bytes.
+    pub fn is_for(&self, shape: Shape, texel_bytes: usize) -> bool {
+        self.image == (shape, texel_bytes)
     }
 
     /// Each region of the image, with the buffer for its texels.

@@ -209,7 +209,10 @@ pub(super) fn check_volume(path: &Path, volume: usize, count: usize) -> Result<(
     if volume < count {
         return Ok(());
     }
-    let fault = format!("there is no {volume}, the last is {}", count.saturating_sub(1));
+    let fault = match count {
+        0 => "the recording has none".into(),
+        _ => format!("there is no {volume}, the last is {}", count - 1),
+    };
     Err(InputError::new(path, "volume", fault))
 }
 

@@ -551,7 +551,7 @@ impl Reader {
     /// A description of the file for users: pairs of title and value. Reads all frames once to check them.
     ///
     /// # Errors
-    /// The file has no frames, or cannot be read.
+    /// The file cannot be read.
     pub fn description(mut self) -> Result<Vec<(String, String)>, InputError> {
         let summary = self.summarize()?;
         let mut rows = Vec::new();
@@ -592,7 +592,7 @@ impl Reader {
     }
 
     fn summarize(&mut self) -> Result<Summary, InputError> {
-        self.skip_to_volume(0)?;
+        self.next = 0;
         let mut summary = Summary::default();
         let each = self.frames_per_volume();
         let (mut volume, mut of_volume) = (None, 0);

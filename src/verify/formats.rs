@@ -97,14 +97,14 @@ impl LargestDifference {
         let fault = Some(findings.faults.len());
         findings.pictures.push(PictureComparison { fault, ..picture_comparison(what, expected, got) });
         let [mean, most] = is;
-        let said = format!("{what}: {mean:.2} levels off on average, {most} at most");
+        let said = format!("{what}: {mean:.2} levels off on average, 99 % of values by {most} at most");
         findings.faults.push(Fault { worst: Some(picture_difference(expected, got).worst), ..Fault::new(said) });
     }
 
     fn add_figures(&self, findings: &mut Findings, [mean, most]: [f64; 2]) {
         findings.figures.push(count_figure("pictures compared", self.pictures));
         findings.figures.push(Figure::error("mean difference", self.apart[0], mean, Unit::Levels));
-        findings.figures.push(Figure::error("largest difference", self.apart[1], most, Unit::Levels));
+        findings.figures.push(Figure::error("99th percentile of the differences", self.apart[1], most, Unit::Levels));
     }
 }
 

@@ -3,7 +3,10 @@
 #![cfg(unix)]
 
 use crate::common::program::*;
+use echolume::low_level::scene::Settings;
+use echolume::low_level::user_presets::{UserPreset, write};
 use std::fs;
+use std::path::Path;
 use std::process::Command;
 
 const SMALL: [&str; 4] = ["--size", "8x8", "--mode", "mip"];
@@ -27,6 +30,25 @@ struct Row {
     kind: Kind,
     /// Too slow, or useless, on a full disk.
     early: bool,
+}
+
+/// What settings are read from is an input too, although a file of settings or the environment names it.
+#[test]
+fn files_that_settings_name_are_not_replaced() {
+    let folder = Folder::new("settings-named");
+    let points = "points = [{ at = 0, colour = [1, 1, 1], opacity = 0 }, { at = 1, colour = [1, 1, 1], opacity = 1 }]";
+    let transfer = folder.write("fire.toml", points);
+    let scene = folder.write("scene.toml", "[volume]\ntransfer = 'fire.toml'");
+    let presets = folder.path("presets.toml");
+    let mine = UserPreset::new("Mine", &Settings::default()).expect("a preset");
+    write(Path::new(&presets), &[mine]).expect("written");
+    for (named, output) in [(["--scene", &scene], &transfer), (["--preset", "Mine"], &presets)] {
+        let mut command = Command::new(PROGRAM);
+        command.args(["profile", BONE, "--json", output]).args(named).env("ECHOLUME_PRESETS", &presets);
+        let before = fs::read(output).expect("a file");
+        refuses(&named, &finish(&mut command), 2, &[output, "would replace an input"]);
+        assert_eq!(fs::read(output).expect("a file"), before);
+    }
 }
 
 fn rows(folder: &Folder) -> Vec<Row> {

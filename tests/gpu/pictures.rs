@@ -55,6 +55,26 @@ fn the_presets_fill_their_pictures() {
     }
 }
 
+/// Prevents a readback that keeps the rows of a picture of another shape with as many bytes.
+#[test]
+fn a_picture_of_another_shape_with_as_many_bytes_is_that_of_a_new_renderer() {
+    let device = Device::new();
+    let sized = |size: [u32; 2]| {
+        let (scene, renderer) = preset(&device, "bone-l14/bone.mha", "bone", "mip");
+        let mut settings = scene.settings.clone();
+        settings.picture.size = size;
+        let scene = Scene::new(scene.geometry.clone(), scene.input, settings).expect("scene");
+        (scene, renderer)
+    };
+    let [(wide, mut changed), (tall, mut fresh)] = [[96, 40], [40, 96]].map(sized);
+    changed.change(wide).expect("change");
+    changed.picture().expect("picture");
+    changed.change(tall.clone()).expect("change");
+    fresh.change(tall).expect("change");
+    let [changed, fresh] = [changed.picture().expect("picture"), fresh.picture().expect("picture")];
+    assert!(changed.size == [40, 96] && changed.rgba == fresh.rgba);
+}
+
 /// The head of sweep.json: an ellipsoid with a nose and two eye sockets, viewed from the probe.
 #[test]
 fn the_wobblers_head_has_its_nose_and_eyes_where_the_truth_has_them() {

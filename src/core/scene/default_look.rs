@@ -12,7 +12,7 @@
 //! default. No default makes a scene that is refused: it is cut, or left out, and one line says so.
 
 use super::echo_levels::EchoLevels;
-use super::load::{Layers, LoadError, PRESETS, preset_settings, rebase};
+use super::load::{Layers, LoadError, preset_settings, rebase};
 use super::region::{insonified_box, slice_grid};
 use super::{
     Compositing, EchoHistogram, Elevation, Input, Layout, MAX_DEVIATION, Mode, Scene, SceneError, Settings, Transfer,
@@ -212,9 +212,7 @@ impl Layers {
         let mode = found.mode(geometry);
         let is_plain = self.presets().is_empty();
         let is_section = mode.is_flat() || mode == Mode::Cube;
-        // A preset of the user's may be of planes.
-        let is_built_in = |name: &String| PRESETS.iter().any(|(preset, _)| preset == name);
-        if is_section && !found.is_as_it_is() && self.presets().iter().all(is_built_in) {
+        if is_section && !found.is_as_it_is() {
             found.section(geometry);
         }
         if mode == Mode::Cube {

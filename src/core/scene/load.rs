@@ -8,7 +8,7 @@ use crate::text::printable;
 use crate::tree::{self, Fault, NodeError};
 use serde::Deserialize;
 use std::collections::BTreeSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
 /// Maximum size of a settings file, bytes.
@@ -56,6 +56,8 @@ pub struct Layers {
     presets: Vec<String>,
     /// The paths of the values that other layers than presets give.
     given: BTreeSet<String>,
+    /// The files of transfer functions that were read.
+    transfers: BTreeSet<PathBuf>,
     /// The labels that are shown, which are in no table.
     labels: Option<SharedLabels>,
 }
@@ -100,6 +102,11 @@ impl Layers {
     /// True if any layer, presets included, sets the value or table at `path`.
     pub fn has(&self, path: &str) -> bool {
         self.gives(path) || holds(&self.merged, path)
+    }
+
+    /// The files of transfer functions that the layers read, whether a flag or a file of settings names them.
+    pub fn transfer_files(&self) -> impl Iterator<Item = &Path> {
+        self.transfers.iter().map(PathBuf::as_path)
     }
 
     pub fn preset(&mut self, name: &str) -> Result<(), LoadError> {
@@ -215,6 +222,7 @@ impl Layers {
         if let Some(name) = transfer_file(&table) {
             let path = folder.unwrap_or(Path::new("")).join(name);
             let points = points(&path)?;
+            self.transfers.insert(path);
             if let Some(Value::Table(volume)) = table.get_mut("volume") {
                 volume.insert("transfer".into(), points);
             }

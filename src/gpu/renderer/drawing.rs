@@ -8,7 +8,7 @@ use crate::context::Context;
 use crate::device_queues::DeviceQueues;
 use crate::error::GpuError;
 use crate::passes::Slot;
-use crate::passes::slots::Format;
+use crate::passes::slots::{Format, Shape};
 use crate::plan::Work;
 use crate::resources::{Image, SlotResources};
 use crate::scene::Scene;
@@ -66,9 +66,10 @@ impl Drawing {
         })
     }
 
-    /// Makes the readback buffer as large as the scene's picture.
+    /// Makes the readback buffer that of the scene's picture.
     pub fn fit(&mut self, scene: &Scene) -> Result<(), GpuError> {
-        if self.readback.as_ref().is_some_and(|r| r.size != Slot::Screen.bytes(scene)) {
+        let (shape, texel_bytes) = picture_image(scene);
+        if self.readback.as_ref().is_some_and(|readback| !readback.is_for(shape, texel_bytes)) {
             self.readback = Some(readback(&self.context, scene)?);
         }
         Ok(())
@@ -269,5 +270,11 @@ impl Drawing {
 }
 
 fn readback(context: &Arc<Context>, scene: &Scene) -> Result<Readback, GpuError> {
-    Readback::new(context, "readback", Slot::Screen.shape(scene), Slot::Screen.format(scene).texel_bytes())
+    let (shape, texel_bytes) = picture_image(scene);
+    Readback::new(context, "readback", shape, texel_bytes)
+}
+
+/// Shape and bytes of a texel of the picture's image.
+fn picture_image(scene: &Scene) -> (Shape, usize) {
+    (Slot::Screen.shape(scene), Slot::Screen.format(scene).texel_bytes())
 }

@@ -54,7 +54,12 @@ impl Drive {
     fn connect(operation: &'static str, settings: &PortSettings, table: &MotorTable) -> Result<Drive, MotorError> {
         let path = settings.path.clone();
         let port = Port::open(settings);
-        let port = port.map_err(|fault| MotorError { port: path, operation, fault, stopped: Stopped::NotMoved })?;
+        let port = port.map_err(|fault| {
+            // Another process may have left it moving.
+            let is_asked = operation == "stop";
+            let stopped = if is_asked { Stopped::Failed("the port was not opened".into()) } else { Stopped::NotMoved };
+            MotorError { port: path, operation, fault, stopped }
+        })?;
         Ok(Drive { guard: Guard::new(port, table), table: table.clone(), module: String::new() })
     }
 

@@ -79,7 +79,8 @@ impl Redactor {
     }
 
     /// Makes a recording's path private: paths inside of its folder are removed, and the names in the path are replaced wherever they occur in a
-    /// text. Names that identify nobody are kept: those of fewer than three bytes, of system folders, and common words such as `data`.
+    /// text. Names that identify nobody are kept: those of fewer than three bytes, numbers of fewer than five, system folders, and common words such as
+    /// `data`.
     pub fn add_recording(&mut self, path: &Path) {
         if let Some(folder) = path.parent() {
             self.add_folder(folder);
@@ -88,7 +89,9 @@ impl Redactor {
         let stem = path.file_stem().map(|stem| stem.to_string_lossy().to_ascii_lowercase());
         for name in parts.chain(stem) {
             let system = SYSTEM_FOLDERS.iter().any(|folder| folder.split('/').any(|part| part == name));
-            let is_identifying = name.len() >= 3 && name.chars().any(char::is_alphabetic);
+            // Long numbers are dates of birth and numbers of patients; short ones are counts too.
+            let least = if name.chars().any(char::is_alphabetic) { 3 } else { 5 };
+            let is_identifying = name.len() >= least;
             if is_identifying && !system && !PUBLIC_NAMES.contains(&name.as_str()) {
                 self.names.push(name);
             }
@@ -358,6 +361,15 @@ mod tests {
         ] {
             assert_eq!(redactor.redact(text), expected, "{text}");
         }
+    }
+
+    /// Prevents a number of a patient, or a date of birth, that stays because it has no letter.
+    #[test]
+    fn long_numbers_in_the_path_of_a_recording_are_removed_and_short_ones_kept() {
+        let mut redactor = Redactor::new();
+        redactor.add_recording(Path::new("/data/1987-04-12/4711223/100/20.xyz"));
+        let text = "patient 4711223, born 1987-04-12: 100 volumes of 20 frames";
+        assert_eq!(redactor.redact(text), "patient <name-2>, born <name-1>: 100 volumes of 20 frames");
     }
 
     #[test]
