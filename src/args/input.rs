@@ -59,10 +59,10 @@ pub struct InputArgs {
 
 impl InputArgs {
     /// Opens the recording and builds the scene of the chosen volume. Without a recording it is the phantom. Settings that were not chosen are
-    /// derived from the recording.
+    /// derived from the recording; the settings of a workspace are complete.
     ///
     /// # Errors
-    /// The recording or a setting is wrong, or there is no such volume.
+    /// The recording, the workspace, the segmentation or a setting is wrong, or there is no such volume.
     pub fn open(&self) -> Result<(Box<dyn Source>, Scene), Failure> {
         self.open_with(&[])
     }
@@ -71,7 +71,7 @@ impl InputArgs {
     /// messages name and `key.path=value`. Flags of these arguments and `--set` take precedence over them.
     ///
     /// # Errors
-    /// The recording or a setting is wrong, or there is no such volume.
+    /// The recording, the workspace, the segmentation or a setting is wrong, or there is no such volume.
     pub fn open_with(&self, chosen: &[Assigned]) -> Result<(Box<dyn Source>, Scene), Failure> {
         let opened = self.open_recorded(chosen, None)?;
         Ok((opened.source, opened.scene))
@@ -80,7 +80,7 @@ impl InputArgs {
     /// Opens the recording and builds the scene of the volume with index `first`, the first that `--volumes` selects.
     ///
     /// # Errors
-    /// The recording or a setting is wrong, or there is no such volume.
+    /// The recording, the workspace, the segmentation or a setting is wrong, or there is no such volume.
     pub fn open_volumes(&self, first: usize) -> Result<(Box<dyn Source>, Scene), Failure> {
         let opened = self.open_recorded(&[], Some(first))?;
         Ok((opened.source, opened.scene))
@@ -91,7 +91,7 @@ impl InputArgs {
     /// [`InputArgs::open_with`].
     ///
     /// # Errors
-    /// The recording or a setting is wrong, or there is no such volume.
+    /// The recording, the workspace, the segmentation or a setting is wrong, or there is no such volume.
     pub fn open_recorded(&self, chosen: &[Assigned], asked: Option<usize>) -> Result<Opened, Failure> {
         let mut source = self.source()?;
         let volume = asked.map_or_else(|| self.volume(), Ok)?;
@@ -152,8 +152,9 @@ impl InputArgs {
         }
     }
 
-    /// Checks `--volumes`: an error if `--volume` is given too, or if `--volumes` leaves out the volume of the workspace, to which the measurements
-    /// of the workspace belong. `flag`: `--volumes` with its value, for the message. `is_among`: true for an index that `--volumes` includes.
+    /// Checks `--volumes`: an error if `--volume` is given too, if the workspace cannot be read, or if `--volumes` leaves out the volume of the
+    /// workspace, to which the measurements of the workspace belong. `flag`: `--volumes` with its value, for the message. `is_among`: true
+    /// for an index that `--volumes` includes.
     pub fn check_volumes(&self, flag: &str, is_among: impl Fn(usize) -> bool) -> Result<(), Failure> {
         if self.volume.is_some() {
             return Err(input("--volume and --volumes: give one of them"));
@@ -173,7 +174,8 @@ impl InputArgs {
         self.input.as_deref().is_some_and(|file| file.as_os_str() == STANDARD)
     }
 
-    /// Name of the recording or workspace for messages: its path as the user typed it, `standard input` for `-`, or `phantom` if none was given.
+    /// Name of the recording or workspace for messages: the file of [`InputArgs::take_stored`], otherwise the path as the user typed it. It is
+    /// `standard input` for `-`, and `phantom` if there is neither.
     pub fn name(&self) -> String {
         match self.stored.as_ref().map(|(file, _)| file).or(self.input.as_ref()) {
             None => "phantom".into(),
@@ -182,8 +184,7 @@ impl InputArgs {
         }
     }
 
-    /// Checks that the output files can be written, that none is standard output, that none is named twice, and that none replaces an input: a file
-    /// of the source or of the settings.
+    /// Checks the outputs as the function [`check_outputs`] does. The inputs are those of [`InputArgs::read_files`].
     pub fn check_outputs(&self, outputs: &[Output], source: &dyn Source) -> Result<(), Failure> {
         check_outputs(outputs, self.read_files(source).iter().map(PathBuf::as_path))
     }
@@ -251,7 +252,7 @@ impl InputArgs {
         Ok(origin)
     }
 
-    /// Every frame of the volume, in the order of the recording; shows a progress bar.
+    /// Every frame of the volume [`InputArgs::volume`], in the order of the recording; shows a progress bar.
     #[cfg(feature = "lab")]
     pub fn frames(&self, source: &mut dyn Source) -> Result<Vec<Frame>, Failure> {
         let bar = progress_bar(source.frames_per_volume() as u64).with_message("frames");
@@ -641,7 +642,8 @@ pub fn device_failure(error: GpuError) -> Failure {
 /// The flag that names an output, and its path if the flag was given.
 pub type Output<'a> = (&'a str, Option<&'a Path>);
 
-/// Checks that the outputs can be written, that none is standard output, that none replaces an input (`read`), and that none is named twice.
+/// Checks that the outputs can be written and that none is standard output. Also checks that none, unless it is a device or a pipe, replaces an
+/// input (`read`) or is named twice.
 pub fn check_outputs<'a>(outputs: &[Output], read: impl IntoIterator<Item = &'a Path>) -> Result<(), Failure> {
     let read: Vec<&Path> = read.into_iter().collect();
     let outputs: Vec<(&str, &Path)> = outputs.iter().filter_map(|(flag, file)| Some((*flag, (*file)?))).collect();

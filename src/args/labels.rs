@@ -12,7 +12,7 @@ use std::path::Path;
 /// that is not known.
 ///
 /// # Errors
-/// The file is no segmentation, or its labels lie beside the volume.
+/// The file cannot be read as a segmentation, it has no labels or too many, or all of them lie beside the volume.
 pub fn show_labels(layers: &mut Layers, file: &Path, geometry: &Geometry, world: Option<World>) -> Result<(), Failure> {
     let (labels, segments) = files::read(file, OpenOptions::default()).map_err(input)?;
     let fault = |why: String| input(InputError::new(file, "labels", why));

@@ -25,8 +25,8 @@ impl SeriesTarget {
     /// `face-000000.png`.
     ///
     /// # Errors
-    /// One line: the name is that of a single picture, the pattern is not valid, the ending belongs to no known format, or no encoder of films was
-    /// found.
+    /// One line: the path is `-` or that of a single picture, the pattern is not valid, the ending belongs to no known format, the name of a pattern
+    /// or film is not UTF-8, or no encoder of films was found.
     pub fn of(path: &Path, name: &str) -> Result<SeriesTarget, Failure> {
         let text = path.to_string_lossy();
         let refuse = |why: &str| Err(input(format!("-o {text}: {why}")));

@@ -94,7 +94,7 @@ impl GeometryArgs {
     }
 }
 
-/// Opens a recording, and prints the path of the probe file that its geometry comes from, if there is one.
+/// Opens a recording, and tells which probe file its geometry comes from, as [`say_probe_file`] does.
 ///
 /// # Errors
 /// The file cannot be read as a recording with these options.

@@ -17,7 +17,7 @@ impl ShaderArgs {
     /// Loads the shaders of the given folder, or the embedded ones. A shader of a folder is compiled when a pipeline needs it.
     ///
     /// # Errors
-    /// With a folder only: there is no compiler, or the folder cannot be read or holds no shader.
+    /// With a folder only: there is no compiler, the folder cannot be read or holds no shader, or an include does not exist.
     pub fn open(&self) -> Result<Arc<Shaders>, Failure> {
         Ok(match &self.glsl {
             Some(folder) => ShaderFolder::open(folder).map_err(input)?.shaders(),

@@ -146,7 +146,7 @@ impl SourceArgs {
         Ok(SourceArgs { source, geometry: self.geometry.or(&workspace.origin)?, ..self.clone() })
     }
 
-    /// The source and its geometry flags as a workspace stores them; without a recording if the source is live.
+    /// The recording and its geometry flags as a workspace stores them; the phantom alone if that is the source; nothing if the source is live.
     #[cfg(feature = "view")]
     pub fn origin(&self) -> Origin {
         match self.kind() {
@@ -159,7 +159,8 @@ impl SourceArgs {
     /// Adds the labels of a segmentation of the first volume of this source to the settings.
     ///
     /// # Errors
-    /// The file is no segmentation or its labels lie beside the volume, the recording cannot be opened, or the source is standard input or a network.
+    /// The file cannot be read as a segmentation, its labels cannot be shown on the volume, the recording cannot be opened, or the source is standard
+    /// input or a network.
     #[cfg(feature = "view")]
     pub fn show_labels(&self, layers: &mut Layers, file: &Path) -> Result<(), Failure> {
         let source: Box<dyn Source> = match self.kind() {
@@ -204,7 +205,7 @@ impl SourceArgs {
         }
     }
 
-    /// The name of the source as the user typed it, for messages.
+    /// The source as the user typed it, but `standard input` for `-`; for messages.
     pub fn name(&self) -> &str {
         match self.source.as_str() {
             "-" => "standard input",

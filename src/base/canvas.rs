@@ -178,7 +178,7 @@ pub fn picture(size: [u32; 2], drawing: &impl Drawing) -> Result<Picture, String
 /// Width of a text in letters of `size` pixels in a picture, pixels.
 ///
 /// # Errors
-/// One line: the embedded font cannot be read.
+/// One line: the embedded font cannot be read, or the text cannot be measured.
 pub fn text_width(text: &str, size: u32) -> Result<f64, String> {
     let mut rgb = [255; 3 * 9];
     let area = BitMapBackend::with_buffer(&mut rgb, (3, 3)).into_drawing_area();

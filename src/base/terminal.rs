@@ -32,7 +32,7 @@ pub enum Failure {
     Input(String),
     /// The request was valid but could not be carried out: exit code 1.
     Failed(String),
-    /// No Vulkan device was found, or not the requested one, or `batch` lost its device: exit code 3.
+    /// No usable Vulkan device was found, or not the requested one, or `batch` lost its device: exit code 3.
     NoDevice(String),
     /// A signal ended the work early, and nothing had failed until then: exit code 4.
     Interrupted(String),

@@ -118,7 +118,7 @@ fn for_each_line(file: &Path, mut each: impl FnMut(u64, &str) -> Result<(), Stri
 ///
 /// # Errors
 /// One line that names the file and the fault, and the line if one is wrong: the file cannot be read, has no unit or more than 2^27, a line is no
-/// unit, or a cost is negative or not finite.
+/// JSON object, or a cost is no number, negative or not finite. Other fields are not checked.
 pub fn costs(file: &Path) -> Result<Vec<f64>, String> {
     let mut costs = Vec::new();
     for_each_line(file, |_, text| {

@@ -41,9 +41,9 @@ pub struct Seconds {
     pub read: f64,
     /// Time for which the worker waited for the recording, s.
     pub wait: f64,
-    /// Time for drawing, converting or comparing, s. For `convert` it includes writing the volume. 0 if the attempt failed.
+    /// Time for drawing, converting or comparing, s. For `convert` it includes writing the volume. 0 if the work was not finished.
     pub work: f64,
-    /// Time for writing and renaming the output, s. About 0 for `convert`, and 0 if the attempt failed.
+    /// Time for writing and renaming the output, s. About 0 for `convert` and for a comparison, and 0 if the work was not finished.
     pub write: f64,
 }
 
@@ -76,7 +76,7 @@ pub struct Record {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub outputs: Vec<OutputFile>,
     pub seconds: Seconds,
-    /// The device that was used; None if none was needed, or none was open when the attempt ended.
+    /// The device that was open when the attempt ended; None if the work needs none, or none was open.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub drawer: Option<Drawer>,
     pub program: String,
@@ -219,8 +219,8 @@ pub struct Results {
 }
 
 impl Results {
-    /// Opens or creates `results/shard-I-of-N.ndjson`. If a killed process left the last line unfinished, a newline ends that line. `earlier`: the
-    /// results that were read before.
+    /// Opens or creates the shard's file in the folder `results`, for example `shard-0002-of-0008.ndjson` for the index 2 of 8. If a killed process
+    /// left the last line unfinished, a newline ends that line. `earlier`: the results that were read before.
     ///
     /// # Errors
     /// One line that names the file that cannot be opened or written.

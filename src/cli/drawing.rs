@@ -33,9 +33,10 @@ impl DrawFault {
 }
 
 /// Draws on the device of `context`. If the device is lost, `reopen` opens it again and `draw` is called again, with smaller bands in `options`,
-/// until it was lost too often in a row ([`Losses`]). `progress` returns how many of several pictures are finished; a further one begins the count of
-/// losses anew. The last argument of `draw` is true if it is called again: then a part of the source may have been read. `own_shaders`: true if the
-/// shaders are the user's, so that one that does not compile is an error of the input.
+/// until it was lost too often in a row ([`Losses`]). A device that did not finish in time is not opened again. `progress` returns how many of
+/// several pictures are finished; a further one begins the count of losses anew. The last argument of `draw` is true if it is called again: then a
+/// part of the source may have been read. `own_shaders`: true if the shaders are the user's, so that one that does not compile is an error of the
+/// input.
 ///
 /// # Errors
 /// The error of `draw` or `reopen`.

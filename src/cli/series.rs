@@ -123,8 +123,8 @@ impl SeriesArgs {
         }
     }
 
-    /// Draws and writes the pictures. A signal ends the command with a failure, after the file that is being written is complete. Pictures in files
-    /// that were written before a failure stay; an incomplete film is not kept.
+    /// Draws and writes the pictures. A signal ends the process after the picture that is being written is complete. Pictures in files that were
+    /// written before a failure or a signal stay; an incomplete film is not kept.
     pub fn run(&self, job: &Job) -> Result<(), Failure> {
         let name = if self.volumes.is_some() { "volume" } else { "picture" };
         let target = SeriesTarget::of(job.output, name)?;

@@ -8,7 +8,7 @@ use std::time::Instant;
 /// The address without a value, with the default port: other machines cannot reach it.
 const LOOPBACK: &str = "igtl://127.0.0.1";
 
-/// The arguments of a server.
+/// The arguments of an OpenIGTLink server.
 #[derive(clap::Args)]
 pub struct ServeArgs {
     /// Send pictures and whole volumes to OpenIGTLink clients such as 3D Slicer: igtl://HOST[:PORT]; port 0 takes a free one, 0.0.0.0 lets other
@@ -85,7 +85,7 @@ impl Serving {
         self.said = now;
     }
 
-    /// Ends the connections after the waiting data was sent, and prints the totals.
+    /// Sends the waiting data, for [`ServerOptions::last`] at most, ends the connections, and prints the totals.
     pub fn end(self) {
         let statistics = self.publisher.finish();
         say!("served    {}", line(&statistics));

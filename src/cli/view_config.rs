@@ -54,10 +54,12 @@ impl WindowConfig {
         }
     }
 
-    /// Opens the window and runs the console (the viewer's user interface) that `make` creates, until the user leaves it.
+    /// Opens the window and runs the console (the viewer's user interface) that `make` creates, until the user leaves it or the time in `shape` is
+    /// over. Returns the console and its last context.
     ///
     /// # Errors
-    /// There is no window system or no such monitor, no device can present there, or the device or the monitor is lost repeatedly.
+    /// There is no window system or no such monitor, no device can present there, the input devices of a direct monitor cannot be read, or the device
+    /// or the monitor is lost repeatedly.
     pub fn run(self, make: Box<MakeConsole>) -> Result<(Console, Arc<Context>), GpuError> {
         match self.direct {
             None => window::run(&self.device, self.shape, make),

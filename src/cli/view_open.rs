@@ -25,7 +25,7 @@ pub struct Shown {
 
 impl Shown {
     /// The source that the command line selects: `file`, a recording or a workspace, or without it that of the flags in `source`. An error if a
-    /// workspace cannot be read or names no recording.
+    /// workspace cannot be read, names no recording, or has a depth axis that is not valid.
     pub fn of(source: &SourceArgs, file: Option<&Path>) -> Result<Shown, Failure> {
         let named = file.unwrap_or(source.path());
         if workspace::is_named(named) {
@@ -38,8 +38,8 @@ impl Shown {
         Ok(Shown { source, workspace: None, labels: None, is_given: true })
     }
 
-    /// The source for a recording or a workspace that was opened in the window. The geometry flags of the command line do not apply to it. An error
-    /// if a workspace cannot be read or names no recording.
+    /// The source for a recording or a workspace that was opened in the window. The flags of geometry and of freehand volumes do not apply to it. An
+    /// error as of [`Shown::of`].
     pub fn opened(flags: &SourceArgs, file: &Path) -> Result<Shown, Failure> {
         Ok(Shown { is_given: false, ..Shown::of(&flags.of_file(file), None)? })
     }
@@ -85,7 +85,7 @@ impl OpenedInWindow {
         locked(&self.current.shown).is_some()
     }
 
-    /// How the source was selected that was opened last in the window. None if none was.
+    /// How the source was selected that was opened last in the window. None if none was, or if [`OpenedInWindow::next`] got None for it.
     pub fn shown(&self) -> Option<Shown> {
         locked(&self.current.shown).clone()
     }

@@ -53,7 +53,8 @@ fn handlers() -> &'static Handlers {
 /// Becomes true with SIGHUP, where that does not end the process.
 static HANGUPS: OnceLock<Arc<AtomicBool>> = OnceLock::new();
 
-/// From now on SIGHUP does not end this process but sets the returned value to true. Call it before a [`Held`] exists.
+/// From now on SIGHUP does not end this process but sets the returned value to true. Call it before the first use of [`Held`], [`Writing`] or
+/// [`received`].
 ///
 /// # Errors
 /// The signal cannot be caught.
@@ -123,7 +124,8 @@ pub fn raise_segmentation_fault() {
     }
 }
 
-/// Name of the last signal that arrived while a [`Held`] or [`Writing`] existed; None if none did. Work that can end early polls this.
+/// Name of the last signal that arrived while a [`Held`] or [`Writing`] existed; None if none did. A new [`Held`] or [`Writing`] forgets it if no
+/// other one exists. Work that can end early polls this.
 pub fn received() -> Option<&'static str> {
     handlers().signal().map(|(_, name)| name)
 }
@@ -154,7 +156,7 @@ impl Held {
         Held { patient }
     }
 
-    /// Name of the last signal that arrived; None if none did.
+    /// Name of the last signal, as [`received`] returns it. It may have arrived before this value was made, while another one existed.
     pub fn signal(&self) -> Option<&'static str> {
         handlers().signal().map(|(_, name)| name)
     }

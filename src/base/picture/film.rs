@@ -118,7 +118,7 @@ impl FilmWriter {
     /// Encodes the pictures that the encoder still holds, and renames the complete file to its path.
     ///
     /// # Errors
-    /// One line: no picture was added, a full disk, a signal.
+    /// One line: a fault of the encoder, a full disk, a signal.
     pub fn finish(mut self) -> Result<(), String> {
         self.encoder.flush();
         self.take_packets()?;

@@ -64,7 +64,7 @@ impl Picture {
     /// Encodes the picture without its alpha channel: with one channel if all pixels are grey, otherwise with three.
     ///
     /// # Errors
-    /// One line: there are no pixels, or their number does not match the size.
+    /// One line: there are no pixels, their number does not match the size, or the format cannot hold a picture of this size.
     pub fn encoded(&self, format: PictureFormat) -> Result<Vec<u8>, String> {
         let pixels = self.width as usize * self.height as usize;
         if pixels == 0 || self.rgba.len() != 4 * pixels {

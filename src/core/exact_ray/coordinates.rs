@@ -47,8 +47,8 @@ impl Line<'_> {
         crate::passes::raycast::ray::texel(self.scene, self.place(s)).is_some()
     }
 
-    /// Returns `low`, `high` and, between them in rising order, every s at which a column, row or slice coordinate is a whole number or the line
-    /// crosses the border of the insonified region. Some other places may be among them.
+    /// Returns `low`, `high` and, between them in rising order, every s at which a column, row or slice coordinate is the index of a texel or the
+    /// line crosses the border of the insonified region. Some other places may be among them.
     pub fn breakpoints(&self, [low, high]: [f64; 2]) -> Vec<f64> {
         let mut found = Vec::new();
         let size = self.scene.volume_size().map(|n| n as usize);

@@ -122,8 +122,8 @@ impl Polynomial {
         values[..self.count].iter().fold([f64::MAX, f64::MIN], |[low, high], v| [low.min(*v), high.max(*v)])
     }
 
-    /// Appends all roots in -1..1, in rising order, each to rounding. Where the polynomial touches 0 without changing its sign, to within about 1e-7
-    /// in x, a root may be added or left out. A polynomial that is 0 everywhere has none.
+    /// Appends all roots in -1..1, in rising order, each to rounding. A root may be appended twice. Where the polynomial touches 0 without changing
+    /// its sign, to within about 1e-7 in x, a root may be added or left out. A polynomial that is 0 everywhere has none.
     pub fn roots(&self, found: &mut Vec<f64>) {
         let bernstein = self.bernstein();
         if bernstein[..self.count].iter().any(|v| v.abs() > 1e-14) {

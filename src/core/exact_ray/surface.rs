@@ -24,13 +24,13 @@ const FOLLOW_LEVEL: f64 = 0.7;
 /// A surface that was found on a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Found {
-    /// Position of the surface, mm along the line.
+    /// Position of the surface, mm along the line from its base.
     pub place: f64,
     /// Mean field over one edge length (`surface.edge`) behind the place where the detector's difference is largest. If `surface.place` is the first
     /// crossing, it is taken behind the crossing of the threshold.
     pub echo: f64,
     /// Mean field over the depth behind the surface that skin shading (`light.skin`) averages. Places outside the insonified region count as 0. It is
-    /// 0 without skin shading.
+    /// 0 unless the skin is translucent.
     pub behind: f64,
     /// Estimated error of the position, mm: the error of the detector's difference (or of its slope, at a maximum), divided by its slope there.
     pub off: f64,
