@@ -40,7 +40,7 @@ pub enum Work {
     Tone,
     /// Stage 3 (shade), with the distance map as it is.
     Shading,
-    /// Stage 2 (raycast): rays are cast again.
+    /// Stage 2 (raycast): rays are cast again. Stage 1 (preprocess), with all frames, may have to run again before.
     Rays,
 }
 
@@ -311,7 +311,7 @@ impl Step {
         self.pass.writes(scene, &self.args()).iter().map(|b| b.slot).collect()
     }
 
-    /// Dispatch arguments of the step, for layer, slice and image 0.
+    /// Dispatch arguments of the step for a single slice; layer, slice and image are 0.
     pub fn args(&self) -> DispatchArgs {
         DispatchArgs { iteration: self.iteration, ..DispatchArgs::default() }
     }

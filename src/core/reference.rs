@@ -9,12 +9,13 @@ use crate::scene::Scene;
 use std::collections::BTreeMap;
 
 /// Renders a volume by the references of all passes. `frames`: one array per slice in geometric order, with the values that the shader reads from the
-/// frame (0..1). Returns the contents of all slots of the plan.
+/// frame ([`decoded`]). Returns the contents of all slots of the plan.
 pub fn render(scene: &Scene, frames: &[Texels]) -> BTreeMap<Slot, Texels> {
     render_with(scene, frames, &mut |_, _, _| false)
 }
 
-/// Converts the frames of a volume, in any order, to the values that shaders read from them, one array per slice in geometric order.
+/// Converts the frames of a volume, in any order, to the values that shaders read from them, one array per slice in geometric order. The values are
+/// 0..1 for integer samples, and the samples themselves for floats.
 pub fn decoded(scene: &Scene, frames: &[Frame]) -> Vec<Texels> {
     let format = Slot::Frames.format(scene);
     let [width, height] = scene.frame_size().map(|n| n as usize);

@@ -288,7 +288,8 @@ impl Pass {
     }
 
     /// Computes the content of the outputs after a dispatch: the reference within the rectangle that the dispatch writes ([`Pass::rectangle`]), and
-    /// around it what `writes` held before the call.
+    /// around it what `writes` held before the call. A dispatch without a rectangle writes all of its outputs, but of a volume only the columns and
+    /// rows that the device stores.
     pub fn expected(&self, scene: &Scene, args: &DispatchArgs, reads: &Arrays, writes: &mut Arrays) {
         let before = writes.clone();
         self.reference(scene, args, reads, writes);

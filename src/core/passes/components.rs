@@ -8,8 +8,7 @@ use std::ops::Range;
 pub struct Lattice<'a> {
     /// Columns, rows, slices.
     pub size: [usize; 3],
-    /// How many slices apart two set texels of one part may be at most. Along columns and rows they may be one apart. This is the reach of an
-    /// interpolated sample.
+    /// Two set texels are connected if they are at most this many slices apart, and at most one apart along columns and along rows.
     pub slices: usize,
     /// Size of a texel, in units of the caller, by row and slice: entry `slice * rows + row`.
     pub sizes: &'a [u64],

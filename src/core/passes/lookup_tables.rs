@@ -37,8 +37,8 @@ pub fn tgc(scene: &Scene) -> Vec<f32> {
 }
 
 /// Fractional (sample, line) that a slice pixel shows. (x, y) is its place in the coordinates of [`SliceGrid`](crate::scene::SliceGrid), mm. None
-/// outside the sector and its apron. Samples are counted after decimation: with the factor M, sample j is sample j M of the frame, and pixels beyond
-/// the last sample take the last.
+/// where [`scan_lut`] leaves the pixel out. Samples are counted after decimation: with the factor M, sample j is sample j M of the frame. With an
+/// apron, pixels beyond the last sample take the last.
 pub fn scan_index(scene: &Scene, probe: &Probe, x: f64, y: f64) -> Option<(f64, f64)> {
     let (sample, line) = probe.plane_indices(x, y);
     let factor = f64::from(scene.decimation());
@@ -101,9 +101,10 @@ pub(super) fn sweep_border(probe: &Probe) -> [f64; 2] {
     [first - margin, last + margin].map(|position| sweep_parameter(probe.motion, position))
 }
 
-/// Position in the sweep, in mean slice pitches from slice 0, at `ray.entries` equidistant abscissae from the first slice to the last. The abscissa
-/// is the tangent of half the angle of a fan, otherwise mm. For a uniform sweep the position is the fractional slice index; for others,
-/// [`slice_table`] has the position of each slice. Empty for a Cartesian volume.
+/// Position in the sweep, in mean slice pitches from slice 0, at `ray.entries` equidistant abscissae between the bounds of the slice positions
+/// ([`Probe::slice_bounds`]), both included. The abscissa is the tangent of half the angle of a fan, otherwise mm. If slices are equidistant and the
+/// motor stands still during a frame, the position is the fractional slice index. For other slices, [`slice_table`] has the position of each. Empty
+/// for a Cartesian volume.
 pub fn sweep_lut(scene: &Scene) -> Vec<f32> {
     let Some(probe) = scene.probe() else { return Vec::new() };
     let entries = scene.settings.ray.entries;
@@ -293,8 +294,8 @@ fn side_code(side: Side) -> u32 {
 }
 
 /// The table of bricks (cubes in space that rays may skip) for shaders, x fastest, then y. Each brick has four floats: the ranges of tile columns,
-/// tile rows and slices that its samples may touch (packed as first * 4096 + last, exact in f32), and its [`Side`] as a number (0 outside, 1 across,
-/// 2 inside).
+/// tile rows and slices that its samples may touch, and its [`Side`] as a number (0 outside, 1 across, 2 inside). A range with both ends included is
+/// packed as first * 4096 + last, exact in f32. The slices of a brick outside are 0 to 4095.
 pub fn brick_table(scene: &Scene) -> Vec<f32> {
     let packed = |[first, last]: [u32; 2]| (first * 4096 + last) as f32;
     let entry = |reach: &Reach| {

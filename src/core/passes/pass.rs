@@ -40,7 +40,7 @@ impl Stage {
 pub enum Frequency {
     /// Once for each frame.
     Frame,
-    /// Once for each complete volume.
+    /// Before a picture, over the slices of the volume that have changed.
     Volume,
     /// Once for each picture.
     Picture,

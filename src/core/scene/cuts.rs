@@ -27,7 +27,8 @@ pub struct CutShape {
     pub contour: Vec<DVec2>,
     /// True if the cut removes what is within the contour, false if it removes what is outside.
     pub(crate) removes_inside: bool,
-    /// Largest distance behind the contour's plane at which matter is removed, mm. None: any distance.
+    /// Largest distance behind the contour's plane at which matter is removed, mm. None: any distance. It does not limit the removal in front of the
+    /// plane.
     pub depth: Option<f64>,
     /// The brush of a cut that was made by strokes; the contour is then empty. None for a cut by a contour.
     pub brush: Option<BrushShape>,

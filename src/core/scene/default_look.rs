@@ -55,8 +55,7 @@ const REGION: [&str; 4] = ["region.lateral", "region.depth", "region.elevation",
 const UNKNOWN: EchoLevels =
     EchoLevels { dark: 0.05, threshold: 0.4, bright: 0.68, mean: 0.3, low: 0.02, high: 0.95, start: None };
 
-/// Settings completed by defaults that follow from the recording. `said` has one line of text for each of these defaults, which tells how it was
-/// found.
+/// Settings completed by defaults that follow from the recording. `said` has lines of text that tell how defaults were found; some have no line.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Completed {
     pub settings: Settings,

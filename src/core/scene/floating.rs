@@ -35,7 +35,7 @@ impl Scene {
         }
     }
 
-    /// The unit in which sizes of parts are counted, mm^3: the volume of the largest texel divided by 2^30.
+    /// The unit in which sizes of parts are counted, mm^3: the volume of the largest texel of slices at their mean distance, divided by 2^30.
     pub fn part_unit(&self) -> f64 {
         let [across, down] = self.grid.pitch;
         let along = match &self.geometry {

@@ -65,8 +65,8 @@ impl LabelVolume {
     /// place of its centre, mm. `own` gives the colour of a label (0..=1), or None for one of the default colours.
     ///
     /// # Errors
-    /// The end of a sentence about the labels: no voxel has one, the box around the labelled voxels has more than 2^26 voxels, `voxels` does not have
-    /// `size`, or `to_space` has no inverse.
+    /// The end of a sentence about the labels: no voxel has one, the box around the labelled voxels has more than 2^26 voxels with a margin of two,
+    /// `voxels` does not have `size`, or `to_space` has no inverse.
     pub fn new(
         size: [usize; 3],
         voxels: &[u8],
@@ -140,7 +140,8 @@ impl LabelVolume {
         (0..3).map(|n| axes.col(n).length()).fold(f64::INFINITY, f64::min)
     }
 
-    /// True if the box around the labelled voxels meets the box around the insonified region. Both are aligned with the axes of space.
+    /// True if the box around the labelled voxels and a margin of two voxels meets the box around the insonified region. Both are aligned with the
+    /// axes of space.
     pub fn overlaps(&self, geometry: &crate::probe::Geometry) -> bool {
         let to_space = self.to_index.inverse();
         let last = DVec3::from(self.size.map(|n| n as f64 - 1.0));

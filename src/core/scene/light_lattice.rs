@@ -223,8 +223,8 @@ impl Scene {
         AmbientCones::new(light.reach, self.light_lattice().cell)
     }
 
-    /// Number of consecutive steps of a ray that share the light at their middle: 2 if two steps together are no longer than a cell of the light
-    /// volume and each has one sample, else 1.
+    /// Number of consecutive steps of a ray that share the light of the light volume at their middle. It is 2 if all steps have the same length and
+    /// one sample each, and two together are no longer than a cell; otherwise, and without a light volume, it is 1.
     pub fn lit_steps(&self) -> u32 {
         let has_one_sample = matches!(self.settings.volume.compositing, Compositing::Riemann | Compositing::Corrected);
         let is_fine = !self.spreads() && 2.0 * self.step <= self.light_lattice().cell;

@@ -161,7 +161,7 @@ impl Layers {
     /// Adds the assignment of a flag `--set key.path=value`. The value is TOML, or a plain word.
     ///
     /// # Errors
-    /// One line: it is no assignment, or the value is invalid, alone or with the layers so far.
+    /// One line: it is no assignment, the value is invalid, alone or with the layers so far, or a file that it names cannot be read.
     pub fn set(&mut self, assignment: &str) -> Result<(), LoadError> {
         self.set_by(&format!("--set {assignment}"), assignment)
     }
@@ -169,7 +169,7 @@ impl Layers {
     /// Adds an assignment `key.path=value`, whose value is TOML or a plain word. `flag`: the flag that it comes from, as it was typed, for messages.
     ///
     /// # Errors
-    /// One line: it is no assignment, or the value is invalid, alone or with the layers so far.
+    /// One line: it is no assignment, the value is invalid, alone or with the layers so far, or a file that it names cannot be read.
     pub fn set_by(&mut self, flag: &str, assignment: &str) -> Result<(), LoadError> {
         let fault = |fault: &str| LoadError::Layer { layer: flag.into(), fault: fault.into() };
         let (path, text) = assignment.split_once('=').ok_or_else(|| fault("must read key.path=value"))?;

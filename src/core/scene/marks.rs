@@ -132,7 +132,7 @@ pub struct TileMarks {
     pub pixel: f64,
     /// True for a rendering, false for a plane.
     pub is_rendering: bool,
-    /// Depth below the probe's face of the tile's upper edge, mm. None if depth does not run straight down on the tile.
+    /// Depth below the probe's face of the tile's upper edge, mm. None if depth runs more than 8 degrees off straight down on the tile.
     pub depth_from: Option<f64>,
     pub letters: Vec<(Edge, &'static str)>,
     /// The edge at which the dot for the probe's marker is drawn. None if the marker is hidden, or if its side points more towards or away from the
@@ -266,8 +266,8 @@ impl PlaneName {
 }
 
 impl TileMarks {
-    /// Where the plane's letter is drawn: the upper corner that is away from the probe's marker, right and down from the middle of the tile, in
-    /// halves of the tile's width and height.
+    /// Where the plane's letter is drawn: the upper right corner, or the upper left one if the probe's marker is at the right edge. It is given right
+    /// and down from the middle of the tile, in halves of the tile's width and height.
     pub fn plane_corner(&self) -> [f64; 2] {
         match self.probe {
             Some(Edge::Right) => [-1.0, -1.0],

@@ -57,8 +57,8 @@ impl<'a> Picker<'a> {
         std::array::from_fn(|a| (at[a] - self.corner[a]) * self.rays_per_pixel)
     }
 
-    /// Column and row of the ray nearest to a position on the picture, and origin and unit direction of that ray. None outside the rendered part.
-    /// `rays`: number of rays along each axis.
+    /// Column and row of the ray nearest to a position on the picture, and origin and unit direction of that ray. None outside the cells of all rays,
+    /// which cover the rendered part. `rays`: number of rays along each axis.
     pub fn nearest_ray(&self, at: [f64; 2], rays: [u32; 2]) -> Option<([usize; 2], (DVec3, DVec3))> {
         let place = self.in_rays(at).map(f64::floor);
         let is_in = (0..2).all(|a| place[a] >= 0.0 && place[a] < f64::from(rays[a]));
@@ -73,7 +73,8 @@ impl<'a> Picker<'a> {
         is_in.then(|| (place.map(|n| n as usize), place.map(f64::fract)))
     }
 
-    /// Column and row of the pixel that contains a ray's centre. If one ray makes several pixels, it may be the first pixel outside the picture.
+    /// Column and row of the picture's pixel that contains a ray's centre. If one ray makes several pixels, it may be the first pixel beyond the
+    /// rendered part.
     pub fn pixel_of_ray(&self, ray: [usize; 2]) -> [usize; 2] {
         std::array::from_fn(|a| ((ray[a] as f64 + 0.5) / self.rays_per_pixel + self.corner[a]) as usize)
     }

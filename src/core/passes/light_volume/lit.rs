@@ -66,8 +66,8 @@ pub(in crate::passes) fn developed(scene: &Scene, is_alone: bool, rgba: [f64; 4]
     }
 }
 
-/// Colour of the backdrop (`light.volume.ground`) where a ray meets no matter. `at`: position in the picture, in rays from its upper left corner.
-/// None if the scene draws no backdrop.
+/// Colour of the backdrop (`light.volume.ground`), after the response curve, where a ray meets no matter. `at`: position in the picture, in rays
+/// from its upper left corner. None if the scene draws no backdrop.
 pub fn bare_ground(scene: &Scene, at: [f64; 2]) -> Option<[f64; 3]> {
     let is_alone = scene.settings.mode == Mode::Volume && !scene.lights_volume() && scene.still().is_none();
     ground_of(scene, is_alone)?;

@@ -42,8 +42,8 @@ pub struct Place {
 
 /// The matter on a ray. A colour is red, green and blue with the absorption over one reference length; None where the ray is outside the medium.
 pub trait Medium {
-    /// The part of a step, given by two offsets in mm, that is inside the medium. None if neither end is inside. A step that begins or ends outside
-    /// takes the value of its end inside.
+    /// The part of a step that is inside the medium; both are given by their two ends, as offsets in mm. None if neither end of the step is inside.
+    /// If one end is outside, the part ends at the border of the medium, and takes the value of the end inside.
     fn part_inside(&self, step: [f64; 2]) -> Option<[f64; 2]> {
         Some(step)
     }

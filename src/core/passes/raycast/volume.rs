@@ -216,7 +216,7 @@ fn is_exponential(scene: &Scene) -> bool {
 /// What compositing looks up: the transfer function and the light volume.
 pub(super) struct Tables<'a> {
     /// The table by which a step is looked up: the transfer function over the sample value or, with `volume.compositing` pre-integrated or
-    /// exponential, a table over the sample values at both ends of a step.
+    /// exponential, a table over the sample values at both ends of a step. With `ray.tolerance` it is always the transfer function.
     pub of_steps: &'a Texels,
     /// The transfer function over the sample value, from which an incomplete last step is integrated. Empty unless `volume.compositing` is
     /// exponential.
