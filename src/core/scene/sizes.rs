@@ -50,7 +50,7 @@ pub(super) struct Pitches {
 }
 
 impl Pitches {
-    /// `apart`: pixels from one ray to the next, for a picture with at most one ray a pixel. `middle`: middle of the region, mm in space.
+    /// `apart`: the setting `ray.subsampling`, by which the distance of neighbouring `rays` is divided. `middle`: middle of the region, mm in space.
     pub fn new(geometry: &Geometry, grid: &SliceGrid, rays: &Rays, apart: u32, middle: DVec3) -> Pitches {
         let (sample, slice) = match geometry {
             Geometry::Cartesian(volume) => (0.0, volume.spacing[2]),

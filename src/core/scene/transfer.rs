@@ -259,6 +259,7 @@ fn named(name: TransferName) -> Vec<TransferPoint> {
 }
 
 /// Control points of a colour map at equidistant brightness from dark to bright, red, green and blue in 0..1; between them it is linear.
+/// [`ColourMap::None`] has those of [`ColourMap::Grey`].
 pub fn colour_map(map: ColourMap) -> [[f64; 3]; 5] {
     match map {
         ColourMap::None | ColourMap::Grey => std::array::from_fn(|i| [i as f64 / 4.0; 3]),

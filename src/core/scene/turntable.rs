@@ -11,8 +11,8 @@ use glam::DVec3;
 
 impl Scene {
     /// The cameras of `count` pictures of one turn; a `count` of 0 gives one. The first looks in the direction of the scene's camera. From each to the next,
-    /// and from the last to the first, the view direction turns right by 360 / `count` degrees about the picture's vertical axis through the target. Their
-    /// `zoom` is not the scene's: all have the scale of the picture that needs most room.
+    /// and from the last to the first, the view direction turns right by 360 / `count` degrees about the picture's vertical axis through the target.
+    /// Each has a `zoom` of its own, so that all have one scale: that of the picture that needs most room with the scene's zoom.
     ///
     /// # Errors
     /// The mode shows planes, which do not turn with the view; or a start depth leaves nothing of the region.

@@ -127,8 +127,8 @@ impl Scene {
         if all.is_empty() { VisibleBounds::all([1; 3]) } else { all }
     }
 
-    /// The scene with the stored bounds of `before`, if these hold everything that this scene shows. A region that shrinks then needs no new memory
-    /// and keeps its slices.
+    /// The scene with the stored bounds of `before` as its `kept_bounds`, if both volumes have the same size and these bounds hold everything that
+    /// this scene shows. Otherwise its `kept_bounds` become empty. A region that shrinks needs no new memory and keeps its slices.
     pub fn keeping(self, before: &Scene) -> Scene {
         let stored = before.stored_bounds();
         let shown = Scene { kept_bounds: VisibleBounds::default(), ..self };

@@ -12,7 +12,7 @@ pub fn classes(words: &[u32]) -> BTreeSet<&'static str> {
     decode(words).unwrap_or_default().iter().filter_map(|i| class(i.opcode, i.operands)).collect()
 }
 
-/// True if the module has operations among the invocations of a subgroup (votes and others).
+/// True if the module has operations among the invocations of a subgroup (votes and others). False if the words are no valid module.
 pub fn has_votes(words: &[u32]) -> bool {
     classes(words).contains(VOTES)
 }

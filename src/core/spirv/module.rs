@@ -61,7 +61,7 @@ pub fn set_tool_version(words: &mut [u32], number: u16) {
 #[error("SPIR-V: {0}")]
 pub struct SpirvError(String);
 
-/// Decodes the words of a module.
+/// Decodes the words of a module from little-endian bytes. Bytes after the last whole word are left out.
 pub fn words(bytes: &[u8]) -> Vec<u32> {
     bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
 }

@@ -48,7 +48,7 @@ const fn of(class: &'static str, what: &'static str, change: fn(Op, &[u32]) -> O
     Mutation { class, what, spares_loops: false, change }
 }
 
-/// One mutation for each class of instructions. For some classes there is none, because none would keep every module valid.
+/// The mutations: at most one for each class of instructions.
 pub const MUTATIONS: &[Mutation] = &[
     of("comparisons of floats", "equal numbers compare the other way", |opcode, _| {
         paired(

@@ -12,7 +12,8 @@ const DIMENSION_2D: u32 = 1;
 /// before on an array of one layer.
 ///
 /// # Errors
-/// The module is invalid, or uses an array of images other than by texels read and written, and by queries of its size.
+/// The module is invalid, has too many identifiers or instructions, or uses an array of images other than by texels read and written, and by queries
+/// of its size.
 pub fn one_layer(words: &[u32]) -> Result<Vec<u32>, SpirvError> {
     let instructions = decode(words)?;
     // Two new identifiers for an instruction at most: with this many of both, the bound stays in its limit.

@@ -16,10 +16,12 @@ pub const BODY_MARK_SIZES: [f64; 2] = [0.06, 0.5];
 pub struct BodyMark {
     /// The part of the body.
     pub body: Body,
-    /// Exchanges left and right, for example for the left breast, or for a fetus whose back is on the other side.
+    /// Exchanges left and right of the outline, for example for the left breast, or for a fetus whose back is on the other side. `probe` and `angle`
+    /// stay as they are.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub mirrored: bool,
-    /// Its centre, as shares of the picture's width and height from the upper left corner. The whole mark stays on the picture. Absent: 0.12, 0.8.
+    /// Its centre, as shares of the picture's width and height from the upper left corner. Near an edge of the picture the mark is drawn further
+    /// inside, so that all of it is on the picture. Absent: 0.12, 0.8.
     pub at: [f64; 2],
     /// The edge of its square, as a share of the picture's shorter edge, 0.06..=0.5. Absent: 0.18.
     pub size: f64,

@@ -22,7 +22,7 @@ pub struct Cut {
     /// winds about is inside, also where it crosses itself. Required without `brush`, absent with it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub contour: Vec<[f64; 2]>,
-    /// The view at which the contour was drawn. Absent: from the probe down.
+    /// The view at which the contour was drawn. Absent: from the point 0, 0, 0 down, with +elevation up.
     #[serde(default)]
     pub view: CutView,
     /// The side of the contour that stays.
@@ -42,8 +42,8 @@ pub struct Cut {
 pub struct Brush {
     /// Distance from its strokes, mm, within which it removes.
     pub radius: f64,
-    /// Points that straight lines join, mm: lateral, depth (from the probe's face), elevation. A stroke of one point is a ball. All strokes have 1 to
-    /// 512 points together.
+    /// Points that straight lines join, mm: lateral, depth (from the probe's face), elevation. A stroke of one point is a ball. A stroke has
+    /// at least 1 point, and all strokes together at most 512.
     pub strokes: Vec<Vec<[f64; 3]>>,
 }
 

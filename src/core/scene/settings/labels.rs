@@ -17,7 +17,7 @@ pub struct Labels {
     pub outline: bool,
     /// Opacity of the shell in renderings.
     pub shell: f64,
-    /// Share of the shell's opacity that is left where it lies behind a rendered surface, by more than a voxel. 0 hides it there.
+    /// Share of the shell's opacity that is left where it lies at least 1.5 voxels behind a rendered surface. 0 hides it there.
     pub behind: f64,
     /// The labels themselves, which are in a file of their own.
     #[serde(skip)]

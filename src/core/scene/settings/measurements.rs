@@ -65,7 +65,7 @@ pub struct Made {
     /// The plane or the view, in words with its place in mm and its directions, at most 200 characters.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub plane: String,
-    /// The mode, and a digest of all settings of the picture: pictures of equal digests have equal settings. At most 200 characters.
+    /// The mode, and a digest of all settings but `picture`, `measure`, `body_marks`, `marks` and `cine`. At most 200 characters.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub settings: String,
 }

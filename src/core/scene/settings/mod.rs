@@ -46,8 +46,8 @@ pub struct Settings {
     /// How the picture is divided.
     pub layout: Layout,
     /// Volume and surface rendering: parts that float and are smaller than this are not drawn, mm^3; 0 draws all. A part consists of texels of the
-    /// sector that are dense enough to be drawn and touch one another; bright matter in dark fluid has parts, a cavity has none. Takes a second volume,
-    /// the whole sector in stage 1, and time of the CPU for each volume.
+    /// sector that are dense enough to be drawn and touch one another. With it, a rendering that draws what is dark is refused. Takes a second
+    /// volume, the whole sector in stage 1, and time of the CPU for each volume.
     pub floating: f64,
     /// Size of the picture.
     pub picture: Picture,

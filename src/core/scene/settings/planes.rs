@@ -128,7 +128,7 @@ pub enum PlaneName {
 pub struct Cube {
     /// Grey window: samples in this interval are stretched to 0..1.
     pub window: [f64; 2],
-    /// Distance that each face is moved inwards, mm. Something must remain.
+    /// Distance that each face is moved inwards, mm. Insets that leave nothing of the block are refused.
     pub inset: Inset,
     /// Tilt of each face about its middle.
     pub tilt: Tilt,

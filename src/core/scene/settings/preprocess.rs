@@ -20,7 +20,7 @@ pub struct Conditioning {
     /// Standard deviation of the Gaussian low pass along each line, 0..=32 samples; 0 for none. Absent: half the decimation factor if
     /// lines are decimated, else none.
     pub low_pass: Option<f64>,
-    /// Standard deviation of the low pass in mm along the line, in place of `low_pass`; at most 32 samples.
+    /// Standard deviation of the low pass in mm along the line, in place of `low_pass`. It is limited to 32 samples.
     pub low_pass_mm: Option<f64>,
     /// Most samples per line. Longer lines are low-passed and decimated by the smallest integer factor that meets this.
     pub samples: Option<u32>,
@@ -68,7 +68,7 @@ impl Conditioning {
         samples.div_ceil(most).max(1) as u32
     }
 
-    /// Standard deviation of the low pass for a decimation factor, samples.
+    /// Standard deviation of the low pass for a decimation factor, samples: `low_pass` if it is set. `low_pass_mm` does not count.
     ///
     /// By default half the factor M: a Gaussian of deviation s passes exp(-2 pi^2 s^2 f^2), so what would alias onto a constant
     /// (f = 1/M) is 43 dB down and what stays below half the new Nyquist frequency (f < 1/(4 M)) loses less than 3 dB.
@@ -166,7 +166,7 @@ impl VolumeFormat {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Sigma {
-    /// Window size, pixels.
+    /// Window size, pixels; odd.
     pub window: u32,
     /// Window size in mm, in place of `window`: the nearest odd number of pixels, at most 63; less than two are no filter. Not in `post`.
     pub window_mm: Option<f64>,
@@ -201,9 +201,9 @@ pub enum Noise {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct EnhancedSigma {
-    /// Starting window size, pixels.
+    /// Starting window size, pixels; odd.
     pub window: u32,
-    /// Largest window size, pixels. Thesis Tables 7-9: 17, 19, 19 (21 in Table 8), 21, 21, 23 for starts of 3, 5, 7, 9, 11, 13.
+    /// Largest window size, pixels; odd. Thesis Tables 7-9: 17, 19, 19 (21 in Table 8), 21, 21, 23 for starts of 3, 5, 7, 9, 11, 13.
     pub largest: u32,
     /// Starting window size in mm, in place of `window`: the nearest odd number of pixels, at least 3 and at most 63. Not in `post`.
     pub window_mm: Option<f64>,

@@ -11,9 +11,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Camera {
-    /// Rotation of the view towards +lateral, deg.
+    /// Angle by which the direction of view turns towards +lateral, deg.
     pub azimuth: f64,
-    /// Rotation of the view towards +elevation, deg.
+    /// Angle by which the direction of view, turned by `azimuth`, rises towards +elevation, deg.
     pub elevation: f64,
     /// Clockwise rotation of the picture, deg.
     pub roll: f64,
@@ -40,7 +40,8 @@ pub struct Ray {
     /// Samples along the smallest side of a voxel: the step is at most that side divided by this, whatever `step` says. The side
     /// is that of a slice pixel, or the slice pitch of a Cartesian volume if it is smaller. Thesis 3.5.2.1 takes 2. Absent: `step` alone.
     pub samples_per_voxel: Option<u32>,
-    /// Early ray termination of VR: a ray ends when its transmittance falls below this. The error is at most this; 0 never ends early.
+    /// Early ray termination of VR: a ray ends when its transmittance is at most this. At most this share of the light from behind is lost; 0 never
+    /// ends early.
     pub early_end: f64,
     /// How a sample is interpolated.
     pub sampling: Sampling,
@@ -55,28 +56,29 @@ pub struct Ray {
     /// How the slice index at a position of the sweep is computed.
     pub slice_index: SliceIndex,
     /// Entries of the look-up table of the slice index, where no polynomial replaces it, and of the table of the lines. Linear interpolation between
-    /// entries h apart is off by at most h^2/8 times the second derivative of the index: with 1025 entries by less than 1e-6 slices for a sweep of
+    /// entries h apart is off by at most h^2/8 times the second derivative of the index: with 1025 entries by less than 1e-5 slices for a sweep of
     /// 142 frames over 85 deg.
     pub entries: u32,
     /// Rays per pixel along each axis: the picture is rendered larger and averaged.
     pub rays: u32,
     /// Adaptive supersampling: all of `rays` only in pixels at edges, where the colour bends by more than two levels of 8 bits; one in each of the
-    /// others. The picture differs by at most a level from that of all rays. Only in mode volume, and not with first-hit shading, cut faces or
-    /// `still`: other pictures have all rays.
+    /// others. It may miss detail that is narrower than a pixel. Only in mode volume, and not with first-hit shading, cut faces or `still`: other
+    /// pictures have all rays.
     pub adaptive: bool,
     /// Largest error of a pixel that its rays and their steps may leave, 0.01..=64 levels of 8 bits of the finished picture; 0 takes the same steps
     /// in all pixels. A ray through every other pixel of every other row begins with `step`, at most a slice pixel. It takes shorter steps, down to a
     /// 32nd of that, where its light differs by more than the tolerance from that of steps of twice the length. The pixels between are means of these
     /// rays where the picture bends little from ray to ray, and have rays of their own elsewhere. Light is integrated between samples whatever
     /// `volume.compositing` says. The error is an estimate; only of pixels whose rays meet nothing but empty bricks it is known to be 0. Only in mode
-    /// volume, and not with first-hit shading or `still`.
+    /// volume, and not with first-hit shading, `still`, `ray.sliding` or `ray.adaptive`.
     pub tolerance: f64,
     /// Brick size of empty-space skipping, texels; 0 takes every sample. Rays skip bricks that cannot change the picture, so
     /// that it stays the same bit for bit. Absent: 8; a CPU skips only where this saves more time in one picture of a volume than computing
     /// the ranges of the bricks takes, or with `slices.still`.
     pub brick: Option<u32>,
     /// Pixels from ray to ray along each axis, for a view that moves: 2 casts one ray for four pixels. The pixels between are interpolated, but not across
-    /// the edges of surfaces. Windows of filters of the distance map have fewer rays, so that they cover the same part of the picture. Above 1 `rays` must be 1.
+    /// the edges of surfaces. Windows of filters of the distance map have fewer rays, so that they cover about the same part of the picture. Above 1
+    /// `rays` must be 1.
     pub subsampling: u32,
 }
 
@@ -229,7 +231,7 @@ pub enum Compositing {
     /// narrow feature of the transfer function is missed (Engel, Kraus, Ertl 2001).
     PreIntegrated,
     /// Premultiplied colour and opacity of a step along which the value changes linearly, each place dimmed by the matter in front of it
-    /// in the same step. Not with `ray.spread`, whose steps have different lengths.
+    /// in the same step. Not with `light.volume` or `region.fade`, nor with `ray.spread`, whose steps have different lengths.
     Exponential,
 }
 

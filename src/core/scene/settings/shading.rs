@@ -28,7 +28,8 @@ pub struct Distance {
 }
 
 impl Distance {
-    /// The filters for half as many rays along each axis: windows cover the same part of the picture, and diffusion spreads as far.
+    /// The filters for half as many rays along each axis: windows cover about the same part of the picture, and have at least 3 rays along each axis.
+    /// Diffusion spreads as far.
     pub fn halved(&self) -> Distance {
         let window = |edge: u32| 2 * (edge / 4).max(1) + 1;
         let half = |mm: Option<f64>| mm.map(|mm| mm / 2.0);
@@ -163,7 +164,8 @@ pub struct LightVolume {
     /// Edge of a cell, mm. Absent: half the standard deviation of the Gaussian that the volume is smoothed with (`slices.smooth`), and a slice pixel
     /// at least. Where there would be more cells than `cells` they are larger; `--explain` says what they are and why.
     pub cell: Option<f64>,
-    /// Most cells, but for rounding up to an even number along each edge; also at most 1024 along an edge. A cell takes 44 bytes of the device's memory.
+    /// Most cells, but for rounding up to an even number along each edge; also at most 1024 along an edge. A cell takes about 45 bytes of the
+    /// device's memory.
     pub cells: u32,
     /// Samples along each edge of a cell.
     pub taps: u32,
@@ -193,7 +195,7 @@ pub struct LightVolume {
     pub back_colour: [f64; 3],
     /// Exposure: factor of the light before the film curve, 0..=100.
     pub exposure: f64,
-    /// The backdrop that fills the picture behind the volume. Absent: black.
+    /// The backdrop that fills the picture behind the volume, in mode volume without first-hit shading. Absent: black.
     pub ground: Option<Ground>,
 }
 

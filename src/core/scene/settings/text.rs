@@ -21,18 +21,18 @@ fn subsampling(mut taken: impl FnMut(&str) -> Option<bool>) -> Option<i64> {
 }
 
 impl Settings {
-    /// Parses a scene file.
+    /// Parses a scene file. Absent settings have their defaults. Limits of values are left to [`Settings::check`].
     ///
     /// # Errors
-    /// The text is not valid TOML, or a value does not fit its setting. The error has the position.
+    /// The text is not valid TOML, a key is unknown, a value does not fit its type, or the version is not 1. The error has the position.
     pub fn from_toml(text: &str) -> Result<Settings, NodeError> {
         Settings::from_node(Node::parse(text)?)
     }
 
-    /// Reads settings from a node of a larger parsed text.
+    /// Reads settings from a node of a larger parsed text. Limits of values are left to [`Settings::check`].
     ///
     /// # Errors
-    /// A value does not fit its setting. The error has the position in the text.
+    /// A key is unknown, a value does not fit its type, or the version is not 1. The error has the position in the text.
     pub fn from_node(mut node: Node) -> Result<Settings, NodeError> {
         node.take("version").map(FileVersion::deserialize).transpose()?;
         if let Some(ray) = node.at("ray") {
@@ -47,10 +47,10 @@ impl Settings {
         Settings::deserialize(node)
     }
 
-    /// Reads settings from a table with the keys of a scene file.
+    /// Reads settings from a table with the keys of a scene file. Limits of values are left to [`Settings::check`].
     ///
     /// # Errors
-    /// A value does not fit its setting.
+    /// A key is unknown, a value does not fit its type, or the version is not 1.
     pub fn from_table(table: Table) -> Result<Settings, NodeError> {
         Settings::from_node(Node::from(Value::Table(table)))
     }
@@ -71,10 +71,10 @@ impl Settings {
         Table::try_from(self.erased())
     }
 
-    /// The settings as JSON.
+    /// The settings as JSON. Numbers that are infinite or NaN become `null`.
     ///
     /// # Errors
-    /// JSON cannot represent a value.
+    /// A value cannot be serialized.
     pub fn to_json(&self) -> Result<String, serde_json::Error> {
         serde_json::to_string(self.erased())
     }
