@@ -32,7 +32,8 @@ pub enum Bands {
     /// By measured time. `losses`: how often the device was lost so far; each loss halves the time that a submission may take. With 0, dispatches on
     /// a software device stay whole, except for a renderer that is paced (`RendererOptions::paced`).
     Measured { losses: u32 },
-    /// Into bands of about this many invocations, rounded up to complete rows of workgroups: for tests.
+    /// Into bands of about this many invocations, for tests. The number is rounded up to whole slabs, which are one workgroup thick along the axis
+    /// with the most workgroups.
     Fixed(u64),
 }
 
@@ -95,7 +96,7 @@ impl BandLimit {
     }
 
     /// The limit for a device whose queue also draws a window's panels, between the bands. Unlike with [`BandLimit::new`], a software device gets
-    /// bands also before a loss, and shorter ones. None if no dispatch is divided.
+    /// bands also before a loss, and shorter ones. The result is never None.
     pub fn paced(bands: Bands, is_software: bool) -> Option<BandLimit> {
         match bands {
             Bands::Measured { losses } if is_software => Some(BandLimit::Time {

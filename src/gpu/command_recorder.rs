@@ -198,7 +198,7 @@ impl CommandRecorder {
         Ok(())
     }
 
-    /// Ends the command buffer and continues the recording in another one; each is submitted on its own.
+    /// Submits the command buffer, and continues the recording in another one.
     pub fn cut(&mut self, queues: &mut DeviceQueues) -> Result<(), GpuError> {
         self.submit(queues)?;
         // Where each pass is timed, that of a band is a run of its own.
@@ -307,11 +307,11 @@ impl CommandRecorder {
         Ok(())
     }
 
-    /// Records a dispatch with the barrier that it needs. With `limit` it is divided into bands, each in a submission of its own; an indirect
+    /// Records a dispatch with the barrier that it needs. With `limit` it is divided into bands, of which no two share a submission; an indirect
     /// dispatch stays whole.
     ///
     /// # Errors
-    /// More parameters than one command buffer can hold; a device that fails.
+    /// The recording has too many parameters, or the device fails.
     pub fn dispatch(
         &mut self,
         queues: &mut DeviceQueues,
@@ -456,7 +456,8 @@ impl CommandRecorder {
         Ok(offset)
     }
 
-    /// Writes a time stamp if each pass is timed. `name`: the work since the previous stamp.
+    /// Writes a time stamp if each pass is timed. `name`: the work since the previous stamp. Where CPU time is counted, this submits what was
+    /// recorded and waits for it.
     ///
     /// # Errors
     /// The device fails, where CPU time is counted.

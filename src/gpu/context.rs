@@ -154,7 +154,7 @@ pub struct Counts {
 /// Loads Vulkan and lists the devices, for `echolume devices`, also those that lack a required feature.
 ///
 /// # Errors
-/// No Vulkan loader or no driver.
+/// No Vulkan loader, no driver, or a driver that fails.
 pub fn list() -> Result<Vec<Candidate>, GpuError> {
     let entry = load()?;
     let instance = create_instance(&entry, None, false, None)?;
@@ -178,7 +178,8 @@ impl Context {
     /// Opens a device.
     ///
     /// # Errors
-    /// No Vulkan loader, no device, a device that lacks a required feature, or no validation layer although validation is requested.
+    /// No Vulkan loader, no such device, a device that lacks a required feature, no validation layer although validation is requested, or a driver
+    /// that fails.
     pub fn new(options: &ContextOptions) -> Result<Arc<Context>, GpuError> {
         Context::create(options, None)
     }
@@ -186,8 +187,8 @@ impl Context {
     /// Opens a device that can present on `target`.
     ///
     /// # Errors
-    /// No Vulkan loader, no device that can present there, a device that lacks a required feature, or no validation layer although validation is
-    /// requested.
+    /// No Vulkan loader, no such device or none that can present there, a device that lacks a required feature, no validation layer although
+    /// validation is requested, or a driver that fails.
     #[cfg(feature = "view")]
     pub fn for_presentation(options: &ContextOptions, target: &Target) -> Result<Arc<Context>, GpuError> {
         Context::create(options, Some(target))

@@ -79,8 +79,8 @@ impl PassRunner {
         self.run_within(scene, pass, args, inputs, poison, u64::MAX)
     }
 
-    /// Does what [`PassRunner::run`] does, which explains the other arguments, in bands of about `most` invocations, rounded up to complete rows of
-    /// workgroups. An indirect dispatch is not divided.
+    /// Does what [`PassRunner::run`] does, which explains the other arguments, in bands of about `most` invocations
+    /// ([`Bands::Fixed`](super::Bands::Fixed)). An indirect dispatch is not divided.
     ///
     /// # Errors
     /// The device cannot hold a slot, a shader does not compile, or the device fails.
@@ -156,7 +156,7 @@ impl PassRunner {
     }
 }
 
-/// Measures the GPU time of a single pass of a scene, with slots and pipelines of its own.
+/// Measures the GPU time of a single pass of a scene, with slots of its own.
 pub struct PassTimer {
     // Fields are dropped in this order, after `drop` has waited for the device.
     recorder: CommandRecorder,
@@ -176,7 +176,7 @@ impl PassTimer {
     /// all other slots hold zeros. A pass over frames works on layer 0 and the middle slice, a pass over volumes on all visible slices.
     ///
     /// # Errors
-    /// The device cannot hold a slot, or a shader does not compile; the error names it.
+    /// The device cannot hold a slot or a shader does not compile, which the error names, or the device fails.
     pub fn new(
         context: &Arc<Context>,
         scene: &Scene,
@@ -189,7 +189,7 @@ impl PassTimer {
     /// Does what [`PassTimer::new`] does, which explains `contents`, with shaders that read single texels by `texel_access`.
     ///
     /// # Errors
-    /// The device cannot hold a slot, or a shader does not compile; the error names it.
+    /// The device cannot hold a slot or a shader does not compile, which the error names, or the device fails.
     pub fn with_texel_access(
         context: &Arc<Context>,
         scene: &Scene,
@@ -297,8 +297,8 @@ impl Drop for PassTimer {
     }
 }
 
-/// Times of `count` consecutive runs of a pass, ns, each with as many dispatches in a row as in a picture, on slots that hold zeros. Empty if the
-/// device has no time stamps. An additional first run, in which drivers compile, is not counted.
+/// Times of `count` consecutive runs of a pass, ns, each with as many dispatches in a row as in a picture. Empty if the device has no time stamps.
+/// Slots begin as with [`PassTimer::new`] without `contents`. An additional first run, in which drivers compile, is not counted.
 ///
 /// # Errors
 /// The device cannot hold a slot, a shader does not compile, or the device fails.

@@ -27,7 +27,7 @@ pub struct MeasuredPipeline {
     /// Formats of the inputs, in the order in which the pass declares them.
     pub formats: Vec<Format>,
     /// The executables that the driver compiled for it. Empty without
-    /// [`ContextOptions::compile_statistics`](super::ContextOptions::compile_statistics).
+    /// [`ContextOptions::compile_statistics`](super::ContextOptions::compile_statistics), and if the device does not list them.
     pub executables: Vec<Executable>,
     /// Compile time if neither a pipeline cache nor the driver's own cache holds the pipeline.
     pub cold: Duration,
@@ -54,10 +54,10 @@ struct Target<'a> {
     args: DispatchArgs,
 }
 
-/// Compiles and measures every pipeline that these scenes need on a device, each once, in the order of the scenes.
+/// Measures the compilation of every pipeline that these scenes need on a device, in the order of the scenes. Each pipeline has one entry.
 ///
 /// # Errors
-/// The device cannot hold a scene, or a shader does not compile.
+/// The device cannot hold a scene, a shader does not compile, or the driver fails.
 pub fn measure(
     context: &Arc<Context>,
     scenes: &[Scene],
@@ -86,7 +86,7 @@ pub fn measure(
 /// Sum of the times to compile each pipeline of a pass in a scene once, without any cache.
 ///
 /// # Errors
-/// A shader does not compile.
+/// A shader does not compile, or the driver fails.
 pub fn compile_time(context: &Arc<Context>, scene: &Scene, pass: &'static Pass) -> Result<Duration, GpuError> {
     let texel_access = TexelAccess::for_device(&context.candidate);
     let pipelines = Pipelines::new(context, embedded(), texel_access)?;

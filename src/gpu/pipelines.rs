@@ -196,8 +196,8 @@ impl Pipelines {
     /// pipelines are missing.
     ///
     /// # Errors
-    /// A shader does not exist, or disagrees with the declaration of its pass: the fault of the first step that has one. Pipelines that were compiled
-    /// are kept.
+    /// A shader does not exist, disagrees with the declaration of its pass, or is refused by the driver: the fault of the first step that has one.
+    /// Pipelines that were compiled are kept.
     pub(super) fn of_plan_while(
         &self,
         plan: &Plan,
@@ -213,7 +213,7 @@ impl Pipelines {
     /// one for each step. The device must have finished with the previous pipelines, and no other thread may compile any.
     ///
     /// # Errors
-    /// A shader does not exist, or disagrees with the declaration of its pass; the previous pipelines stay.
+    /// A shader does not exist, disagrees with the declaration of its pass, or is refused by the driver; the previous pipelines stay.
     pub(super) fn recompile(
         &self,
         shaders: &HashSet<String>,

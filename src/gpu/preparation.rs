@@ -45,8 +45,9 @@ struct Progress {
 }
 
 impl Preparation {
-    /// Begins to compile the pipelines that a renderer of this scene with these options will need. `wake` is called after each pipeline and at the
-    /// end. None if the options have shaders from a folder, because renderers do not share the pipelines of those.
+    /// Begins to compile the pipelines that a renderer of this scene with these options will need. `wake` is called whenever
+    /// [`Preparation::progress`] changes, and at the end. None if the options have shaders from a folder, because renderers do not share the
+    /// pipelines of those.
     ///
     /// # Errors
     /// The thread cannot be started.

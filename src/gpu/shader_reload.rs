@@ -43,7 +43,7 @@ impl ShaderFolder {
     /// Reads the folder, but compiles nothing yet.
     ///
     /// # Errors
-    /// There is no compiler, the folder cannot be read or holds no shader, or an include does not exist.
+    /// There is no compiler, the folder cannot be read or holds no shader, or an include does not exist or includes itself.
     pub fn open(glsl: &Path) -> Result<Arc<ShaderFolder>, String> {
         ShaderFolder::open_with(glsl, Compiler::find()?)
     }
@@ -51,7 +51,7 @@ impl ShaderFolder {
     /// Reads the folder, whose shaders `compiler` will compile, but compiles nothing yet.
     ///
     /// # Errors
-    /// The folder cannot be read or holds no shader, or an include does not exist.
+    /// The folder cannot be read or holds no shader, or an include does not exist or includes itself.
     pub fn open_with(glsl: &Path, compiler: Compiler) -> Result<Arc<ShaderFolder>, String> {
         let sources = read(glsl)?;
         tracing::info!("shaders: {} from {}, compiled by {}", sources.len(), glsl.display(), compiler.name());

@@ -30,7 +30,7 @@ struct Origin {
 /// Every variant of every `.comp` file in the folders directly below `root`, in order of path.
 ///
 /// # Errors
-/// A file cannot be read, or an include does not exist or includes itself.
+/// A file cannot be read or lists a variant without a name, or an include does not exist or includes itself.
 pub fn sources(root: &Path) -> Result<Vec<Source>, String> {
     let mut all = Vec::new();
     for stage in sorted(root)? {
@@ -105,7 +105,7 @@ fn version_first(lines: Vec<(String, Origin)>) -> (String, Vec<Origin>) {
 }
 
 impl Source {
-    /// The text whose hash is in the file spirv/SOURCES.
+    /// The text whose hash is in the file spirv/SOURCES: the compiler's options, the macros and the source text.
     pub fn fingerprint(&self) -> String {
         format!("{OPTIONS}\n{}\n{}", self.defines.join(" "), self.text)
     }

@@ -178,7 +178,7 @@ impl Timeline {
         self.wait(self.submitted)
     }
 
-    /// True if the submission with this timeline value is done; does not wait. It also submits what is held back and due.
+    /// True if the submission with this timeline value is done; does not wait. If it is not done, this submits what is held back and due.
     ///
     /// # Errors
     /// The device fails, or is given up because it does not finish.

@@ -306,7 +306,8 @@ impl Timings {
         self.cpu.as_mut().map(|log| std::mem::take(&mut log.passes)).unwrap_or_default()
     }
 
-    /// Largest error of the position of device times on the host's clock, ns. `None` without spans, or if the device's clock cannot be read.
+    /// Largest error of the position of device times on the host's clock, ns. `None` without spans, before the first device span, and if the device's
+    /// clock cannot be read.
     pub fn clock_deviation(&self) -> Option<u64> {
         self.spans.as_ref()?.deviation
     }

@@ -137,8 +137,7 @@ struct Declarations {
 /// Reads the interface of a module.
 ///
 /// # Errors
-/// The module is invalid, or declares a kind of binding, a format of texel buffers or a type of parameter that this program does not support in any
-/// shader.
+/// The module is invalid, or declares a binding or a parameter that this program supports in no shader.
 pub fn reflect(words: &[u32]) -> Result<Module, SpirvError> {
     let declared = scan(words)?;
     let mut module = Module { local_size: declared.local_size, ..Module::default() };

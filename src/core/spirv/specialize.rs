@@ -16,7 +16,7 @@ enum Value {
 /// without a value keep their defaults.
 ///
 /// # Errors
-/// The module is invalid, or has an expression of a kind that no shader of this project has.
+/// The module is invalid, or has an expression without a value: one with an operation that no shader of this project has, or a division by 0.
 pub fn specialize(words: &[u32], values: &[(u32, i32)]) -> Result<Vec<u32>, SpirvError> {
     let instructions = decode(words)?;
     let (mut given, mut known) = (HashMap::new(), HashMap::new());

@@ -13,7 +13,7 @@ impl Renderer {
     /// Selects the volume image with index `image`, from 0, for the next picture and later ones. All of its visible frames must have been sent.
     ///
     /// # Errors
-    /// The image does not exist, or the device fails.
+    /// The image does not exist, the device fails, or the last change of the scene failed.
     pub fn show(&mut self, image: u32) -> Result<(), GpuError> {
         self.check(image)?;
         self.flush()?;
@@ -80,10 +80,10 @@ impl Renderer {
     }
 
     /// Waits for the picture in flight and returns it; without one, returns the last picture. If pictures stay on the device, it is copied to the
-    /// host now.
+    /// host now. If [`Renderer::has_drawn`] is false, the colours are undefined.
     ///
     /// # Errors
-    /// The device fails.
+    /// The device fails, or, if pictures stay on the device, the last change of the scene failed.
     pub fn end_picture(&mut self) -> Result<Picture, GpuError> {
         self.wait_drawn()?;
         let [width, height] = self.program.scene.picture_size();
@@ -195,7 +195,7 @@ impl Renderer {
     /// the device waits for it and presents it.
     ///
     /// # Errors
-    /// The device fails, or a lost surface cannot be recreated.
+    /// The device fails, a lost surface cannot be recreated, or the last change of the scene failed.
     pub fn present(
         &mut self,
         screen: &mut Screen,

@@ -161,7 +161,7 @@ impl Ring {
         Ok(())
     }
 
-    /// True if a slice of volume image `image` can be added to the batch.
+    /// True if a slice of volume image `image` can be added to the batch; false if no batch has begun.
     pub fn continues(&self, image: u32, slice: u32) -> bool {
         self.batch
             .as_ref()

@@ -51,7 +51,7 @@ pub struct RendererOptions {
     /// How dispatches over the volume and the picture are divided, so that no submission takes too long.
     pub bands: Bands,
     /// Holds back bands of a picture while the device has enough work, so that a window's panels can be drawn between them. [`Renderer::is_drawing`]
-    /// submits them, and so does every wait. On a device with several queues nothing is held back.
+    /// submits them, and so does every wait. With several queues nothing is held back.
     pub paced: bool,
     /// How single texels are read. `None` selects the faster way on the device.
     pub texel_access: Option<TexelAccess>,
@@ -62,7 +62,7 @@ pub struct RendererOptions {
     pub queues: Option<usize>,
     /// True: every picture is copied to the host. False: pictures stay on the device, for presentation.
     pub readback: bool,
-    /// A function that is called when a pipeline has been compiled in the background.
+    /// A function that is called after each pipeline that was compiled in the background for [`Renderer::prepare`].
     pub wake: Option<Wake>,
     /// Keeps a log of everything that is recorded and submitted ([`Renderer::log`]).
     pub log: bool,
@@ -136,7 +136,7 @@ impl Renderer {
     /// Allocates the slots and compiles the pipelines that the scene needs.
     ///
     /// # Errors
-    /// The device cannot hold a slot, or a shader does not compile; the error names it.
+    /// The device cannot hold a slot or a shader does not compile, which the error names, or the device fails.
     pub fn new(context: &Arc<Context>, scene: Scene, options: &RendererOptions) -> Result<Renderer, GpuError> {
         let compiler = options.compiler(context)?;
         let (scene, plan) = compiler.plan(scene);
@@ -261,7 +261,7 @@ impl Renderer {
     /// slice can follow, another slice arrives, [`Renderer::submit_frames`] is called, the volume is read, or the scene changes.
     ///
     /// # Errors
-    /// A frame of the wrong size, a slice or image that does not exist, a device that fails.
+    /// The frame has the wrong size, the slice or image does not exist, the device fails, or the last change of the scene failed.
     pub fn frame(&mut self, slice: u32, bytes: &[u8], image: u32) -> Result<(), GpuError> {
         self.check(image)?;
         self.check_frame(slice as usize, bytes)?;
@@ -333,7 +333,7 @@ impl Renderer {
     /// [`RendererOptions::wake`] is called after each.
     ///
     /// # Errors
-    /// A shader does not compile, or the device cannot hold a slot.
+    /// A shader does not compile, the device cannot hold a slot, or the thread cannot be started.
     pub fn prepare(&mut self, scene: &Scene) -> Result<bool, GpuError> {
         self.compiler.prepare(scene)
     }
@@ -361,8 +361,8 @@ impl Renderer {
     /// [`Rerun::Frames`], all frames must be sent again first.
     ///
     /// # Errors
-    /// If a shader does not compile or the device can never hold a slot, the old scene stays in use. If memory is exhausted halfway,
-    /// nothing can be drawn until another change succeeds, which rebuilds everything.
+    /// If a shader does not compile or the device can never hold a slot, the old scene stays in use. If memory is exhausted or the
+    /// device fails halfway, nothing can be drawn until another change succeeds, which rebuilds everything.
     pub fn change(&mut self, scene: Scene) -> Result<Rerun, GpuError> {
         // Frames that wait go through the stage 1 that they were sent to.
         self.flush()?;
@@ -421,8 +421,8 @@ impl Renderer {
     /// [`Renderer::change`] does.
     ///
     /// # Errors
-    /// A shader does not exist, or disagrees with the declaration of its pass: the previous pipelines stay. The device fails, or the last change of
-    /// the scene failed.
+    /// A shader does not exist, disagrees with the declaration of its pass, or is refused by the driver: the previous pipelines stay. The device
+    /// fails, or the last change of the scene failed.
     pub fn reload_shaders(&mut self, shaders: &HashSet<String>) -> Result<Rerun, GpuError> {
         if let Some(fault) = &self.broken {
             return Err(GpuError::Broken(fault.clone()));
@@ -525,13 +525,13 @@ impl Renderer {
         self.queues.timings.take_cpu()
     }
 
-    /// Largest error of the position of device spans on the host's clock, ns. `None` without spans, and if the device's clock cannot be
-    /// read.
+    /// Largest error of the position of device spans on the host's clock, ns. `None` without spans, before the first device span, and if the device's
+    /// clock cannot be read.
     pub fn clock_deviation(&self) -> Option<u64> {
         self.queues.timings.clock_deviation()
     }
 
-    /// Runs `work` and returns the names of the passes that it dispatches, in order, one entry for each dispatch.
+    /// Runs `work` and returns the names of the passes that it dispatches, in order, as [`Renderer::dispatch_extents`] does.
     ///
     /// # Errors
     /// `work` returns one, or the device fails.

@@ -81,7 +81,7 @@ impl Screen {
     /// Makes a screen on `target`. `size`: width and height of the window, pixels; ignored for a monitor.
     ///
     /// # Errors
-    /// The device cannot present on the target.
+    /// The device cannot present on the target, or fails.
     pub fn new(
         context: &Arc<Context>,
         target: Target,

@@ -52,7 +52,7 @@ impl Target {
     /// Creates a surface on this target for the device.
     ///
     /// # Errors
-    /// The window is closed, or no monitor is free.
+    /// The window is closed, the chosen monitor or mode does not exist, another program uses the monitor, or the driver fails.
     pub fn surface(
         &self,
         entry: &Entry,

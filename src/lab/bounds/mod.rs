@@ -24,8 +24,8 @@ use rayon::prelude::*;
 pub struct Effort {
     /// A ray is not refined further once its widest channel (upper less lower bound, 0..1) is at most this wide.
     pub width: f64,
-    /// A ray is not refined further once it has this number of parts. Its first division, at the faces of cells and the points of the transfer
-    /// function, may have more.
+    /// A ray is not refined further once it has this number of parts that are not surely transparent. Its first division, at the faces of cells and
+    /// the points of the transfer function, may have more.
     pub parts: usize,
 }
 

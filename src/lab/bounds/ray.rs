@@ -148,9 +148,9 @@ impl Bounds {
 }
 
 /// The bounds of a ray. Parts of the ray are halved until the widest channel is no wider than `target`, `enough` is true for the bounds, there are
-/// `most` parts, or no part can be halved. `hints`: positions on the field's line in rising order, mm, at which parts end at first, even if these are
-/// more than `most`. The first and last are the ray's ends. The bounds are valid for any positions between them; positions at the faces of cells make
-/// them narrower.
+/// `most` parts that are not surely transparent, or no part can be halved. `hints`: positions on the field's line in rising order, mm, at which parts
+/// end at first, even if these are more than `most`. The first and last are the ray's ends. The bounds are valid for any positions between them;
+/// positions at the faces of cells make them narrower.
 pub fn bounds(
     field: &Field,
     medium: &Medium,

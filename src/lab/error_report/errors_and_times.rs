@@ -273,7 +273,7 @@ impl ErrorMeasurement<'_> {
     /// bound, combinations that may be the fastest are first run alternately, `runs` times each.
     ///
     /// # Errors
-    /// The report has no times, no combination keeps the bound, or the device fails.
+    /// No combination of the report has both a time and an error by `measure`, none keeps the bound, or the device fails.
     pub fn choose(
         &self,
         finest: &Finest,
