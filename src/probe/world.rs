@@ -92,8 +92,8 @@ impl World {
     }
 
     /// The grid on which the volume is drawn. Its axes are those of the lattice, and its coordinates are the components of world positions along
-    /// these axes. For a lattice that is parallel to the axes of the world, the coordinates are the world's. `size`: number of voxels along the axes
-    /// of the lattice.
+    /// these axes. If they point along x, y and z of the world in this order, the coordinates are the world's. `size`: number of voxels along the
+    /// axes of the lattice.
     pub fn grid(&self, size: [usize; 3]) -> Grid {
         let spacing = [0, 1, 2].map(|n| self.axis(n).length());
         let origin = self.directions().transpose() * self.origin();

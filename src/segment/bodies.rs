@@ -74,7 +74,7 @@ pub struct Body {
     pub is_cut: bool,
 }
 
-/// The bodies that were found, the largest first, which has label 1.
+/// The bodies that were found, labelled from 1 on: the largest at [`Found::level`] first.
 #[derive(Clone, Debug)]
 pub struct Found {
     pub labels: Labels,
@@ -86,11 +86,11 @@ pub struct Found {
 }
 
 /// Finds, within a box, the largest body that is brighter than what is around it. `corners`: the lowest and the highest corner of the box, mm in the
-/// space of the volume. Returns the body, and the level at its surface as a share of the sample range, 0..=1. `range`: the stored values at both ends
-/// of the sample range.
+/// space of the volume. Returns the body, and the level at which it was found as a share of the sample range, 0..=1. `range`: the stored values at
+/// both ends of the sample range.
 ///
 /// # Errors
-/// One line: no voxel lies in the box, or as [`find`].
+/// One line: no voxel lies in the box, there would be too many voxels or too little memory, or as [`find`].
 pub fn largest_within(volume: &Volume, range: [f64; 2], corners: [DVec3; 2]) -> Result<(Body, f64), String> {
     let grid = lattice::usual_grid(volume.geometry())?;
     let grid = lattice::cropped(&grid, corners).ok_or("the region is empty")?;

@@ -52,7 +52,7 @@ pub fn write_segments(labels: &Labels, path: &Path, segments: &[Segment]) -> Res
 /// of a recording are.
 ///
 /// # Errors
-/// The file is no segmentation, is no volume of one layer of bytes, or cannot be read.
+/// The file is no segmentation, is no volume of one layer of bytes, takes too much memory, or cannot be read.
 pub fn read(path: &Path, options: OpenOptions) -> Result<(Labels, Vec<Segment>), InputError> {
     let segments = segmentation::segments(path)?;
     let fault = |why: String| InputError::new(path, "labels", why);

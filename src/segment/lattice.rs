@@ -21,7 +21,8 @@ pub fn usual_grid(geometry: &Geometry) -> Result<Grid, String> {
     }
 }
 
-/// The part of a grid whose voxels have their centres between two corners, mm in the coordinates of the grid; None if there are none.
+/// The part of a grid whose voxels have their centres between the lowest and the highest corner, inclusive; None if there are none. Corners are in mm
+/// in the coordinates of the grid.
 pub fn cropped(grid: &Grid, corners: [DVec3; 2]) -> Option<Grid> {
     let Region { low, size } = Region::within(grid, corners)?;
     let origin = place(grid, DVec3::from(low.map(|n| n as f64))).to_array();
@@ -57,7 +58,8 @@ pub(crate) struct Region {
 }
 
 impl Region {
-    /// The box of voxels whose centres lie between two corners, mm in the coordinates of the grid; None if there are none.
+    /// The box of voxels whose centres lie between the lowest and the highest corner, inclusive; None if there are none. Corners are in mm in the
+    /// coordinates of the grid.
     pub fn within(grid: &Grid, [low, high]: [DVec3; 2]) -> Option<Region> {
         let index = |at: DVec3| (at - DVec3::from(grid.origin)) / DVec3::from(grid.spacing);
         let (from, to) = (index(low), index(high));
@@ -72,8 +74,8 @@ impl Region {
         Some(region)
     }
 
-    /// The smallest box that contains the voxels with these linear indices and a margin of `margin` mm around them, cut at the border of the
-    /// lattice.
+    /// The smallest box that contains the voxels with these linear indices, of which there must be one at least, and a margin of `margin` mm around
+    /// them, cut at the border of the lattice.
     pub fn around(voxels: &[u32], grid: &Grid, margin: f64) -> Region {
         let (mut low, mut high) = (grid.size, [0; 3]);
         for n in voxels {

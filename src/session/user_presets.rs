@@ -111,7 +111,7 @@ pub fn read(file: &Path) -> Result<Vec<UserPreset>, String> {
 /// Replaces the presets in a file, which need not exist. If this fails, the file stays unchanged.
 ///
 /// # Errors
-/// One line: the existing file is damaged, there are more than [`MAX_PRESETS`] presets, or the file cannot be written.
+/// One line: [`read`] refuses the existing file, there are more than [`MAX_PRESETS`] presets, or the file cannot be written.
 pub fn write(file: &Path, presets: &[UserPreset]) -> Result<(), String> {
     read(file).map_err(|e| format!("{e}; the file is left as it is"))?;
     if presets.len() > MAX_PRESETS {

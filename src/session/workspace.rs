@@ -81,7 +81,7 @@ impl Workspace {
     /// Reads a workspace file. Paths in it are relative to its folder.
     ///
     /// # Errors
-    /// One line that names the file: it cannot be read, is no workspace, or has a setting that is not allowed.
+    /// One line that names the file: it cannot be read, is no workspace or one of another version, or has a setting that is not allowed.
     pub fn read(path: &Path) -> Result<Workspace, String> {
         let fault = |fault: &str| format!("{}: {}", path.display(), printable(fault));
         let text = files::read_text(path, MAX_BYTES, TABLE).map_err(|e| fault(&e))?;
@@ -91,7 +91,7 @@ impl Workspace {
     /// Reads a workspace from `text`, which may be a part of the file at `path`. Paths in it are relative to the folder of that file.
     ///
     /// # Errors
-    /// One line that names the file: the text is no workspace, or has a setting that is not allowed.
+    /// One line that names the file: the text is no workspace or one of another version, or has a setting that is not allowed.
     pub fn of_text(path: &Path, text: &str) -> Result<Workspace, String> {
         let fault = |fault: &str| format!("{}: {}", path.display(), printable(fault));
         let line = |e: &toml::de::Error| match e.span() {

@@ -45,7 +45,7 @@ pub enum Units {
     /// Microsteps/s and microsteps/s2.
     #[default]
     Pps,
-    /// Integers from 0 to 2047 that the pulse and the ramp divisor (axis parameters 154 and 153) scale.
+    /// Integers from 0 to 2047. The pulse divisor (axis parameter 154) scales velocities; it and the ramp divisor (153) scale accelerations.
     Tmc429,
 }
 
@@ -72,7 +72,7 @@ pub struct MotorTable {
     pub module: Option<u16>,
     #[serde(default)]
     pub home: Home,
-    /// Direction in which the motor first rotates to find the home switch.
+    /// Direction in which the home switch is searched for first, with `home = 'switch'`.
     #[serde(default)]
     pub home_direction: Side,
     /// True if the input of the home switch reads 0 while the switch is closed; false if it then reads 1.
@@ -207,7 +207,8 @@ impl MotorTable {
         if self.reversed { -1.0 } else { 1.0 }
     }
 
-    /// Speed of the array while home is searched, deg/s: `search_speed_deg_per_s`, or if that is None 10, or the largest speed if that is lower.
+    /// Speed of the array in a search for the home switch and on its way to the start of a sweep, deg/s: `search_speed_deg_per_s`, or if that is None
+    /// 10, or the largest speed if that is lower.
     pub fn search_speed(&self) -> f64 {
         self.search_speed_deg_per_s.unwrap_or(self.largest_speed_deg_per_s.min(10.0))
     }

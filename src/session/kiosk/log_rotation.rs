@@ -236,8 +236,8 @@ impl Drop for RotatingLog {
 
 /// A log whose file may not be available yet. Until it can be opened, lines go to another writer.
 ///
-/// Writing never fails. A write tries to open the file if the last try is at least `pause` ago. The first line of the file then states why it could
-/// not be opened before.
+/// Writing never fails. A write tries to open the file if the last try is at least `pause` ago. The first line that is then written to the file
+/// states why it could not be opened before.
 pub struct LateLog<O, W> {
     open: O,
     until: W,

@@ -54,7 +54,7 @@ const LEVELS: &[&str] = &["ERROR", "WARN", "INFO", "DEBUG", "TRACE"];
 /// Longest line that is searched, bytes. Longer ones are removed completely.
 const MAX_LINE: usize = 16 << 10;
 
-/// Replaces private names, such as those of recordings and of the user, in texts for others.
+/// Replaces private names, such as those of recordings and of the user, in texts that are passed on.
 #[derive(Default)]
 pub struct Redactor {
     numbers: HashMap<String, usize>,
@@ -79,8 +79,8 @@ impl Redactor {
     }
 
     /// Makes a recording's path private: paths inside of its folder are removed, and the names in the path are replaced wherever they occur in a
-    /// text. Names that identify nobody are kept: those of fewer than three bytes, numbers of fewer than five, system folders, and common words such as
-    /// `data`.
+    /// text as whole words. Some names are kept: those of fewer than three bytes, of fewer than five without a letter, of system folders, and common
+    /// words such as `data`.
     pub fn add_recording(&mut self, path: &Path) {
         if let Some(folder) = path.parent() {
             self.add_folder(folder);

@@ -29,7 +29,7 @@ pub struct Arrived {
     pub at: Instant,
 }
 
-/// A function that is called with every event of a feed, before it is queued.
+/// A function that is called with the events of a source, before they are queued.
 pub type Observer = Box<dyn FnMut(&Event) + Send>;
 
 /// What a feed lost so far.
@@ -185,8 +185,8 @@ impl Feed {
         Feed::observed(source, record, wake, None)
     }
 
-    /// Reads a source as [`Feed::waking`] does. `observer` is called with every event except [`Event::Idle`] before it is queued, on the thread of
-    /// the source. It also gets frames that are then lost because the queue is full.
+    /// Reads a source as [`Feed::waking`] does. `observer` is called with every event of the source except [`Event::Idle`] before it is queued, on
+    /// the thread of the source. It also gets frames that are then lost because the queue is full. It does not get faults of the recording.
     ///
     /// # Errors
     /// The thread cannot be started.

@@ -48,8 +48,7 @@ pub struct SourceStatus {
     pub not_opened: u64,
 }
 
-/// The metrics in Prometheus' text format. `totals`: statistics since the run began. The length of the text grows during the run only by the
-/// digits of its numbers.
+/// The metrics in Prometheus' text format. `totals`: statistics since the run began.
 pub fn text(totals: &Statistics, conditions: &Conditions) -> String {
     let Conditions { command, device, driver, vulkan, .. } = conditions;
     let truth = |is: bool| f64::from(u8::from(is));

@@ -20,8 +20,8 @@ pub struct StreamOptions {
     pub readback: bool,
     /// Limits of the cine loop; by default there is none.
     pub cine: CineLimits,
-    /// Called when the next step has work, because the source reported an event or a pipeline was compiled. If it is given, pipelines of changed
-    /// settings are compiled in the background.
+    /// Called when a pipeline was compiled, so that the next step may have work. If it is given, pipelines of changed settings are compiled in the
+    /// background.
     pub wake: Option<Wake>,
     /// Which operations are timed on the device. With [`TimeStamps::EachPass`] passes do not overlap, so that pictures take longer.
     pub time_stamps: TimeStamps,

@@ -91,8 +91,8 @@ impl Statistics {
         self.latency.value_at_quantile(share) as f64 / 1e3
     }
 
-    /// These statistics minus the earlier ones. Latencies and times of passes are not subtracted, because they are reset whenever statistics are
-    /// taken.
+    /// These statistics minus the earlier ones. Latencies, times of passes and the number of untimed ones are not subtracted, because they are reset
+    /// whenever statistics are taken.
     pub fn since(&self, before: &Statistics) -> Statistics {
         let counts = |now: VolumeCounts, then: VolumeCounts| VolumeCounts {
             shown: now.shown.saturating_sub(then.shown),

@@ -14,14 +14,14 @@ pub enum Update {
     Rolling,
 }
 
-/// Numbers of volumes. Each volume is counted once, when it has ended.
+/// Numbers of volumes. Each volume is counted once.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct VolumeCounts {
     /// Number of volumes that were shown; of rolling ones those that were complete.
     pub shown: u64,
-    /// Number of volumes that were not shown, because a newer one replaced them, no volume image was free, or newer ones had arrived already.
+    /// Number of volumes that were not shown, for example because a newer one or changed settings replaced them, or no volume image was free.
     pub dropped: u64,
-    /// Number of volumes that ended with frames missing.
+    /// Number of volumes that ended with frames missing, dropped ones not included.
     pub incomplete: u64,
     /// Number of frames (not volumes) that arrived for a volume that had ended or was dropped.
     pub left_out: u64,
@@ -125,8 +125,8 @@ impl VolumePool {
         self.over = None;
     }
 
-    /// Index of a volume image for a replayed volume: one that is neither on display nor being filled, or else that of a volume that waits to be
-    /// shown. None if there is none.
+    /// Index of a volume image for a replayed volume: one that is neither on display nor being filled nor waiting to be shown. If there is none, the
+    /// volume that waits to be shown is dropped for it; None if no volume waits. Of rolling volumes it is always image 0.
     pub fn spare(&mut self) -> Option<u32> {
         if self.is_rolling() {
             return Some(0);

@@ -44,7 +44,7 @@ pub enum Demo {
 /// `start`: the surface at which rendering starts (setting `unveil`), if one was found. `demo`: None if the volume may be of a patient.
 ///
 /// # Errors
-/// One line: the picture is not of this scene's size, or the drawing failed.
+/// One line: the drawing failed, or a bar is to be added and the picture is not of this scene's size.
 pub fn as_set<'a>(
     picture: &'a Picture,
     scene: &Scene,
@@ -99,8 +99,8 @@ pub fn marked(
     Ok(marked)
 }
 
-/// The picture with its measurements, annotations and body marks, the lines on its reference tile, and the line at which rendering starts. On a
-/// picture of another size than the scene's only `origin` is written.
+/// The picture with its measurements, annotations and body marks, the lines and positions of the slices of a tomography, the line of a curved plane,
+/// and the line at which rendering starts. On a picture of another size than the scene's only `origin` is written.
 ///
 /// `volume`: number of the volume that the picture shows; measurements of other volumes are dimmed. None: not known, none is dimmed. `start`: the
 /// surface at which rendering starts (setting `unveil`), if one was found. `origin`: what the picture shows, in small letters in the lower left

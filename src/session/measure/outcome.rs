@@ -22,7 +22,7 @@ impl Quantity {
         Quantity { name, value, unit }
     }
 
-    /// Value and unit for users: mm and degrees to a tenth, cm^2 and cm^3 to a hundredth.
+    /// Value and unit for users: mm and degrees to a tenth, cm^2 and cm^3 to a hundredth, an echo as a whole number.
     pub fn shown(&self) -> String {
         let value = self.value;
         match self.unit {
@@ -115,8 +115,8 @@ pub fn label(number: usize, measured: &Measurement) -> String {
     }
 }
 
-/// All results as CSV: a line for each quantity, with the conditions of the measurement if they are known. Numbers have a decimal point and four
-/// decimals. `recording`: name of the recording; empty for live volumes.
+/// All results as CSV: the names of the columns, then a line for each quantity, with the conditions of the measurement if they are known. Values and
+/// times have a decimal point and four decimals. `recording`: name of the recording; empty for live volumes.
 pub fn csv(all: &[Measurement], recording: &str) -> String {
     csv_with(all, recording, "", |_| String::new())
 }

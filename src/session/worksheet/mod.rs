@@ -54,7 +54,8 @@ pub struct Recording {
     pub files: usize,
     /// Total length of all files, bytes.
     pub bytes: u64,
-    /// SHA-256 of its file; of several the hash of their digests, one a line. Empty for the phantom.
+    /// SHA-256 of its file in hexadecimal; of several files the SHA-256 of their digests, one a line, in the order of their paths. Empty for the
+    /// phantom.
     pub sha256: String,
 }
 

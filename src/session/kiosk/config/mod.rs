@@ -264,11 +264,11 @@ impl Config {
         Config::parse(&text, path)
     }
 
-    /// Parses the text of a configuration, and checks everything that needs no source and no device. `path`: that of its file, for messages and for
-    /// the paths in it, which are relative to its folder.
+    /// Parses the text of a configuration, and checks it. The ranges of the keys of [`Config::source_arguments`] are not checked: they are those of
+    /// the flags. `path`: that of its file, for messages and for the paths in it, which are relative to its folder.
     ///
     /// # Errors
-    /// One line that names the file, the line, the key and the allowed values.
+    /// One line that names the file and, as far as they are known, the line, the key and the allowed values.
     pub fn parse(text: &str, path: &Path) -> Result<Config, ConfigError> {
         let locations = KeyLocations::of(text, path)?;
         let mut config: Config = tree::from_text(text).map_err(|e| locations.parse_error(&e))?;
@@ -286,7 +286,7 @@ impl Config {
         toml::to_string(self).map_err(|e| printable(&e.to_string()))
     }
 
-    /// The settings of the scene as layers, of which later ones take precedence: the preset of the phantom if that is the source, the presets,
+    /// The settings of the scene as layers, of which later ones take precedence: the presets of the phantom if that is the source, the presets,
     /// the settings in `scene`.
     ///
     /// # Errors

@@ -55,7 +55,7 @@ pub enum Step {
     Fault(String),
     /// Other work was done, or there was nothing to do.
     Progress,
-    /// The source has ended; the reason if that was not expected. The last picture shows everything that arrived.
+    /// The source has ended; the reason if that was not expected. No complete volume waits to be drawn.
     End(Option<String>),
 }
 
@@ -508,7 +508,7 @@ impl Stream {
     /// Continues on another device, or on the same one after it was lost. The volume on display is sent again from the cine loop.
     ///
     /// # Errors
-    /// The device cannot hold the slots that the geometry needs.
+    /// The device fails or lacks memory for the geometry, or the geometry cannot be drawn with the settings.
     pub fn revive(&mut self, context: &Arc<Context>) -> Result<(), StreamError> {
         self.context = context.clone();
         self.losses += 1;
@@ -613,7 +613,7 @@ impl Stream {
 
     /// Compiles the pipelines of these settings in the background, in this order, while no other pipeline is needed. Each entry has settings,
     /// and the settings at full quality that they replace, if any. A new call replaces the entries of an earlier one; settings that cannot be
-    /// drawn are left out. Nothing happens before the first header, and without [`StreamOptions::wake`].
+    /// drawn are left out. Nothing happens before the first geometry has begun, and without [`StreamOptions::wake`].
     pub fn warm(&mut self, next: Vec<(Settings, Option<Settings>)>) {
         let (Some(session), Some(header)) = (&mut self.session, &self.header) else { return };
         let (header, options) = (Arc::new(header.clone()), self.options.clone());

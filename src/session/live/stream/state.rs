@@ -124,7 +124,7 @@ impl Stream {
         self.session.as_ref().map(|session| &session.pool).or(self.previous_pool.as_ref())
     }
 
-    /// The properties that all frames have in common; None before the first header.
+    /// The properties that all frames have in common; None before the first geometry has begun or was refused.
     pub fn header(&self) -> Option<&Header> {
         self.header.as_ref()
     }
