@@ -277,7 +277,7 @@ impl Volume {
     /// 0 to 255 for a secondary capture. `each` is called after every slice.
     ///
     /// # Errors
-    /// The file cannot hold the volume ([`Target::check`]), or the disk is full. No file is left then.
+    /// The file cannot hold the volume ([`Target::check`]) or cannot be written. No incomplete file is left then.
     pub fn write(&self, target: &Target, path: &Path, each: impl Fn()) -> Result<(), InputError> {
         write_voxels(target, path, |voxel| self.value(target, voxel), each)
     }
@@ -294,7 +294,7 @@ impl Volume {
     /// `.seg.nrrd` or `.seg.dcm`, otherwise a volume.
     ///
     /// # Errors
-    /// The file cannot hold the mask, or the disk is full.
+    /// The file cannot hold the mask or cannot be written.
     pub fn write_mask(&self, target: &Target, path: &Path) -> Result<(), InputError> {
         if segmentation::is_one(path) || segmentation::is_dicom(path) {
             let segment = Segment { label: 1, name: "insonified".into(), colour: [0.4, 0.6, 0.8] };
@@ -311,7 +311,7 @@ impl Volume {
     /// DICOM if the file's name ends in `.seg.dcm`, otherwise NRRD. `each` is called once for each slice.
     ///
     /// # Errors
-    /// The format cannot hold the segmentation, or the disk is full.
+    /// The format cannot hold the segmentation, or the file cannot be written.
     pub fn write_tissue(
         &self,
         target: &Target,
@@ -328,7 +328,7 @@ impl Volume {
 /// Writes a segmentation on a grid along the axes of the world. `label` gives the label at a position, mm; 0 is in no segment.
 ///
 /// # Errors
-/// The format cannot hold the segmentation, or the disk is full.
+/// The format cannot hold the segmentation, or the file cannot be written.
 pub(super) fn write_labels(
     grid: &Grid,
     segments: &[Segment],
@@ -347,7 +347,7 @@ pub fn no_echo(source: &dyn Source) -> f64 {
 /// after every slice.
 ///
 /// # Errors
-/// The file cannot hold the volume ([`Target::check`]), or the disk is full.
+/// The file cannot hold the volume ([`Target::check`]) or cannot be written.
 pub(super) fn write_grid(
     grid: &Grid,
     sample: SampleType,

@@ -59,7 +59,8 @@ pub(super) struct Pattern {
     /// Least number of characters, and of digits.
     width: usize,
     digits: usize,
-    /// The whole numbers that follow the pattern in the header, in their order: a range of file numbers.
+    /// The whole numbers that follow the pattern in the header, in their order: first file number, last one and step, as far as stated. What more
+    /// follows depends on the format.
     pub numbers: Vec<i64>,
 }
 

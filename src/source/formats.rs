@@ -160,7 +160,8 @@ pub fn names() -> String {
     named.map(|format| format!("{}{}", dot(format), format.name)).collect::<Vec<_>>().join(", ")
 }
 
-/// True if files of a recording may have this ending, given in lower case without the dot. `gz` is one, as files may be packed.
+/// True if an ending, in lower case without the dot, is one of [`Format::endings`], or `gz`, as files may be packed. The endings of
+/// [`Format::data`] and of pictures do not count.
 pub fn is_ending(ending: &str) -> bool {
     ending == PACKED || FORMATS.iter().any(|format| format.endings.contains(&ending))
 }

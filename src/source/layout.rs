@@ -33,7 +33,7 @@ pub(super) struct Layout {
     pub states_geometry: bool,
     /// Transforms of tracked frames, by the name of the transform and the index of the frame.
     pub poses: Poses,
-    /// Time stamp of each frame, s, by its index in the file; no entry if it has none.
+    /// Time stamp of each frame, s, by its index in the order in which frames are read; no entry if it has none.
     pub times: BTreeMap<usize, f64>,
     /// True if the file says that its samples are of the phantom.
     pub synthetic: bool,
@@ -75,7 +75,7 @@ pub(super) struct Cartesian {
 }
 
 impl Layout {
-    /// Size of a frame in the file before compression, bytes.
+    /// Size of a frame as `pixels` gives it, decompressed and in the type of `pixel`, bytes.
     pub fn frame_bytes(&self) -> u64 {
         self.frame_size[0] as u64 * self.frame_size[1] as u64 * self.pixel.bytes() as u64
     }

@@ -93,7 +93,7 @@ pub struct OpenOptions<'a> {
 /// recording, if there is one.
 ///
 /// # Errors
-/// One line that names the file: it cannot be read, is of no known format, is damaged, or the probe file does not fit it.
+/// One line that names the file: that of [`open_with`].
 pub fn open(path: &Path, probe: Option<&Path>) -> Result<Box<dyn Source>, InputError> {
     open_with(path, OpenOptions { probe, ..OpenOptions::default() })
 }

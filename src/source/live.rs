@@ -45,8 +45,8 @@ pub trait Live: Send {
     /// The next event. It waits for about `patience` at most and then returns [`Event::Idle`].
     fn next(&mut self, patience: Duration) -> Event;
 
-    /// True if the source, such as a file or a pipe, loses nothing when `next` is not called for a while. False if complete volumes are then
-    /// lost.
+    /// True if the source waits for the caller, so that nothing is lost when `next` is not called for a while. A pipe does, and a file that is read
+    /// as fast as possible. False if frames come at a rate of their own, whether or not volumes are then lost.
     fn can_wait(&self) -> bool;
 
     /// True if the source is a recording that is read as fast as the caller takes frames. Frames that are read while the picture is frozen then

@@ -104,7 +104,7 @@ impl<'a> InputFile<'a> {
     /// Opens the unpacked bytes from the start of the file.
     ///
     /// # Errors
-    /// The file cannot be opened.
+    /// The file cannot be opened, or a packed one is cut short or corrupt before the start of its [`InputFile::window`].
     pub fn open(&self) -> io::Result<PixelStream> {
         self.pixels(0).open(0)
     }

@@ -38,7 +38,7 @@ impl About {
     /// Reads the header of a picture file.
     ///
     /// # Errors
-    /// One line: the file cannot be read, or is no picture of a format that is read.
+    /// One line: the file cannot be read, is no picture of a format that is read, or has samples of more than 16 bits.
     pub fn of(picture: &Path) -> Result<About, String> {
         let length = std::fs::metadata(picture).map_err(|e| format!("cannot be read: {e}"))?.len();
         let mut decoder = reader(picture)?.into_decoder().map_err(unreadable)?;

@@ -99,7 +99,7 @@ impl PixelFormat {
         PixelFormat { number, channels: 1, big_endian: false, scale: None }
     }
 
-    /// Size of a pixel in the file, bytes.
+    /// Size of a pixel before its conversion, bytes.
     pub fn bytes(&self) -> usize {
         self.number.bytes() * self.channels
     }

@@ -17,9 +17,10 @@ pub(super) struct PlusConfig {
     /// Name of the pictures' coordinate frame in `VolumeReconstructor`; `reference` is that of the volume. None if not stated.
     pub image: Option<String>,
     pub reference: Option<String>,
-    /// The part of each picture that the volume reconstructor uses: first column, first row, columns, rows. None: the whole picture.
+    /// The part of each picture that the volume reconstructor uses: first column, first row, columns, rows. None: the whole picture, also if the
+    /// stated rectangle is less than one pixel wide or high.
     pub clip: Option<[usize; 4]>,
-    /// Voxel spacing of the volume reconstructor, mm: the smallest of its three axes. None if not stated.
+    /// Voxel spacing of the volume reconstructor, mm: the smallest of its three axes. None if it is not stated or not above 0.
     pub spacing: Option<f64>,
 }
 
@@ -27,7 +28,8 @@ impl PlusConfig {
     /// Reads a configuration file.
     ///
     /// # Errors
-    /// The file cannot be read or is no XML, a transform has a wrong name or matrix, or `VolumeReconstructor` has a wrong clip rectangle or spacing.
+    /// The file cannot be read or is no XML, a transform has a wrong name or matrix, or a clip rectangle or spacing of `VolumeReconstructor` has a
+    /// wrong number of entries or one that is not a finite number.
     pub fn read(path: &Path) -> Result<PlusConfig, InputError> {
         let text = files::read_text(path, MAX_BYTES, "configuration").map_err(|e| InputError::new(path, "file", e))?;
         PlusConfig::parse(path, &text)

@@ -205,8 +205,8 @@ impl Opened {
     /// files stay unchanged, and so do pictures that all have the same pose, as a series in time. All pictures are read once for their poses.
     ///
     /// # Errors
-    /// The file cannot be read, it announces poses but no picture has a valid one, the volume is too large, or arguments for a freehand volume are
-    /// given where there is none.
+    /// The file cannot be read, it announces poses but no picture has a valid one, the volume is too large, an argument is out of its range, or
+    /// arguments for a freehand volume are given where there is none.
     pub fn new(path: &Path, mut frames: Box<dyn Source>, said: FreehandArguments) -> Result<Opened, InputError> {
         let header = frames.header();
         let grid = match &header.forward {

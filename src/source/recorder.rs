@@ -105,8 +105,8 @@ impl Writer {
     /// volumes are on the disk.
     ///
     /// # Errors
-    /// The size or the slice of the frame does not fit the header, its volume is before that of the last frame, or the disk is full. Earlier frames
-    /// are kept, and the next call may succeed.
+    /// The size or the slice of the frame does not fit the header, its volume is before that of the last frame, or the file cannot be written.
+    /// Earlier frames are kept, and the next call may succeed.
     pub fn frame(&mut self, frame: &Frame, arrived: f64) -> Result<(), InputError> {
         let fault = |field: &str, fault: String| Err(InputError::new(&self.path, field, fault));
         let expected = self.header.frame_bytes().unwrap_or(0);
@@ -163,7 +163,7 @@ impl Writer {
     /// Writes the index and flushes the file to the disk.
     ///
     /// # Errors
-    /// The disk is full. The file then has no index.
+    /// The file cannot be written. It may then have no index.
     pub fn finish(mut self) -> Result<(), InputError> {
         let offset = self.at;
         self.frame.clear();
@@ -299,7 +299,7 @@ impl Reader {
         self.index.len()
     }
 
-    /// Number of frames that were left out so far because of a wrong checksum or field.
+    /// Number of frames that were left out so far because of a wrong checksum or field. A frame that is left out again counts again.
     pub fn damaged(&self) -> u64 {
         self.damaged
     }

@@ -54,7 +54,7 @@ impl Recording {
     /// recording, if there is one.
     ///
     /// # Errors
-    /// A file that cannot be read, has an unknown format or is damaged, or a geometry that is missing or impossible.
+    /// That of [`Recording::open_with`].
     pub fn open(path: &Path, probe: Option<&Path>) -> Result<Recording, InputError> {
         Recording::open_with(path, OpenOptions { probe, ..OpenOptions::default() })
     }
@@ -64,8 +64,8 @@ impl Recording {
     /// known.
     ///
     /// # Errors
-    /// A file that cannot be read, has an unknown format or is damaged, or a geometry that is missing or impossible. A depth axis for a
-    /// recording that is not Cartesian.
+    /// The file cannot be read, has an unknown format or is damaged, its geometry is missing or impossible, or its volume is too large. Another error
+    /// is an option that does not fit the recording, such as a depth axis for one that is not Cartesian.
     pub fn open_with(path: &Path, options: OpenOptions) -> Result<Recording, InputError> {
         let mut layout = read_layout(path, &options)?;
         let probe_file = choose_probe_file(path, options.probe, &mut layout)?;

@@ -73,7 +73,7 @@ impl Item {
         }
     }
 
-    /// The value of an element as text, without the spaces and zeros around it; empty if it is absent.
+    /// The value of an element as text, without the white space and NUL characters around it; empty if it is absent.
     pub fn text(&self, tag: Tag) -> String {
         let text = String::from_utf8_lossy(self.bytes(tag).unwrap_or_default());
         text.trim_matches(|c: char| c.is_whitespace() || c == '\0').to_string()
@@ -133,8 +133,8 @@ pub(super) struct Fragment {
     pub length: u64,
     /// The first bytes of the fragment, zeros after its end.
     pub head: [u8; 8],
-    /// True if the fragment may end a frame: its last bytes are the end mark of JPEG or JPEG 2000, or the second byte of it, padding apart, or only
-    /// padding.
+    /// True if the fragment may end a frame. Its last bytes are then, padding apart, the end mark of JPEG or JPEG 2000, or they are padding alone, or
+    /// the whole fragment is the second byte of that mark.
     pub ends: bool,
 }
 
@@ -170,7 +170,8 @@ impl Elements {
     /// Reads the data elements of [`WANTED`] from a file, and finds where its pixels are without reading them.
     ///
     /// # Errors
-    /// The file cannot be read or is cut short, its elements contradict each other, it states no transfer syntax, or its data set is compressed.
+    /// The file cannot be read or is cut short, its elements contradict each other or exceed a limit, it states no transfer syntax, or its
+    /// data set is compressed.
     pub fn read(file: &InputFile) -> Result<Elements, InputError> {
         let input = file.open().map_err(|e| InputError::unreadable(file.path, &e))?;
         let mut walk = Walk {

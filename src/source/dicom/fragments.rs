@@ -7,7 +7,7 @@ use super::elements::Fragment;
 pub(super) struct Divided {
     /// For each frame, the index of its first fragment and the number of its fragments.
     pub frames: Vec<(usize, usize)>,
-    /// One line for each statement of the file that turned out to be wrong.
+    /// One line for each statement of the file about its frames that is wrong or missing, and for fragments that are doubtful.
     pub warnings: Vec<String>,
 }
 

@@ -43,7 +43,8 @@ pub(super) struct Place {
     /// Index of the frame's first part in the list of parts; `count` is their number.
     pub first: usize,
     pub count: usize,
-    /// True if the bytes are in words of 16 bits and the frame begins with the second byte of a word.
+    /// True if the frame begins at an odd number of bytes from the first frame, so that in words of 16 bits it begins with the second byte of a
+    /// word.
     pub odd: bool,
 }
 

@@ -43,7 +43,7 @@ impl Image {
     /// consist of.
     ///
     /// # Errors
-    /// The pixels are missing, cut short or of a kind that is not read.
+    /// The pixels are missing, cut short, too large or of a kind that is not read, or what the file states of them is invalid or incomplete.
     pub fn of(path: &Path, elements: &Elements, slices: u32) -> Result<Image, InputError> {
         let fault = |field: &str, fault: String| Err(InputError::new(path, field, fault));
         let root = &elements.root;

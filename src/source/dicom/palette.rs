@@ -53,7 +53,7 @@ impl Palette {
     /// Makes the palette of a picture. The second result has a warning for each statement of the file that is wrong.
     ///
     /// # Errors
-    /// One line: the palette is missing, cut short or contradicts itself.
+    /// One line: the palette is missing, cut short, contradicts itself or has a form that is not read.
     pub fn of(tables: &Tables, numbers: Indices) -> Result<(Palette, Vec<String>), String> {
         let Tables { about, plain, segmented } = tables;
         let [count, first, bits] = about[0][..] else { return Err("is missing, or has not three numbers".into()) };

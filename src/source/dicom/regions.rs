@@ -90,7 +90,7 @@ pub(super) struct Flat {
     /// Position (x, y) of the first pixel of the part, mm from the origin that the region states; 0 without a region with a scale.
     pub origin: [f64; 2],
     pub remarks: Vec<(String, String)>,
-    /// One line for each statement of the file that is wrong.
+    /// One line for each statement of the file that is wrong or missing.
     pub warnings: BTreeSet<String>,
 }
 

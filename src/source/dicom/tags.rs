@@ -95,7 +95,7 @@ const REALS: Kind = Kind::Numbers(8);
 pub(super) struct Wanted {
     pub tag: Tag,
     pub kind: Kind,
-    /// Name (the standard's keyword) and treatment of the element.
+    /// Name and treatment of the element. The name is the standard's keyword; that of a private element is a description.
     pub key: Key,
 }
 

@@ -21,7 +21,7 @@ impl Lattice {
     /// Map from the voxels to the tracker's space.
     ///
     /// # Errors
-    /// One line: the map is not rigid.
+    /// One line: the axes or the origin of the voxels in the tracker's space are such that [`World::new`] refuses them.
     pub fn world(&self) -> Result<World, String> {
         let back = self.to_volume.inverse();
         let (spacing, origin) = (self.grid.spacing, self.grid.origin.into());

@@ -154,7 +154,7 @@ impl Sweep {
         self.left_out
     }
 
-    /// The lattice of the volume. None before it was placed.
+    /// The lattice of the volume, which changes when the volume grows. None before the volume was placed.
     pub fn lattice(&self) -> Option<&Lattice> {
         Some(self.compounder.as_ref()?.lattice())
     }

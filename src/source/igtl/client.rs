@@ -43,7 +43,7 @@ pub struct ClientOptions {
     pub silence_timeout: Duration,
     /// Wait before the first attempt to reconnect. It doubles with every attempt that brings no message.
     pub first_wait: Duration,
-    /// Longest wait before an attempt to reconnect.
+    /// Longest wait before an attempt to reconnect, unless `first_wait` is longer.
     pub longest_wait: Duration,
     /// Largest body of a message, bytes. After the header of a larger one the connection is closed.
     pub body_limit: usize,
@@ -379,7 +379,7 @@ pub fn port(address: &str) -> Option<u16> {
 #[derive(Clone, Debug)]
 pub struct Received {
     pub message: Message,
-    /// When the last byte of the message was received.
+    /// When the message was put into the queue, which is after it was received and decoded.
     pub arrived: Instant,
 }
 

@@ -131,8 +131,8 @@ const UTF_8: u16 = 106;
 /// Encodes a message with its header and checksum.
 ///
 /// # Errors
-/// A field that the format cannot represent, or [`Message::Other`], whose body was not kept. Such fields are a name that is too long or has zero
-/// bytes, a STRING of more than 65535 bytes, a time before 1970 or after 2106, a number that is not finite, or sizes that disagree with the samples.
+/// A field that the format cannot represent, or [`Message::Other`], whose body was not kept. Such fields are, for example, a name that is too long
+/// or has zero bytes, a STRING of more than 65535 bytes, a time before 1970 or after 2106, and a number that is not finite.
 pub fn encode(message: &Message, version: Version) -> Result<Vec<u8>, MessageError> {
     let error = |fault| MessageError::new(message.kind(), message.device(), fault);
     let mut bytes = vec![0; HEADER];

@@ -39,7 +39,7 @@ pub struct ServerOptions {
     pub message_timeout: Duration,
     /// Longest time that dropping the server waits until its last messages are sent.
     pub last: Duration,
-    /// Name of the server: device name in answers to status queries, and text of its STRING message.
+    /// Name of the server: device name in its answers to queries, except for images, and text of its STRING message.
     pub name: String,
 }
 

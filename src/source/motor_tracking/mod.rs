@@ -283,7 +283,8 @@ pub struct FreeRunning {
 
 impl FreeRunning {
     /// The phantom for an array that a motor moves at `speed` deg/s: swept in both directions, and with the motor's travel during each frame. It has
-    /// fewer lines than `options` states, but at least 16, if the motor would travel more than three quarters of a slice pitch during a frame.
+    /// an even number of volumes and at least 16 lines. It has fewer lines than `options` states if the motor would otherwise travel more than three
+    /// quarters of a slice pitch during a frame.
     ///
     /// # Errors
     /// An option of the phantom is out of its range.

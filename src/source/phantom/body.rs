@@ -86,7 +86,7 @@ pub struct Wire {
 }
 
 impl Wire {
-    /// Distance of a position from the wire's axis, mm.
+    /// Distance of a position from the line segment between the two points, mm.
     pub fn distance(&self, place: DVec3) -> f64 {
         let along = self.to - self.from;
         let share = ((place - self.from).dot(along) / along.length_squared()).clamp(0.0, 1.0);

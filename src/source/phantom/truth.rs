@@ -46,7 +46,7 @@ impl Phantom {
     }
 
     /// Distance of a position, given as for [`Phantom::label`], from the skin of head, trunk, hand or cord (not of the uterus), or for vessels
-    /// from the blood; mm, negative inside. It is exact on the surface and correct to first order near it.
+    /// from the blood; mm, negative inside. It is exact on the surface, and for the head correct to first order near it.
     ///
     /// # Errors
     /// The body is neither head nor vessels; [`Phantom::truth`] has its formula.
