@@ -35,8 +35,8 @@ impl Sequence {
     /// Reads a source once to find its complete volumes, whose number goes into the header. `path`: that of the source, for messages.
     ///
     /// # Errors
-    /// The source is not a sweep or has no complete volume, there are more than 20000 frames or too many time stamps for a header of 1 MiB, or no
-    /// probe file can describe the probe.
+    /// The source cannot be read, is not a sweep, or has no complete volume. There are more than 20000 frames or too many time stamps for a header of
+    /// 1 MiB. No probe file can describe the probe.
     pub fn of(source: &mut dyn Source, path: &Path) -> Result<Sequence, InputError> {
         let fault = |field: &str, fault: String| InputError::new(path, field, fault);
         let (kept, left_out) = choose(source, path)?;
@@ -85,7 +85,7 @@ impl Sequence {
     /// ([`probe_file_path`]). `each` is called after every volume.
     ///
     /// # Errors
-    /// The source can no longer be read, the extension is not .mha, or the disk is full. No sequence is left then.
+    /// The source can no longer be read or has changed, the extension is not .mha, or a file cannot be written. No incomplete sequence is left then.
     pub fn write(&self, source: &mut dyn Source, path: &Path, each: impl Fn()) -> Result<(), InputError> {
         write_both(path, &self.header, &self.probe, |file| {
             for volume in &self.kept {

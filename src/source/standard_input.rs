@@ -27,7 +27,7 @@ pub(super) fn is_meant(path: &Path) -> bool {
     path.as_os_str() == "-"
 }
 
-/// Deletes the temporary file with the content of standard input. Sources that still read it fail afterwards.
+/// Deletes the temporary file with the content of standard input. Sources that still read it may fail afterwards.
 pub fn forget() {
     kept().take();
 }

@@ -38,7 +38,8 @@ impl TrackedVolume {
     /// Computes the poses of all pictures of a recording. No picture is read yet.
     ///
     /// # Errors
-    /// The recording has no poses, the configuration cannot be read, there is no chain of transforms, or no picture has a pose.
+    /// The recording has no tracked pictures, an option does not apply to these or is out of its range, or the configuration cannot be read. There is
+    /// no chain of transforms, no picture has a valid pose, or the volume is too large.
     pub fn new(path: &Path, pictures: Recording, options: &OpenOptions) -> Result<TrackedVolume, InputError> {
         let fault = |field: &str, fault: String| InputError::new(path, field, fault);
         let flag = match (options.plus_config, options.calibration) {

@@ -135,8 +135,8 @@ enum Link<'a> {
 }
 
 impl<'a> Chain<'a> {
-    /// The shortest chain of `poses` and constant transforms (`fixed`) from one coordinate frame to another. A pose takes precedence over a
-    /// constant transform of the same name. None if there is no chain.
+    /// The shortest chain of `poses` and constant transforms (`fixed`) from one coordinate frame to another. Any transform can be taken backwards. A
+    /// pose takes precedence over a constant transform of the same name. None if there is no chain.
     pub fn find(poses: &'a Poses, fixed: &'a [Calibration], from: &str, to: &str) -> Option<Chain<'a>> {
         let mut edges: Vec<(&TransformName, Link)> =
             poses.by_name.iter().map(|(name, matrices)| (name, Link::Pose(matrices))).collect();
@@ -168,7 +168,7 @@ impl<'a> Chain<'a> {
         Some(Chain { links })
     }
 
-    /// The map along the whole chain for the picture with this index; None if one of its poses is missing.
+    /// The map along the whole chain for the picture with this index; None if one of its poses is missing, or if the map is not finite.
     pub fn of(&self, picture: usize) -> Option<DMat4> {
         let mut all = DMat4::IDENTITY;
         for (link, backwards) in &self.links {

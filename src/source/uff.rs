@@ -118,8 +118,8 @@ impl Beamformed {
     /// Opens a file, and reads all of its samples once to find the largest, unless they are grey values of 8 bits.
     ///
     /// # Errors
-    /// The file cannot be read or holds no beamformed data. The data are RF, or of a scan of a kind that is not read. The file states more bytes than
-    /// it can hold, or its chunks are too large.
+    /// The file cannot be read, holds no beamformed data, or holds an array of them. The data are RF, hold nothing but 0, are not compounded, or are
+    /// of a scan that is not read. The file states more bytes than it can hold, or its chunks are too large.
     pub fn open(path: &Path) -> Result<Beamformed, InputError> {
         Beamformed::open_within(path, CACHE)
     }

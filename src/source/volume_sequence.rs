@@ -108,7 +108,8 @@ impl VolumeSequence {
     /// every volume.
     ///
     /// # Errors
-    /// The file cannot hold the volumes ([`VolumeSequence::check`]), the source can no longer be read, or the disk is full. No file is left then.
+    /// The file cannot hold the volumes ([`VolumeSequence::check`]), the source can no longer be read or has changed, or the file cannot be written.
+    /// No incomplete file is left then.
     pub fn write(
         &self,
         source: &mut dyn Source,

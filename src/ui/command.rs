@@ -71,10 +71,11 @@ pub enum Command {
     Opacity(Option<TransferName>),
     ColourMap(ColourMap),
     Shadow(bool),
-    /// Restores all settings of the start except the size of the picture. A frozen picture stays frozen. Measurements, body marks and labels are
-    /// kept, cuts are not.
+    /// Restores the settings of the start. The size of the picture, measurements, body marks, labels, the patient's sides, the probe's marker, the
+    /// bar of saved pictures, and the marks, speed and direction of the cine loop are kept. Cuts are not kept. A frozen
+    /// picture stays frozen.
     Reset,
-    /// Undoes the last change: of settings, planes, region or measurements.
+    /// Undoes the last change. While a measurement or a line is in progress, removes its last point instead.
     Undo,
     /// Undoes all changes. Redo can restore them one by one.
     UndoAll,
@@ -151,7 +152,7 @@ pub enum Command {
     CopyMeasures,
     /// Saves the results of measurements as a CSV file.
     SaveMeasures,
-    /// Saves settings, recording and measurements as a workspace file.
+    /// Saves settings, measurements and the path of the recording as a workspace file.
     SaveWorkspace,
     /// Shows or hides the list of files to open.
     OpenFiles,
@@ -175,7 +176,8 @@ pub enum Command {
     MoveCompared(usize, [[f64; 2]; 2], bool),
     /// Cuts or ties a link between the shown and the compared volumes.
     ToggleLink(Link),
-    /// Moves the compared volumes rigidly onto the shown one. If they are aligned or about to be, moves them back to where their recordings say.
+    /// Moves the visible compared volumes rigidly onto the shown one. If they are aligned or about to be, moves them back to where their recordings
+    /// say.
     Align,
     /// Stops reading the file that is being opened.
     CancelReading,
@@ -219,7 +221,7 @@ pub enum Command {
     /// Plays the cine loop back and forth, or forwards only.
     BackAndForth(bool),
     SavePicture,
-    /// Saves the volumes of the cine loop as a recording.
+    /// Saves the volumes of the cine loop as a recording; if marks are set, only those between them.
     SaveLoop,
     ToggleHelp,
     /// Closes the hints of the first start.

@@ -32,8 +32,8 @@ pub enum LabelCommand {
     Add,
     /// Gives the chosen label to the body within the contours of the measurement with this index.
     Fill(usize),
-    /// Moves the brush to this pixel of the picture: on the tile of planes with this index, or with None on the rendering. The flag is true if it
-    /// erases, whatever the effect is.
+    /// Moves the brush to this pixel of the picture: on the tile of planes with this index, or with None on the rendering. If the flag is true and
+    /// the effect is [`Effect::Paint`], the brush erases.
     Stroke([f64; 2], Option<usize>, bool),
     /// Ends a stroke. If the effect grows, labels the body at the last place of the brush.
     EndStroke,

@@ -11,7 +11,7 @@ use crate::volume_export::FORMATS;
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Entry {
     pub name: String,
-    /// What the command does, or where the control is.
+    /// What the command does, or where the control is; empty if the name says all.
     pub about: String,
     /// Name of the key that has the same effect; empty if there is none.
     pub key: String,

@@ -40,7 +40,7 @@ pub type MakeConsole<'a> = dyn FnMut(&Arc<Context>, [u32; 2], f32, Wake) -> Cons
 /// context.
 ///
 /// # Errors
-/// There is no window system, no device can present on it, or the device is lost repeatedly.
+/// There is no window system, no device can present on it, or the device or the window is lost repeatedly.
 pub fn run(
     device: &ContextOptions,
     options: WindowOptions,

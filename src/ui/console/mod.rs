@@ -263,7 +263,8 @@ impl Console {
         self.presentation.screen.take()
     }
 
-    /// Continues on another device, or on the same one opened again. The cine loop is kept; the live picture continues with the next volume.
+    /// Continues on another device, or on the same one opened again. The cine loop is kept; the live picture continues with the next volume. A
+    /// comparison ends.
     ///
     /// # Errors
     /// The device cannot hold the slots of what is shown.

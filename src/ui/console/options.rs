@@ -24,7 +24,7 @@ pub struct ConsoleOptions {
     pub statistics_interval: Duration,
     /// The frame budget: longest time that a picture may take while the view moves; `None`: no limit.
     pub budget: Option<Duration>,
-    /// The rungs of the quality ladder, from full quality down.
+    /// The rungs of the quality ladder. The first is full quality.
     pub rungs: Vec<Rung>,
     /// Time after which a source that ended or could not be opened is opened again; `None`: it is not.
     pub retry: Option<Duration>,
@@ -34,7 +34,7 @@ pub struct ConsoleOptions {
     pub record: Option<PathBuf>,
     /// Path of a file with metrics for Prometheus, which is rewritten at intervals; `None`: there is none.
     pub prometheus: Option<PathBuf>,
-    /// Folder for saved pictures and cine loops.
+    /// Folder for files that the user saves or exports.
     pub folder: PathBuf,
     /// True if panels, messages and marks are drawn over the picture.
     pub overlay: bool,
@@ -42,7 +42,7 @@ pub struct ConsoleOptions {
     pub panels: bool,
     /// Pixels of the window per point, the unit of text and buttons.
     pub scale: f32,
-    /// The key combination that ends a kiosk; `None`: none does.
+    /// The key combination that ends the console at once, also in a kiosk; `None`: there is none.
     pub exit: Option<Chord>,
     pub is_kiosk: bool,
     /// What a workspace stores about the source; `None`: no workspace can be saved.
@@ -50,11 +50,12 @@ pub struct ConsoleOptions {
     /// True if volume numbers of the stream are those of the recording.
     pub plays_once: bool,
     pub opening: OpeningOptions,
-    /// Path of the file that marks that the hints of the first start were shown; `None`: the hints are never shown.
+    /// Path of an empty file that is created once the hints of the first start are shown; `None`: they are not shown. The console does not check
+    /// whether the file exists.
     pub first_steps: Option<PathBuf>,
     /// Path of the file with the user's presets; `None`: the user can save no presets.
     pub presets: Option<PathBuf>,
-    /// Called when [`Console::update`](super::Console::update) has something to do.
+    /// Called on any thread when [`Console::update`](super::Console::update) has something to do.
     pub wake: Wake,
     /// A fault that prevents the view, so that only its message is shown.
     pub startup_fault: Option<StartupFault>,

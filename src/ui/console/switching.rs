@@ -44,7 +44,7 @@ impl Console {
     }
 
     /// Reads a recording or a workspace in the background, and then shows it. If it is the one that is shown, it is read again. Refused with a
-    /// message if the present cine loop is not saved.
+    /// message if no other files can be opened, if too many are open, or if unsaved volumes or measurements would be lost.
     pub fn open_path(&mut self, path: &Path) {
         self.read(path, false);
     }

@@ -98,7 +98,7 @@ impl<'a> Workers<'a> {
     }
 
     /// Runs the check with index `place` in [`Ready::checks`] in a worker. `name`: its name, for an outcome if the worker fails. A check whose
-    /// process crashes has failed, and is run again in new workers to find out whether it is flaky.
+    /// process crashes is run up to three times more in new workers, and passes, marked as flaky, once it passes.
     pub fn run(&mut self, place: usize, name: &CheckName) -> Outcome {
         let (first, has_crashed) = self.attempt(Request { place, waits: false }, name);
         // What failed without a crash the worker has run again itself.

@@ -155,7 +155,7 @@ pub fn refuse(failure: Failure) -> Result<(), String> {
 }
 
 /// Sends `ready`. Then reads from each line of standard input the index of a check in `checks`, runs it, and sends its outcome on standard output,
-/// until standard input ends.
+/// until standard input ends. If the process still runs two seconds after that, it exits with code 0.
 ///
 /// # Errors
 /// One line: standard output is closed, or there is no such check.

@@ -64,7 +64,7 @@ pub struct BaselineComparison {
     /// What could not be compared, with the reasons, and other remarks.
     pub notes: Vec<String>,
     /// The changes, the worst class first. Within a class those of verdicts and of which figures there are come first, then those of errors, then
-    /// those of times, each in the order of the new run.
+    /// those of times.
     pub changes: Vec<Change>,
     /// Number of checks that did not change.
     pub same: usize,
