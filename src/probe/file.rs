@@ -29,8 +29,8 @@ impl ProbeFile {
     /// Reads a probe file and checks everything that can be checked without the recording.
     ///
     /// # Errors
-    /// A file that cannot be read, is larger than 1 MiB or is not TOML, unknown keys, and numbers out of their range: one line that
-    /// names the file and the field.
+    /// The file cannot be read, is larger than 1 MiB or is not TOML. A key is unknown, missing or inapplicable, or excludes another. A value has
+    /// another type or is out of its range. The error is one line that names the file, and the field or the line of the text.
     pub fn read(path: &Path) -> Result<ProbeFile, InputError> {
         let text = files::read_text(path, MAX_BYTES, "probe file").map_err(|e| InputError::new(path, "file", e))?;
         ProbeFile::parse(path, &text)
@@ -49,7 +49,8 @@ impl ProbeFile {
     /// in messages; nothing is read from there.
     ///
     /// # Errors
-    /// Unknown keys, values of another type, and numbers out of their range: one line that names `path` and the field.
+    /// A key is unknown, missing or inapplicable, or excludes another. A value has another type or is out of its range. The error is one line that
+    /// names `path`.
     pub fn from_json(path: &Path, tables: serde_json::Value) -> Result<ProbeFile, InputError> {
         let tables = serde_json::from_value(tables).map_err(|e| InputError::new(path, "probe", e.to_string()))?;
         ProbeFile { path: path.into(), tables, interval: None }.checked()
@@ -174,7 +175,8 @@ impl ProbeFile {
     ///
     /// # Errors
     /// The probe file lacks a key or has two that exclude each other, has a table for another number of lines or frames, or has numbers that make no
-    /// valid [`Probe`]; or there are fewer frames than one volume.
+    /// valid [`Probe`]. The motor travels beyond the next frame while one is acquired, or `motion.steady` is set and the recording has no time
+    /// stamps. There are fewer frames than one volume.
     pub fn geometry(&self, samples: usize, lines: usize, frames: usize) -> Result<(Probe, Volumes), InputError> {
         let mut volumes = self.volumes(frames)?;
         let (motion, slices) = self.motion(volumes.frames)?;

@@ -10,13 +10,13 @@ use std::path::Path;
 const POSITION_TOLERANCE: f64 = 1e-9;
 
 impl ProbeFile {
-    /// The text of a probe file from which [`ProbeFile::read`] and [`ProbeFile::geometry`] make this probe and these volumes again. `probe` has the
-    /// motor's motion in the first volume ([`Volumes::swept`]). `speed_ratio` and `firing` of `volumes` are ignored, since they follow from `probe`.
-    /// `range`: the sample values that are displayed as 0 and 1.
+    /// The text of a probe file from which [`ProbeFile::read`], [`ProbeFile::geometry`] and [`Volumes::swept`] make this probe and these volumes
+    /// again. `probe` has the motor's motion in the first volume. `speed_ratio` and `firing` of `volumes` are ignored, since they follow from
+    /// `probe`. `range`: the sample values that are displayed as 0 and 1.
     ///
     /// # Errors
-    /// One line: no file can describe the probe, because its advance is not that of a motor at constant speed, or its tables are longer than a file
-    /// may be.
+    /// One line: no probe file makes this probe. For example, its advance is not that of a motor at constant speed, or its tables are longer than a
+    /// file may be.
     pub fn to_toml(probe: &Probe, volumes: &Volumes, range: [f64; 2]) -> Result<String, String> {
         for firing in [Firing::Forward, Firing::Backward, Firing::Alternating] {
             let volumes = Volumes { firing, ..volumes.clone() };

@@ -38,7 +38,7 @@ pub enum Advance {
     None,
     /// The same change for every slice: the motor moves in one direction, lines fire in one order, and the slices are uniformly spaced.
     Same(f64),
-    /// One change for each slice: lines fire in both orders, or the slices are not uniformly spaced.
+    /// One change for each slice: the motor moves in both directions, lines fire in both orders, or the slices are not uniformly spaced.
     Each(Vec<f64>),
 }
 
@@ -305,7 +305,7 @@ impl Probe {
         (self.slices.at(0.0) - low, self.slices.at(last) + high)
     }
 
-    /// Corners (low, high) of a box in space that contains the insonified region, mm.
+    /// Corners (low, high) of a box in space that contains every sample that is drawn, mm.
     pub fn bounds(&self) -> (DVec3, DVec3) {
         let (low, high) = self.plane_bounds();
         let (first, last) = self.slice_bounds();
@@ -327,7 +327,7 @@ impl Probe {
         }
     }
 
-    /// Time that sound needs for one volume, s: 2 d / c for each line (thesis 4.5). No system can acquire faster.
+    /// Time that sound needs for one volume, s: 2 d / c for each line (thesis 4.5).
     pub fn acquisition_time(&self) -> f64 {
         let depth = (self.start_depth + self.sample_pitch * (self.samples - 1) as f64) * 1e-3;
         (self.slices.len() * self.lines.len()) as f64 * 2.0 * depth / self.sound_speed

@@ -94,7 +94,8 @@ impl Geometry {
             && (0..a.slices.len()).all(|k| is_near(k as f64))
     }
 
-    /// True if the two geometries differ at most in the direction of the motor's travel during each frame.
+    /// True if the two geometries differ at most in the direction of the motor's travel during each frame. Line 0 of each slice is at the same place
+    /// in both.
     pub fn equals_except_direction(&self, other: &Geometry) -> bool {
         let travels = |geometry: &Geometry| match geometry {
             Geometry::Sweep(p) => (0..p.slices.len()).map(|k| p.advance_at(k as f64).abs()).collect(),
@@ -104,8 +105,8 @@ impl Geometry {
     }
 
     /// The geometry of a volume with slices of both directions of the motor: slice k is as in `backward` if `marked[k]` is true, otherwise as in
-    /// `self`. None for Cartesian geometries, if the last lines of neighbouring slices would cross, or if the two geometries differ in more than the
-    /// motor's travel.
+    /// `self`, also if `marked` has no entry for it. None for Cartesian geometries, if the last lines of neighbouring slices would cross, or if
+    /// [`Geometry::equals_except_travel`] is false.
     pub fn with_mixed_directions(&self, backward: &Geometry, marked: &[bool]) -> Option<Geometry> {
         let (Geometry::Sweep(forward), Geometry::Sweep(back)) = (self, backward) else { return None };
         let of = |k: usize| if marked.get(k) == Some(&true) { back } else { forward };

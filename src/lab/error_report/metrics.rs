@@ -69,11 +69,11 @@ pub struct SurfaceError {
     pub jumps: f64,
 }
 
-/// Compares two toned pictures with values in 0..1 by their first three channels. `left_out`: for each pixel, row by row, true if it does not count;
-/// if no pixel counts, all differences are 0.
+/// Compares two toned pictures with values in 0..1 by their first three channels. `left_out`: for each pixel, row by row, true if it does not count.
+/// Pixels without an entry count. If no pixel counts, all differences are 0.
 ///
 /// # Errors
-/// One line: sizes or channels differ, there is no pixel, or a value is not finite.
+/// One line: sizes or channels differ, there is no pixel or more than one layer, or a value is not finite.
 pub fn levels(measured: &Texels, reference: &Texels, left_out: &[bool]) -> Result<Levels, String> {
     check("picture", measured, reference)?;
     let channels = measured.channels;
@@ -117,7 +117,7 @@ pub fn changed_rays(measured: &Texels, reference: &Texels, cliff: f64, size: [us
 /// Compares pictures of 3 or 4 channels in 0..1.
 ///
 /// # Errors
-/// One line: the channels are not 3 or 4, sizes or channels differ, there is no pixel, or a value is not finite.
+/// One line: the channels are not 3 or 4, sizes or channels differ, there is no pixel or more than one layer, or a value is not finite.
 pub fn pictures(measured: &Texels, reference: &Texels) -> Result<PictureError, String> {
     if !matches!(measured.channels, 3 | 4) {
         return Err(format!("a picture has 3 or 4 channels, not {}", measured.channels));
@@ -138,7 +138,7 @@ pub fn pictures(measured: &Texels, reference: &Texels) -> Result<PictureError, S
 /// Compares two distance maps, mm. Distances that differ by more than `cliff` mm count as jumps to another surface, not as errors.
 ///
 /// # Errors
-/// One line: sizes or channels differ, there is no pixel, or a value is not finite.
+/// One line: sizes or channels differ, there is no pixel or more than one layer, or a value is not finite.
 pub fn surfaces(measured: &Texels, reference: &Texels, cliff: f64) -> Result<SurfaceError, String> {
     check("distance map", measured, reference)?;
     let first = |t: &Texels| t.values.iter().step_by(t.channels).map(|v| is_hit(*v).then_some(*v)).collect::<Vec<_>>();
@@ -150,7 +150,7 @@ pub fn surfaces(measured: &Texels, reference: &Texels, cliff: f64) -> Result<Sur
 /// zero vector is a miss.
 ///
 /// # Errors
-/// One line: there are fewer than 3 channels, sizes or channels differ, there is no pixel, or a value is not finite.
+/// One line: there are fewer than 3 channels, sizes or channels differ, there is no pixel or more than one layer, or a value is not finite.
 pub fn normals(measured: &Texels, reference: &Texels) -> Result<SurfaceError, String> {
     if measured.channels < 3 {
         return Err(format!("a map of normals has 3 channels or more, not {}", measured.channels));

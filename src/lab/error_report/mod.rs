@@ -62,7 +62,8 @@ pub struct Combination {
     pub times: Option<Times>,
 }
 
-/// An estimate of the error of a reference.
+/// An estimate of the error of a reference. Of [`Reference::Exact`], `rmse` is its `estimate`, also where that is in mm, and `levels` is 255 times
+/// `rmse`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct OwnError {
@@ -191,9 +192,9 @@ pub struct Point {
     pub is_default: bool,
 }
 
-/// Errors of a picture against a reference, and of the surface if it shows one. Pixels that hit a surface in only one of the two, or surfaces further
-/// apart than [`Scene::cliff`](crate::scene::Scene::cliff), are left out of the errors of the picture, and so are their neighbours. `mm` has the
-/// shares of such pixels, without the neighbours.
+/// Errors of a picture against a reference, and of the surface if it shows one. With layout `single`, pixels that hit a surface in only one of the
+/// two, or surfaces further apart than [`Scene::cliff`](crate::scene::Scene::cliff), are left out of the errors of the picture, and so are their
+/// neighbours. `mm` has the shares of such pixels, without the neighbours.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Errors {
@@ -203,7 +204,7 @@ pub struct Errors {
     pub max: f64,
     /// Peak signal-to-noise ratio, dB; None (infinite) for equal pictures.
     pub psnr: Option<f64>,
-    /// Structural similarity (SSIM), at most 1. None for a picture smaller than 11 x 11 pixels.
+    /// Structural similarity (SSIM), at most 1. Pixels that are left out count as equal. None for a picture smaller than 11 x 11 pixels.
     pub ssim: Option<f64>,
     /// Differences of the pictures as displayed.
     pub levels: Levels,
@@ -331,7 +332,7 @@ impl Report {
     /// The report as JSON.
     ///
     /// # Errors
-    /// One line: a number is not finite, or an error or time is negative. It names the dial and point, the combination or the share of the budget.
+    /// One line: an error, a time or the value of a point is not finite, or an error or time is negative.
     pub fn to_json(&self) -> Result<String, String> {
         self.check()?;
         serde_json::to_string_pretty(self).map_err(|e| format!("error report: {e}"))
@@ -340,7 +341,7 @@ impl Report {
     /// Reads a report.
     ///
     /// # Errors
-    /// One line: the text is not JSON, has another format or version, or has numbers that no measurement gives.
+    /// One line: the text is not JSON, has another format or version, lacks a field or has an unknown one, or has numbers that no measurement gives.
     pub fn from_json(text: &str) -> Result<Report, String> {
         Report::read(text).map_err(|e| crate::text::single_line(&e))
     }

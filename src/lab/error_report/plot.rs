@@ -51,7 +51,7 @@ impl Figure {
 /// The diagram as SVG: the error by `measure` over the time. `size`: width and height, pixels.
 ///
 /// # Errors
-/// One line: no point has both a time and this error, or the size is not within 640x400..4096x4096.
+/// One line: no point has both a time and this error, the size is not within 640x400..=4096x4096, or the drawing failed.
 pub fn svg(report: &Report, figure: Figure, measure: Measure, size: [u32; 2]) -> Result<String, String> {
     check(size)?;
     canvas::svg(size, &Diagram { report, figure, measure })
@@ -60,7 +60,7 @@ pub fn svg(report: &Report, figure: Figure, measure: Measure, size: [u32; 2]) ->
 /// The diagram as a picture: the error by `measure` over the time. `size`: width and height, pixels.
 ///
 /// # Errors
-/// One line: no point has both a time and this error, or the size is not within 640x400..4096x4096.
+/// One line: no point has both a time and this error, the size is not within 640x400..=4096x4096, or the drawing failed.
 pub fn picture(report: &Report, figure: Figure, measure: Measure, size: [u32; 2]) -> Result<Picture, String> {
     check(size)?;
     canvas::picture(size, &Diagram { report, figure, measure })

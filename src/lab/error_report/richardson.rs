@@ -34,7 +34,8 @@ pub struct Extrapolated {
 /// lattices, not the requested ones.
 ///
 /// # Errors
-/// One line: the pictures differ in size, the cells do not descend, a value is not finite, or the differences do not shrink as a power of the cell.
+/// One line: the pictures differ in size or channels, the cells do not descend or are not above 0, a value is not finite, or the observed order is
+/// not within 0.25..=8.
 pub fn extrapolated(pictures: [&Texels; 3], cells: [f64; 3]) -> Result<Extrapolated, String> {
     let [coarse, middle, fine] = pictures;
     let is_alike = |other: &Texels| (other.size, other.channels) == (fine.size, fine.channels);

@@ -25,7 +25,7 @@ const PHANTOM: Areas = Areas {
 pub struct MeasureOptions<'a> {
     /// Only filters whose names contain this text are measured, and always "no filter". Empty for all filters.
     pub only: &'a str,
-    /// Pixels along the longer edge of a slice.
+    /// Pixels along the longer edge of a slice, 2..=4096. A Cartesian volume keeps its voxels.
     pub pixels: u32,
     /// Number of time measurements for each candidate.
     pub repeats: usize,
@@ -45,7 +45,7 @@ pub enum MeasureError {
 /// `after_each` is called after each candidate.
 ///
 /// # Errors
-/// `options.pixels` is too small for the measured areas, or the device fails.
+/// `options.pixels` is out of its range or too small for the measured areas, or the device fails.
 pub fn phantom(
     context: &Arc<Context>,
     options: MeasureOptions<'_>,
@@ -69,8 +69,8 @@ pub fn phantom(
 /// `after_each` is called after each candidate.
 ///
 /// # Errors
-/// An area is less than 4 pixels wide or high, `crop` reaches beyond the sector, another area beyond `crop`; the recording cannot be read; the device
-/// fails.
+/// `options.pixels` is out of its range. An area is no valid region or is less than 4 pixels wide or high, `crop` reaches beyond the sector, or
+/// another area beyond `crop`. The recording cannot be read or lacks the frame, or the device fails.
 pub fn recording(
     context: &Arc<Context>,
     source: &mut dyn Source,

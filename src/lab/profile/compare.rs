@@ -126,7 +126,7 @@ pub struct Line {
     pub limit: Option<f64>,
     /// True if a slowdown by more than the threshold may have been overlooked. Always false for [`Kind::Host`].
     pub is_unseen: bool,
-    /// True for a pass whose share of the time is below [`CompareOptions::minor`], so that `is_unseen` does not fail the comparison.
+    /// True for a compared pass whose share of the time is below [`CompareOptions::minor`], so that `is_unseen` does not fail the comparison.
     pub is_minor: bool,
 }
 
@@ -146,7 +146,7 @@ pub struct Comparison {
 }
 
 impl Comparison {
-    /// Lines that are slower by more than the threshold.
+    /// The lines with `is_regression`.
     pub fn regressions(&self) -> impl Iterator<Item = &Line> {
         self.lines.iter().filter(|l| l.is_regression)
     }

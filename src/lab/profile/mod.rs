@@ -49,8 +49,8 @@ pub struct Profile {
     pub host: Vec<PassProfile>,
     /// Wall time of the repeat by the host's clock, from before its first frame is uploaded until the picture is in host memory.
     pub wall_ns: Vec<f64>,
-    /// CPU time of the process over the same intervals, all threads, user and system. On a software device it is the cost of the work, independent of
-    /// other load. Empty if the system does not report it.
+    /// CPU time of the process over the same intervals, all threads, user and system. On a software device it is the cost of the work. Empty if the
+    /// system does not report it.
     #[serde(default)]
     pub cpu_ns: Vec<f64>,
     /// Time from the begin of the first pass to the end of the last one, by the device's clock. Empty without time stamps.
@@ -99,7 +99,7 @@ pub struct PassProfile {
     /// Number of runs in the first measured repeat: one for each dispatch or copy, or for each frame of a batch; for a host span, how often it
     /// occurs there.
     pub runs_per_picture: u32,
-    /// Time of all runs together, ns, for each repeat. Empty without time stamps.
+    /// Time of all runs together, ns, for each repeat. Empty for a pass without time stamps.
     pub samples_ns: Vec<f64>,
     /// CPU time of all threads in each repeat, ns, if the device is the CPU; otherwise empty.
     #[serde(default)]

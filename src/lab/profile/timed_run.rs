@@ -85,7 +85,7 @@ impl ProfileRun {
     /// Runs the scene once, and records its times unless it is part of the warm-up. `frames`: those of one volume, the same in every call.
     ///
     /// # Errors
-    /// The device fails.
+    /// The device fails or cannot hold the scene, a frame has the wrong size, or the scene with the rotated view is refused.
     pub fn repeat(&mut self, frames: &[Frame]) -> Result<(), GpuError> {
         let cpu = CpuTime::now();
         let start = self.began.elapsed();

@@ -153,7 +153,7 @@ pub fn measure(context: &Arc<Context>, grey: &Grey, rows: Vec<GrowthSettings>) -
 /// Measures Tables 7-9 on a picture, with both estimators, as `echolume filter --growth-table` does. `picture`: its name.
 ///
 /// # Errors
-/// A window is out of range, or the device cannot hold the picture.
+/// The scene of the picture is refused, or the device cannot hold the picture or fails.
 pub fn growth(context: &Arc<Context>, picture: &str, grey: &Grey) -> Result<Grown, GrowthError> {
     let mut rows = Vec::new();
     for (centre, sigma) in CENTRES.into_iter().flat_map(|centre| SIGMAS.map(|sigma| (centre, sigma))) {

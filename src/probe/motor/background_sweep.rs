@@ -13,8 +13,8 @@ const MIN_POSITIONS: usize = 4096;
 /// Between two positions that are further apart the position is not known, s. At 9600 baud a position takes 20 ms, three requests 60.
 const MAX_GAP: f64 = 0.1;
 
-/// A motor that a separate thread sweeps until the motor fails or this value is dropped. Dropping it stops the motor. That takes the time of one
-/// request and its reply, or of all attempts to stop if the module no longer replies.
+/// A motor that a separate thread sweeps until the motor fails, a signal comes, or the sweep is stopped. Dropping this value stops it as
+/// [`BackgroundSweep::stop`] does.
 pub struct BackgroundSweep {
     port: String,
     positions: PositionLog,
@@ -85,10 +85,11 @@ impl BackgroundSweep {
         self.thread.as_ref().is_none_or(JoinHandle::is_finished)
     }
 
-    /// Stops the motor and waits until it has stopped.
+    /// Stops the motor, and waits until the module has confirmed the command or all attempts have failed. The motor may still be slowing down.
     ///
     /// # Errors
-    /// The fault that ended the sweep before, or the motor could not be stopped. A sweep that a signal ended is no error if the motor was stopped.
+    /// The fault that ended the sweep before, the thread panicked, or the module did not confirm the stop. A sweep that a signal ended is no error if
+    /// the module confirmed the stop.
     pub fn stop(&mut self) -> Result<(), MotorError> {
         self.interrupter.interrupt();
         if self.thread.take().is_some_and(|thread| thread.join().is_err()) {

@@ -43,7 +43,7 @@ impl Drive {
     /// Opens the port and checks that its module is the one of the `[motor]` table. Moves nothing.
     ///
     /// # Errors
-    /// Any [`Fault`] of the port, and [`Fault::WrongModule`]; a motor that is already moving is then stopped if possible.
+    /// Any [`Fault`] of the port, [`Fault::WrongModule`], and [`Fault::Interrupted`]; a motor that is already moving is then stopped if possible.
     pub fn open(settings: &PortSettings, table: &MotorTable) -> Result<Drive, MotorError> {
         let mut drive = Drive::connect("open", settings, table)?;
         let module = drive.identify();
@@ -66,7 +66,7 @@ impl Drive {
     /// Reads position, speed, switches and watchdog. Moves nothing.
     ///
     /// # Errors
-    /// Any [`Fault`] of the port; a motor that is moving is then stopped if possible.
+    /// Any [`Fault`] of the port, and [`Fault::Interrupted`]; a motor that is moving is then stopped if possible.
     pub fn status(&mut self) -> Result<MotorStatus, MotorError> {
         let status = self.read_status();
         self.done("status", status)
@@ -83,8 +83,8 @@ impl Drive {
         self.done("home", found)
     }
 
-    /// Moves to the start of the sweep and then back and forth over it. [`Drive::home`] has to be called before. Each position that is read during
-    /// the passes is passed to `on_position`, with its time in s since `start`, in order of time. Returns the number of passes.
+    /// Moves to the start of the sweep and then back and forth over it. [`Drive::home`] has to be called before. Each position that the first request
+    /// for it returns during the passes is passed to `on_position`, with its time in s since `start`, in order of time. Returns the number of passes.
     ///
     /// # Errors
     /// Any [`Fault`], after which the motor is stopped if possible. With [`Fault::OutOfRange`] nothing moved.
@@ -106,7 +106,8 @@ impl Drive {
     /// Opens the port and stops the motor before anything else is requested, whichever module is there.
     ///
     /// # Errors
-    /// The port cannot be opened ([`Fault::NotOpened`]), the module does not confirm the stop, or the motor keeps moving.
+    /// The port cannot be opened ([`Fault::NotOpened`]), the module does not confirm the stop, the motor keeps moving for 5 s, its speed cannot be
+    /// read, or a signal has come ([`Fault::Interrupted`]).
     pub fn stop_at(settings: &PortSettings, table: &MotorTable) -> Result<(), MotorError> {
         Drive::connect("stop", settings, table)?.stop()
     }
@@ -114,7 +115,8 @@ impl Drive {
     /// Stops the motor and waits until it is at rest.
     ///
     /// # Errors
-    /// The module does not confirm the stop, or the motor keeps moving.
+    /// The module does not confirm the stop, the motor keeps moving for 5 s, its speed cannot be read, or a signal has come
+    /// ([`Fault::Interrupted`]).
     pub fn stop(&mut self) -> Result<(), MotorError> {
         let stopped = self.guard.stop();
         let path = self.guard.port().settings().path.clone();

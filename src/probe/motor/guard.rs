@@ -46,7 +46,7 @@ impl Guard {
         Guard { port, address: table.address, motor: table.motor, moving: false, searching: false, held, interrupter }
     }
 
-    /// Sends a request and waits for its reply. Requests that can be repeated without harm are tried three times, others once ([`Port::ask`]).
+    /// Sends a request and waits for its reply. Requests that can be repeated without harm are tried up to three times, others once ([`Port::ask`]).
     ///
     /// # Errors
     /// [`Fault::NoReply`], [`Fault::Checksum`], [`Fault::Refused`], [`Fault::Unplugged`], and [`Fault::Interrupted`] once a signal has come or the

@@ -53,7 +53,7 @@ pub enum Fault {
     TooLong { what: &'static str, limit: Duration },
     #[error("interrupted by {0}")]
     Interrupted(&'static str),
-    /// The request exceeds the limits of the probe or the module, as the text says. Nothing moved.
+    /// The request exceeds the limits of the probe or the module, or no thread can be started, as the text says. Nothing moved.
     #[error("{0}")]
     OutOfRange(String),
 }
@@ -67,7 +67,7 @@ pub enum Stopped {
     Confirmed,
     /// The command to stop was sent, but the module did not confirm it for the given reason.
     Unconfirmed(String),
-    /// The command to stop could not be sent for the given reason.
+    /// The port failed while the command to stop was sent or confirmed, for the given reason.
     Failed(String),
 }
 

@@ -86,7 +86,7 @@ impl Port {
         &self.settings
     }
 
-    /// Sends a request and waits for its reply. Requests that can be repeated without harm are tried three times, others once.
+    /// Sends a request and waits for its reply. Requests that can be repeated without harm are tried up to three times, others once.
     ///
     /// # Errors
     /// [`Fault::NoReply`] or [`Fault::Checksum`] after the last try; [`Fault::Refused`]; [`Fault::Unplugged`].

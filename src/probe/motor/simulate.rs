@@ -94,7 +94,7 @@ struct Shared {
     end: AtomicBool,
 }
 
-/// A simulated TMCL module on a pseudo-terminal. The simulation runs until this value is dropped.
+/// A simulated TMCL module on a pseudo-terminal. The simulation runs until this value is dropped, or its port is unplugged or fails.
 pub struct Simulator {
     path: PathBuf,
     shared: Arc<Shared>,
@@ -105,7 +105,7 @@ impl Simulator {
     /// Starts the simulation on a thread of its own.
     ///
     /// # Errors
-    /// The system provides no pseudo-terminal.
+    /// The system provides no pseudo-terminal or no thread.
     pub fn start(options: SimulatorOptions) -> std::io::Result<Simulator> {
         let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
         grantpt(&master)?;

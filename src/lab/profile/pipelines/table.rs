@@ -9,8 +9,8 @@ use std::fmt::Write as _;
 /// Pipelines that the table of a long list shows: those with the fewest waves.
 const SHOWN: usize = 40;
 
-/// The pipelines as a table of text, and sums over all of them. The table has at most 40 rows: those with the lowest occupancy first or, where the
-/// device reports no statistics, those that take longest to compile.
+/// The pipelines as a table of text, and sums over all of them. The table has at most 40 rows: those with the lowest occupancy first, of equal
+/// occupancy those with the most instructions. Where the device reports no statistics, those that take longest to compile are first.
 pub fn table(profile: &PipelineProfile) -> String {
     let mut order: Vec<&Pipeline> = profile.pipelines.iter().collect();
     // Without statistics the slowest to compile are of interest.
@@ -58,7 +58,8 @@ fn sums(profile: &PipelineProfile) -> String {
     text
 }
 
-/// The changes as a table of text, those that fail the comparison first.
+/// The comparison as a table of text: the notes, the changes with those that fail the comparison first, the new pipelines whose registers spill, and
+/// the counts.
 pub fn comparison_table(compared: &PipelineComparison) -> String {
     let mut text = String::new();
     for note in &compared.notes {
