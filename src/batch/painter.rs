@@ -65,7 +65,12 @@ impl Painter {
             if !self.losses.allow_after(&error) {
                 return Err(error);
             }
-            self.context = open_device_until(self.options.device.clone(), self.options.deadline, self.options.stop)?;
+            let opened = open_device_until(self.options.device.clone(), self.options.deadline, self.options.stop);
+            // The context is that of the lost device: neither this unit nor a later one can be drawn.
+            self.context = opened.map_err(|why| match why {
+                GpuError::Stopped { .. } => why,
+                _ => GpuError::Lost { operation: "open the device again".into(), report: why.to_string() },
+            })?;
         }
     }
 
