@@ -107,7 +107,7 @@ impl SourceArgs {
         Ok(parsed.source)
     }
 
-    /// Checks the values without opening the source.
+    /// Checks the range of each value. Whether the values fit together and fit the source is checked by [`SourceArgs::open`].
     pub fn check(&self) -> Result<(), Failure> {
         self.playback(self.rate)?;
         self.network()?;

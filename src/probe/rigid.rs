@@ -11,7 +11,7 @@ use std::str::FromStr;
 pub struct Rigid {
     /// The translation after the rotation, mm.
     pub shift: DVec3,
-    /// The rotation vector, degrees: its direction is the axis, its length the angle, anticlockwise as seen against the axis.
+    /// The rotation vector, degrees: its direction is the axis, its length the angle. A vector along elevation turns lateral to depth.
     pub turn: DVec3,
     /// The point that only the shift moves, mm.
     pub about: DVec3,

@@ -77,7 +77,8 @@ pub enum Command {
     Reset,
     /// Undoes the last change. While a measurement or a line is in progress, removes its last point instead.
     Undo,
-    /// Undoes all changes. Redo can restore them one by one.
+    /// Undoes all changes that are kept, at most the last 100. Redo can restore them one by one, but not the points of a measurement or a line in
+    /// progress.
     UndoAll,
     /// Redoes the change that was undone last.
     Redo,

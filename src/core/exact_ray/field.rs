@@ -44,7 +44,8 @@ impl Segment {
 }
 
 /// Returns the interpolated samples of the volume between two positions of a line, `ends` in mm, as polynomials. There are gaps where the line is
-/// outside the insonified region. `window`: the grey values that become 0 and 1.
+/// outside the insonified region of a swept volume. Beyond the border of a Cartesian volume the nearest texels count. `window`: the grey values that
+/// become 0 and 1.
 pub fn segments(line: &Line, volume: &Texels, window: [f64; 2], ends: [f64; 2]) -> Vec<Segment> {
     let mut found = Vec::new();
     if ends[1] <= ends[0] {

@@ -113,8 +113,8 @@ pub fn switches(from: &Settings, follow: impl Fn(Settings) -> Settings) -> Vec<V
     variants
 }
 
-/// All variants of `from` that [`switches`] gives, and also every way to sample the volume in every mode, every mode of every preset, and every
-/// filter and light.
+/// All variants of `from` that [`switches`] gives, and also every way to sample the volume in every mode, every mode of every preset, and a list of
+/// filters, lights and other choices, each applied to `from` by itself.
 pub fn all(from: &Settings) -> Vec<Variant> {
     let mut variants = switches(from, |settings| settings);
     for sampling in SAMPLINGS {

@@ -104,9 +104,9 @@ pub struct PassProfile {
     /// CPU time of all threads in each repeat, ns, if the device is the CPU; otherwise empty.
     #[serde(default)]
     pub cpu_ns: Vec<f64>,
-    /// Least number of bytes that a repeat reads. Each run counts every texel once that it can reach in a bound slot (image or buffer).
+    /// Number of bytes that a repeat can read. Each run counts every texel once that it can reach in a bound slot (image or buffer).
     pub bytes_read: u64,
-    /// Least number of bytes that a repeat writes, counted like `bytes_read`.
+    /// Number of bytes that a repeat can write, counted like `bytes_read`.
     pub bytes_written: u64,
     /// Number of unfiltered texel fetches in a repeat. None if they cannot be counted.
     #[serde(default)]

@@ -59,7 +59,7 @@ pub struct Recording {
     pub sha256: String,
 }
 
-/// A measurement.
+/// A measurement on the worksheet: its result, what it was made on, and its picture.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 pub struct Entry {
     /// Number of the measurement in the list of the workspace's settings, from 1.

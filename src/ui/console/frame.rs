@@ -21,7 +21,7 @@ impl Console {
     /// Does everything that is due, and returns what the event loop has to do next.
     ///
     /// # Errors
-    /// The device or the screen is lost.
+    /// The device or the screen is lost; [`ConsoleError`] says how to continue.
     pub fn update(&mut self, now: Instant) -> Result<LoopRequest, ConsoleError> {
         let updated = self.advance(now);
         if let Err(ConsoleError::DeviceLost(why)) = &updated {

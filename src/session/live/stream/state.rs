@@ -40,7 +40,7 @@ impl Stream {
         self.feed.disconnected()
     }
 
-    /// True if events of the source are queued.
+    /// True if events of the source are queued. While the picture is frozen and the cine loop is full, no step takes those of a recording.
     pub fn has_waiting(&self) -> bool {
         self.feed.waiting() > 0
     }
