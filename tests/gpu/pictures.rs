@@ -72,7 +72,7 @@ fn a_picture_of_another_shape_with_as_many_bytes_is_that_of_a_new_renderer() {
     changed.change(tall.clone()).expect("change");
     fresh.change(tall).expect("change");
     let [changed, fresh] = [changed.picture().expect("picture"), fresh.picture().expect("picture")];
-    assert!(changed.size == [40, 96] && changed.rgba == fresh.rgba);
+    assert!([changed.width, changed.height] == [40, 96] && changed.rgba == fresh.rgba);
 }
 
 /// The head of sweep.json: an ellipsoid with a nose and two eye sockets, viewed from the probe.
