@@ -55,7 +55,7 @@ impl<'a> Merged<'a> {
         self.units.values().copied().filter(|record| record.status != Status::Done)
     }
 
-    /// The results of units that are done.
+    /// The results of units that are done, one for each.
     pub fn done(&self) -> impl Iterator<Item = &'a Record> {
         self.units.values().copied().filter(|record| record.status == Status::Done)
     }

@@ -43,7 +43,7 @@ pub struct Header {
     /// True if frames may have poses.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub posed: bool,
-    /// True if the frames are of the phantom, not of a patient. A `.frames` file stores this in the flags of its frames, not in its header.
+    /// True if the frames are of the phantom, not of a patient.
     #[serde(skip)]
     pub synthetic: bool,
 }

@@ -14,9 +14,9 @@ pub enum Effect {
     #[default]
     Paint,
     Erase,
-    /// Labels the body that is brighter than what is around it.
+    /// Labels the body at the end of the drag that is brighter than what is around it.
     GrowBright,
-    /// Labels the body that is darker than what is around it.
+    /// Labels the body at the end of the drag that is darker than what is around it.
     GrowDark,
 }
 

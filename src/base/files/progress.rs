@@ -27,7 +27,7 @@ struct Counts {
     is_cancelled: AtomicBool,
 }
 
-/// How much of the input was read.
+/// Progress of the reading of the input.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Share {
     /// The total is not known yet.

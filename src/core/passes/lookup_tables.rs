@@ -152,8 +152,8 @@ pub(super) fn is_non_uniform(geometry: &Geometry) -> bool {
     }
 }
 
-/// The transfer function: red, green, blue (0..1) and absorption over [`Scene::reference_length`], at [`Scene::transfer_entries`] equidistant
-/// windowed sample values from 0 to 1.
+/// The transfer function at [`Scene::transfer_entries`] equidistant windowed sample values from 0 to 1. Each entry has four values: red, green, blue
+/// (0..1) and the optical depth (0 or more) of [`Scene::reference_length`].
 pub fn transfer_table(scene: &Scene) -> Vec<f32> {
     floats(transfer_of(scene).into_iter().flatten())
 }

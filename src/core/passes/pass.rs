@@ -310,7 +310,7 @@ pub struct Pass {
     pub frequency: Frequency,
     /// How the pass takes part in a filter chain.
     pub link: Link,
-    /// Path of the shader below glsl/, with the variant behind a dot if it has several.
+    /// Path of the shader below glsl/ without its extension, with the variant behind a dot if it has several.
     pub shader: fn(&Scene, &Dispatch) -> &'static str,
     pub needed: fn(&Scene) -> Need,
     pub reads: fn(&Scene, &Dispatch) -> Vec<Bind>,
@@ -417,7 +417,7 @@ pub fn in_runs_of(run: u32, mut texels: [u32; 3], axis: usize) -> [u32; 3] {
     texels
 }
 
-/// Invocations along each edge of a workgroup: local_size of glsl/include/common.glsl.
+/// Invocations of a workgroup along x and along y; along z it has one: local_size of glsl/include/common.glsl.
 pub const GROUP: u32 = 8;
 
 /// Largest tile of a workgroup, bytes. A multiprocessor of NVIDIA's Ada or Ampere has 100 KB of shared memory: for twelve workgroups, half of the

@@ -20,7 +20,7 @@ impl Settings {
 }
 
 impl Scene {
-    /// True if the rendering shows echoes on the cut faces of clip planes (`cap.enabled`), even if no echo reaches the level of tissue
+    /// True if clip planes cut the rendering and it shows echoes on their cut faces (`cap.enabled`), even if no echo reaches the level of tissue
     /// ([`Scene::cap_level`]). False for a still ([`Scene::still`]), which lights cut faces like other matter.
     pub fn has_caps(&self) -> bool {
         self.settings.cap.enabled && self.settings.can_cap() && self.still().is_none()

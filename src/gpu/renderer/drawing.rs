@@ -207,7 +207,7 @@ impl Drawing {
         Ok((Upload::new(&self.context, name, there.layout(), place.parts.clone(), texels)?, place))
     }
 
-    /// Submits the picture.
+    /// Submits what was recorded of the picture since [`Drawing::begin`], and its readback if there is one, without waiting for it.
     pub fn submit(&mut self, queues: &mut DeviceQueues, slots: &SlotResources) -> Result<(), GpuError> {
         if let (Some(screen), Some(readback)) = (slots.image(Slot::Screen, 0), &self.readback) {
             self.recorder.copy_out(queues, screen, Slot::Screen, 0, readback);

@@ -256,7 +256,7 @@ pub struct Times {
     pub volume: Time,
     /// Work for each picture: which bricks rays may skip, stages 2 to 4 (raycast, shade, postprocess), and the readback.
     pub picture: Time,
-    /// `volume` and `picture` together.
+    /// Statistics of the sum of both in each run, or of the ratio of such sums.
     pub total: Time,
 }
 

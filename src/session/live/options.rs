@@ -20,8 +20,8 @@ pub struct StreamOptions {
     pub readback: bool,
     /// Limits of the cine loop; by default there is none.
     pub cine: CineLimits,
-    /// Called when a pipeline was compiled, so that the next step may have work. If it is given, pipelines of changed settings are compiled in the
-    /// background.
+    /// Called on the thread that compiled a pipeline, so that the next step may have work. If it is given, pipelines of changed settings are
+    /// compiled in the background; otherwise a step waits for them.
     pub wake: Option<Wake>,
     /// Which operations are timed on the device. With [`TimeStamps::EachPass`] passes do not overlap, so that pictures take longer.
     pub time_stamps: TimeStamps,
@@ -45,7 +45,7 @@ pub struct StreamOptions {
 }
 
 /// A function that returns, for a scene at full quality, the settings of lower quality of which any one may replace its own while the view moves.
-/// Their order does not matter.
+/// Their order does not matter. [`StreamOptions::lowered`] says what they are for.
 pub type Lowered = Arc<dyn Fn(&Scene) -> Vec<Settings> + Send + Sync>;
 
 impl Default for StreamOptions {

@@ -43,7 +43,7 @@ pub struct Statistics {
     pub faults: SourceFaults,
     pub pictures: u64,
     pub volumes: VolumeCounts,
-    /// Latency from the arrival of each frame to the end of the first picture that shows it, us.
+    /// Latency from the arrival of each frame until the host finds the first picture that shows it finished, us.
     pub latency: Histogram<u64>,
     /// The latencies of `latency`, but in s and in bins with fixed limits.
     pub latencies: histogram::Histogram,

@@ -116,7 +116,7 @@ impl Settings {
         Settings { measure, body_marks, marks: other.marks.clone(), cine: other.cine, ..self }
     }
 
-    /// These settings without measurements, annotations, body marks and marks, and with the cine loop of a whole recording. Labels stay.
+    /// These settings without measurements, annotations and body marks, with the default [`Marks`], and with the cine loop of a whole recording.
     pub fn without_drawings(self) -> Settings {
         self.with_drawings_of(&Settings::default())
     }
