@@ -204,7 +204,7 @@ impl InputArgs {
         read.extend(self.input.clone().filter(|file| workspace::is_named(file)));
         read.extend(self.stored.as_ref().map(|(file, _)| file.clone()));
         read.extend(self.labels().ok().flatten());
-        read.extend(self.scene.scene.clone());
+        read.extend(self.scene.files());
         // Settings that are refused are named where the scene is made.
         let layers = self.scene.layers_over(Layers::default(), &[]);
         read.extend(layers.iter().flat_map(Layers::transfer_files).map(Path::to_path_buf));
