@@ -77,7 +77,7 @@ fn plain(line: &str, numbers: bool) -> String {
     }
     let mut text = String::new();
     for c in line.chars() {
-        if c.is_ascii_digit() && [" -", " +"].iter().any(|sign| text.ends_with(sign)) {
+        if c.is_ascii_digit() && [" -", " +", ",-"].iter().any(|sign| text.ends_with(sign)) {
             text.pop();
         }
         let goes_on = text.ends_with('#') && (c.is_ascii_digit() || c == '.');
