@@ -1,7 +1,7 @@
 //! `echolume report filters`: compares the 2D filters.
 
 use crate::args::{Output, check_outputs, open_device, open_recording, write_report};
-use crate::filter_report::candidate_runs::{MeasureError, MeasureOptions, count, phantom, recording};
+use crate::filter_report::candidate_runs::{MeasureError, MeasureOptions, Middle, count, phantom, recording};
 use crate::filter_report::candidates::candidates;
 use crate::filter_report::{Area, Areas, Report, contact_sheet, export};
 use crate::gpu::DeviceChoice;
@@ -86,11 +86,19 @@ impl FilterReport {
         let context = open_device(self.device.clone(), false)?;
         let options = MeasureOptions { only: &self.filter, pixels: self.pixels, repeats: self.repeat as usize };
         let bar = progress_bar((names.len() * count(&self.filter)) as u64).with_message("settings");
-        let mut subjects = vec![phantom(&context, options, &mut || bar.inc(1)).map_err(|e| fault("phantom", e))?];
+        let at_fault = |file: &Path| {
+            let name = file.display().to_string();
+            move |e| fault(&name, e)
+        };
+        // All of them before the first is measured: what cannot be measured is refused at once.
+        let mut middles = Vec::new();
         for ((source, file), areas) in sources.iter_mut().zip(&self.recordings).zip(areas) {
-            let name = stem(file);
-            let measured = recording(&context, &mut **source, &name, areas, options, &mut || bar.inc(1));
-            subjects.push(measured.map_err(|e| fault(&file.display().to_string(), e))?);
+            middles.push(Middle::new(&context, &mut **source, areas, self.pixels).map_err(at_fault(file))?);
+        }
+        let mut subjects = vec![phantom(&context, options, &mut || bar.inc(1)).map_err(|e| fault("phantom", e))?];
+        for (middle, file) in middles.into_iter().zip(&self.recordings) {
+            let measured = recording(&context, middle, &stem(file), options, &mut || bar.inc(1));
+            subjects.push(measured.map_err(at_fault(file))?);
         }
         bar.finish_and_clear();
         let report = Report {

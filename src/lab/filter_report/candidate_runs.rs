@@ -55,7 +55,8 @@ pub fn phantom(
         let options = PhantomOptions { speckle, ..PhantomOptions::default() };
         Phantom::new(options).map(PhantomSource::new).map_err(|e| MeasureError::Input(e.to_string()))
     };
-    let mut subject = recording(context, &mut source(Speckle::Random)?, "phantom", PHANTOM, options, after_each)?;
+    let speckled = Middle::new(context, &mut source(Speckle::Random)?, PHANTOM, options.pixels)?;
+    let mut subject = recording(context, speckled, "phantom", options, after_each)?;
     let mut bare = Middle::new(context, &mut source(Speckle::Mean)?, PHANTOM, options.pixels)?;
     let clean = bare.filtered(context, &Candidate::none())?.0;
     for row in &mut subject.rows {
@@ -69,17 +70,14 @@ pub fn phantom(
 /// `after_each` is called after each candidate.
 ///
 /// # Errors
-/// `options.pixels` is out of its range. An area is no valid region or is less than 4 pixels wide or high, `crop` reaches beyond the sector, or
-/// another area beyond `crop`. The recording cannot be read or lacks the frame, or the device fails.
+/// The device fails.
 pub fn recording(
     context: &Arc<Context>,
-    source: &mut dyn Source,
+    mut middle: Middle,
     name: &str,
-    areas: Areas,
     options: MeasureOptions<'_>,
     after_each: &mut dyn FnMut(),
 ) -> Result<Subject, MeasureError> {
-    let mut middle = Middle::new(context, source, areas, options.pixels)?;
     let mut rows: Vec<Row> = Vec::new();
     let mut before: Vec<&'static str> = Vec::new();
     for candidate in candidates(middle.scene.grid.pitch, options.only) {
@@ -99,7 +97,7 @@ pub fn recording(
         rows.push(Row { candidate, quality, time: Spread::new(&times), pixels });
         after_each();
     }
-    Ok(Subject { name: name.into(), areas, frame: middle.frame, size: middle.size(), clean: None, rows })
+    Ok(Subject { name: name.into(), areas: middle.areas, frame: middle.frame, size: middle.size(), clean: None, rows })
 }
 
 /// Number of candidates: "no filter", and those whose filter's name contains `only`.
@@ -115,8 +113,9 @@ fn time_of_filter(passes: &[PassTime], before: &[&str]) -> Option<f64> {
     filters.map(|p| p.total).reduce(|a, b| a + b)
 }
 
-/// The middle frame of a volume, and where it is measured.
-struct Middle {
+/// The middle frame of a recording's first volume, and where it is measured.
+pub struct Middle {
+    areas: Areas,
     scene: Scene,
     frame: usize,
     bytes: Vec<u8>,
@@ -128,7 +127,17 @@ struct Middle {
 }
 
 impl Middle {
-    fn new(context: &Arc<Context>, source: &mut dyn Source, areas: Areas, pixels: u32) -> Result<Middle, MeasureError> {
+    /// Reads the frame and checks the areas. `pixels`: as in [`MeasureOptions`].
+    ///
+    /// # Errors
+    /// `pixels` is out of its range. An area is no valid region or is less than 4 pixels wide or high, the crop reaches beyond the sector, or
+    /// another area beyond the crop. The recording cannot be read or lacks the frame, or the device fails.
+    pub fn new(
+        context: &Arc<Context>,
+        source: &mut dyn Source,
+        areas: Areas,
+        pixels: u32,
+    ) -> Result<Middle, MeasureError> {
         let input = |e: String| MeasureError::Input(e);
         let geometry = source.geometry(0);
         let samples = Input { stored: source.stored_type(), range: source.range() };
@@ -157,8 +166,10 @@ impl Middle {
         let crop = pixels_of("crop", areas.crop)?;
         let [tissue, behind] = [("region", areas.region), ("background", areas.background)]
             .map(|(what, area)| pixels_of(what, area).and_then(|region| within(what, region, crop)));
-        let mut made = Middle { scene, frame: middle, bytes, crop, levels: [tissue?, behind?], renderer: None };
+        let mut made = Middle { areas, scene, frame: middle, bytes, crop, levels: [tissue?, behind?], renderer: None };
         made.check_crop(context)?;
+        // It would keep its memory until the recordings before this one are measured.
+        made.renderer = None;
         Ok(made)
     }
 
