@@ -8,6 +8,8 @@ import rows
 import view
 
 LIMIT = 600  # s, of one run
+# How the names of its passes begin that a peer has nothing of.
+FILTERS = ("gaussian", "median", "sigma", "enhanced_sigma", "perona_malik", "aos", "rkl1", "estimator", "bilateral")
 
 
 class Failed(Exception):
@@ -51,6 +53,9 @@ class Echolume:
             measured = json.load(file)
         self.driver = f"{measured['device']['name']}, {measured['device']['driver']}"
         self.program = measured["program"]
+        filters = [p["name"] for p in measured["passes"] if p["name"].startswith(FILTERS)]
+        if self.row.kind == "volume" and filters:
+            raise Failed(f"changed the volume: {', '.join(filters)}")
         made = max((p["runs_per_picture"] for p in measured["passes"] if p["stage"] == "preprocess"), default=self.row.per)
         if made < self.row.per:
             raise Failed(f"made {made} of {self.row.per} slices")

@@ -3,12 +3,24 @@
 A picture is finished when its pixels are in host memory, as Echolume's is.
 """
 
+import types
+
 import numpy as np
-import vtk
-from vtk.util import numpy_support
+from vtkmodules import (
+    vtkCommonCore, vtkCommonDataModel, vtkFiltersCore, vtkImagingCore, vtkRenderingCore, vtkRenderingOpenGL2, vtkRenderingVolume,
+    vtkRenderingVolumeOpenGL2,
+)
+from vtkmodules.util import numpy_support
 
 import phantom
 import view
+
+# What is used of VTK, and no more: a pack has nothing else of it (pack.py). The modules of OpenGL2 are the factories of the others.
+MODULES = (
+    vtkCommonCore, vtkCommonDataModel, vtkFiltersCore, vtkImagingCore, vtkRenderingCore, vtkRenderingOpenGL2, vtkRenderingVolume,
+    vtkRenderingVolumeOpenGL2,
+)
+vtk = types.SimpleNamespace(**{name: value for module in MODULES for name, value in vars(module).items() if name.startswith("vtk")})
 
 
 def version():

@@ -22,12 +22,18 @@ class Row:
     inverted: bool = False
     sizes: tuple = (128, 256, 512)
     aim: float | None = None
+    judged_by: str = "cpu"  # the time of which the aim is: "cpu" or "wall"
     per: int = 1  # frames or slices that one repeat works on
     notes: dict = field(default_factory=dict)  # by peer: another method
 
     @property
     def key(self):
         return self.name + (":new" if self.new else "")
+
+
+# Without a preset Echolume smooths a recording and its surface, and takes four slices for a sample. The choice of one filter, here of
+# none, replaces that of all.
+UNFILTERED = ("slices.median=false", "distance.bilateral=none", "ray.elevation=linear")
 
 
 def transfer(n):
@@ -40,7 +46,7 @@ def arguments(row, n):
     if row.kind != "volume":
         return list(row.echolume)
     # VTK's fixed-point caster ends a ray at 1/128 of the light left, and that is no setting there.
-    sets = ["slices.format=r8", f"ray.step={phantom.pitch(n)}", "ray.early_end=0.0078125", *view.PLANE]
+    sets = ["slices.format=r8", *UNFILTERED, f"ray.step={phantom.pitch(n)}", "ray.early_end=0.0078125", *view.PLANE]
     # Grey values as they are, and all of the volume, as the peers take them. By default the windows follow from the recording, and a
     # minimum projection takes a slab; surfaces keep their window, since no peer finds edges.
     sets += [f"{mode}.window=[0,1]" for mode in ("volume", "projection", "planes")]
@@ -87,7 +93,8 @@ def volume_rows(new):
 
 # The slice that the peers show is cut, though a picture that small is hardly one. All slices are made, as by the peers, not only
 # those that the plane is cut from.
-TINY = ("--size", "16x16", "--mode", "mpr", "--set", "slices.format=r8", "--set", "slices.everything=true", "--set", "planes.window=[0,1]")
+SETS = ("slices.format=r8", "slices.everything=true", "planes.window=[0,1]", *UNFILTERED)
+TINY = ("--size", "16x16", "--mode", "mpr", *(word for s in SETS for word in ("--set", s)))
 
 
 def slice_row(name, title, peers, setting, **more):
@@ -96,7 +103,7 @@ def slice_row(name, title, peers, setting, **more):
 
 
 def distance_row(name, title, peers, setting, **more):
-    plain = ("--size", "512x512", "--mode", "sr", "--still")
+    plain = ("--size", "512x512", "--mode", "sr", "--still", *(word for s in UNFILTERED for word in ("--set", s)))
     return Row(name, title, "distance", peers, (*plain, "--set", setting), plain, sizes=(512,), **more)
 
 

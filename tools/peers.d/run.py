@@ -1,6 +1,7 @@
 """Measures rows and writes the table. Started by tools/peers, which says how."""
 
 import argparse
+import dataclasses
 import datetime
 import json
 import os
@@ -175,10 +176,23 @@ def measure(row, size, options, log):
     for name, mean in table.side_by_side(pictures, options.out, row, size).items():
         cells[name]["differs"] = mean
     return {
-        "row": row.key, "title": row.title, "size": size, "aim": row.aim, "kind": row.kind,
+        "row": row.key, "title": row.title, "size": size, "aim": row.aim, "judged_by": row.judged_by, "kind": row.kind,
         "date": datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds"),
         "load": os.getloadavg()[0], "cells": cells,
     }
+
+
+# What draws on a GPU; a plane has the CPU's peer alone.
+ON_GPU = ("VTK GPU", "pygfx", "vispy", "VTK reslice")
+
+
+def on_gpu(row):
+    """The row as it is measured on a GPU, at every size and judged by time by the wall; None if no peer of it draws there."""
+    also = ("VTK GPU",) if row.name in ("mip", "minip") else ()
+    peers = tuple(name for name in (*also, *row.peers) if name in ON_GPU)
+    if row.kind != "volume" or not peers:
+        return None
+    return dataclasses.replace(row, peers=peers, sizes=(128, 256, 512), aim=rows.VOLUME, judged_by="wall")
 
 
 def machine():
@@ -189,15 +203,17 @@ def machine():
 def asked():
     parser = argparse.ArgumentParser(prog="tools/peers", description="Echolume beside what a user would pick instead, in one run on one machine.")
     parser.add_argument("--rows", default="", help="such as mip,mpr,shaded:new; default all: " + ", ".join(r.key for r in rows.ROWS))
-    parser.add_argument("--sizes", default="128,256", help="edges of the volumes, of 128, 256, 512 (default 128,256)")
+    parser.add_argument("--sizes", help="edges of the volumes, of 128, 256, 512 (default 128,256; with --gpu all three)")
     parser.add_argument("--peers", default="", help="only these, such as 'pygfx,VTK GPU'")
     parser.add_argument("--turns", type=int, default=3, help="turns that all contestants of a row take (default 3)")
     parser.add_argument("--budget", type=float, default=0.8, help="seconds of one contestant's turn, at most 7 pictures (default 0.8)")
+    parser.add_argument("--gpu", action="store_true", help="volumes on a GPU, by VTK, pygfx and vispy; ratios of time by the wall")
     parser.add_argument("--missing", action="store_true", help="only what the output folder does not hold yet")
     parser.add_argument("--out", required=True)
     parser.add_argument("--work", required=True)
     parser.add_argument("--binary", required=True)
     options = parser.parse_args()
+    options.sizes = options.sizes or ("128,256,512" if options.gpu else "128,256")
     split = lambda text: [word.strip() for word in text.split(",") if word.strip()]
     options.rows, options.peers, options.sizes = split(options.rows), split(options.peers), [int(s) for s in split(options.sizes)]
     known = {r.key for r in rows.ROWS}
@@ -209,11 +225,16 @@ def asked():
 
 def main():
     options = asked()
-    os.environ.update(DRIVER)
+    if options.gpu:
+        os.environ["VTK_DEFAULT_OPENGL_WINDOW"] = "vtkEGLRenderWindow"
+    else:
+        os.environ.update(DRIVER)
     os.makedirs(os.path.join(options.out, "rows"), exist_ok=True)
     os.makedirs(options.work, exist_ok=True)
     with open(os.path.join(options.work, "peers.log"), "a") as log:
-        for row in rows.ROWS:
+        for row in (on_gpu(row) for row in rows.ROWS) if options.gpu else rows.ROWS:
+            if row is None:
+                continue
             if options.rows and row.key not in options.rows:
                 continue
             # What has no size of its own is measured whatever sizes are asked for.

@@ -29,7 +29,7 @@ def ratio(measured, kind):
 
 
 def judged(measured):
-    found, aim = ratio(measured, "cpu"), measured["aim"]
+    found, aim = ratio(measured, measured.get("judged_by", "cpu")), measured["aim"]
     if found is None or aim is None:
         return ""
     return f"{'reached' if found[0] <= aim else 'missed'} ({aim:g})"
@@ -78,6 +78,7 @@ def write(folder, order, machine):
     head = {"format": "echolume-peers-1", "machine": machine, "versions": versions, "drivers": drivers, "rows": measured}
     with open(os.path.join(folder, "table.json"), "w") as file:
         json.dump(head, file, indent=1)
+    judged_by = "by the wall" if any(m.get("judged_by") == "wall" for m in measured) else "of the CPU"
     marks, lines = [], []
     for m in measured:
         peers = []
@@ -100,7 +101,7 @@ def write(folder, order, machine):
         file.write(
             f"{machine['cpu']}, {machine['cores']} cores; {'; '.join(versions)}; {'; '.join(drivers)}; "
             f"{dates[0] if dates else ''} to {dates[-1] if dates else ''}. ms, wall / CPU (user and system, all threads): median "
-            "(middle half). Ratios: Echolume over the fastest peer; the aim is of the CPU's. \"Differs\": mean difference between "
+            f"(middle half). Ratios: Echolume over the fastest peer; the aim is of the time {judged_by}. \"Differs\": mean difference between "
             "the peer's first picture and Echolume's, grey levels of 255.\n\n"
             "| work | size | Echolume | peers | wall ratio | CPU ratio | aim |\n|---|---|---|---|---|---|---|\n"
         )
