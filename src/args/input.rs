@@ -13,7 +13,7 @@ use crate::scene::default_look::Recorded;
 use crate::scene::load::{Layers, LoadError, PRESETS};
 use crate::scene::{Input, Scene};
 use crate::source::phantom::{self, Phantom, PhantomSource};
-use crate::source::{Frame, Source};
+use crate::source::{Frame, Source, VolumeFrames};
 use crate::terminal::{Failure, failed, input, progress_bar, say};
 use crate::user_presets;
 use crate::workspace::{self, Origin, Workspace};
@@ -491,17 +491,11 @@ pub fn frames_of(
     volume: usize,
     mut each: impl FnMut(Frame) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
-    source.skip_to_volume(volume).map_err(input)?;
-    let mut number = None;
-    for _ in 0..source.frames_per_volume() {
-        let Some(frame) = source.next_frame().map_err(input)? else { break };
-        // An incomplete volume has fewer frames: the next one then begins earlier.
-        if *number.get_or_insert(frame.volume) != frame.volume {
-            break;
-        }
+    let mut frames = VolumeFrames::of(source, volume).map_err(input)?;
+    while let Some(frame) = frames.read().map_err(input)? {
         each(frame)?;
     }
-    Ok(())
+    frames.count().map(drop).map_err(input)
 }
 
 /// Makes a folder, and those above it, unless they exist.

@@ -3,7 +3,7 @@
 use super::manifest::Numbered;
 use super::results::{Record, Verified, read_record};
 use super::unit::{Key, Kind, Work};
-use crate::args::{check_volume, recorded};
+use crate::args::{check_volume, frames_of, recorded};
 use crate::digest::digest_of;
 use crate::files::escaped;
 use crate::probe::{Geometry, Grid, World};
@@ -131,16 +131,11 @@ fn contents(task: &Task, source: &mut dyn Source) -> Result<Contents, Failure> {
 
 /// The frames of the chosen volume, in the order of the recording.
 fn frames(work: &Work, source: &mut dyn Source) -> Result<Vec<Frame>, Failure> {
-    source.skip_to_volume(work.volume).map_err(input)?;
-    let (mut frames, mut volume) = (Vec::new(), None);
-    for _ in 0..source.frames_per_volume() {
-        let Some(frame) = source.next_frame().map_err(input)? else { break };
-        // An incomplete volume has fewer frames: the next one then begins earlier.
-        if *volume.get_or_insert(frame.volume) != frame.volume {
-            break;
-        }
+    let mut frames = Vec::new();
+    frames_of(source, work.volume, |frame| {
         frames.push(frame);
-    }
+        Ok(())
+    })?;
     Ok(frames)
 }
 

@@ -1,7 +1,7 @@
 //! `echolume stic`: one slow sweep over a beating heart becomes volumes of one cycle.
 
 use super::recordings::OUTPUT;
-use crate::args::{GeometryArgs, check_outputs, open_recording};
+use crate::args::{GeometryArgs, check_outputs, frames_of, open_recording};
 use crate::files::signals::Writing;
 use crate::files::{quoted, read_text};
 use crate::probe::Geometry;
@@ -118,13 +118,11 @@ impl Stic {
         }
         let mut motion = Motion::new(header.forward.frame_size(), header.stored);
         let mut frames: Vec<Frame> = Vec::new();
-        recording.skip_to_volume(self.volume).map_err(input)?;
-        while frames.len() < recording.frames_per_volume() {
-            let next = recording.next_frame().map_err(input)?;
-            let Some(frame) = next.filter(|next| frames.first().is_none_or(|f| f.volume == next.volume)) else { break };
+        frames_of(recording, self.volume, |frame| {
             motion.take(&frame);
             frames.push(frame);
-        }
+            Ok(())
+        })?;
         if frames.len() < 2 {
             return Err(input(format!("{file}: a sweep of one frame; STIC needs the frames of several cycles")));
         }

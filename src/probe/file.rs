@@ -62,9 +62,11 @@ impl ProbeFile {
     }
 
     /// Looks for the probe file of a recording in the folder of the recording. `<stem>.probe.toml` is for this recording alone; if there is none,
-    /// `probe.toml` is for all recordings of the folder. None if there is neither.
+    /// `probe.toml` is for all recordings of the folder. None if there is neither. `sweep.mha.gz` has the probe file of `sweep.mha`.
     pub fn find_for(recording: &Path) -> Option<PathBuf> {
-        let own = recording.file_stem().map(|stem| {
+        let is_packed = recording.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz"));
+        let unpacked = if is_packed { recording.with_extension("") } else { recording.into() };
+        let own = unpacked.file_stem().map(|stem| {
             let mut name = stem.to_os_string();
             name.push(".probe.toml");
             recording.with_file_name(name)

@@ -5,7 +5,7 @@ use super::segmentation::{self, Segment};
 use super::volume_file::VolumeFile;
 use crate::files::InputError;
 use crate::probe::{Geometry, Grid, Indices, Probe, World};
-use crate::{Frame, Source};
+use crate::{Frame, Source, VolumeFrames};
 use crate::{SampleType, StoredType};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -135,24 +135,19 @@ impl Volume {
     /// some. `each` is called with every frame before the volume takes it.
     ///
     /// # Errors
-    /// The recording cannot be read, or has no volume with this number.
+    /// The recording cannot be read, has no volume with this number, or all frames of it are damaged.
     pub fn read(
         source: &mut dyn Source,
         number: usize,
         mut each: impl FnMut(&Frame),
     ) -> Result<(Volume, usize), InputError> {
         let mut volume = Volume::new(source.geometry(number), source.stored_type());
-        source.skip_to_volume(number)?;
-        let (mut there, mut first) = (0, None);
-        while there < source.frames_per_volume() {
-            // After an incomplete volume the next frame belongs to another one.
-            let next = source.next_frame()?;
-            let Some(frame) = next.filter(|frame| *first.get_or_insert(frame.volume) == frame.volume) else { break };
+        let mut frames = VolumeFrames::of(source, number)?;
+        while let Some(frame) = frames.read()? {
             each(&frame);
             volume.take(frame);
-            there += 1;
         }
-        Ok((volume, there))
+        Ok((volume, frames.count()?))
     }
 
     /// Stores a frame at its [`Frame::slice`]. A frame of another size, or of a slice that the volume does not have, is ignored.

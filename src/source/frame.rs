@@ -146,6 +146,10 @@ pub trait Source: Send {
     /// # Errors
     /// The data cannot be read, or the volume does not exist.
     fn skip_to_volume(&mut self, volume: usize) -> Result<(), InputError>;
+    /// The number of the frames ([`Frame::volume`]) of the volume with this index. None if only the frames tell it.
+    fn number_of(&self, _volume: usize) -> Option<u32> {
+        None
+    }
     /// The next frame; None after the last.
     ///
     /// # Errors
@@ -198,6 +202,58 @@ pub trait Source: Send {
     /// Time of arrival of the last frame that was returned, s on the recorder's clock; None if it was not recorded.
     fn arrival(&self) -> Option<f64> {
         None
+    }
+}
+
+/// The frames of one volume of a source, in the order of the recording. A volume of a `.frames` file may lack some.
+pub struct VolumeFrames<'a> {
+    source: &'a mut dyn Source,
+    volume: usize,
+    number: Option<u32>,
+    /// Frames that were read, and the most that may follow.
+    there: usize,
+    left: usize,
+}
+
+impl<'a> VolumeFrames<'a> {
+    /// Moves the source to the volume with this index.
+    ///
+    /// # Errors
+    /// The data cannot be read, or the volume does not exist.
+    pub fn of(source: &'a mut dyn Source, volume: usize) -> Result<VolumeFrames<'a>, InputError> {
+        source.skip_to_volume(volume)?;
+        let (number, left) = (source.number_of(volume), source.frames_per_volume());
+        Ok(VolumeFrames { source, volume, number, there: 0, left })
+    }
+
+    /// The next frame; None after the last one that is there.
+    ///
+    /// # Errors
+    /// Data that cannot be read.
+    pub fn read(&mut self) -> Result<Option<Frame>, InputError> {
+        self.left = match self.left.checked_sub(1) {
+            Some(left) => left,
+            None => return Ok(None),
+        };
+        // After an incomplete volume the next frame belongs to another one.
+        let next = self.source.next_frame()?;
+        let next = next.filter(|frame| *self.number.get_or_insert(frame.volume) == frame.volume);
+        match next {
+            Some(_) => self.there += 1,
+            None => self.left = 0,
+        }
+        Ok(next)
+    }
+
+    /// The number of frames that were read.
+    ///
+    /// # Errors
+    /// There was none: all frames of the volume are damaged.
+    pub fn count(&self) -> Result<usize, InputError> {
+        let files = self.source.files();
+        let file = files.first().map_or(Path::new("recording"), PathBuf::as_path);
+        let fault = || InputError::new(file, format!("volume {}", self.volume), "all of its frames are damaged");
+        (self.there > 0).then_some(self.there).ok_or_else(fault)
     }
 }
 

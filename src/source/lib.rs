@@ -59,7 +59,7 @@ use echolume_probe as probe;
 
 pub use crate::files::InputError;
 pub use crate::probe::{DepthAxis, Frame, Geometry, Grid, SampleType, StoredType};
-pub use frame::{DEMO_DATA, Header, Source};
+pub use frame::{DEMO_DATA, Header, Source, VolumeFrames};
 pub use recording::Recording;
 pub use transforms::Calibration;
 

@@ -29,6 +29,7 @@ use crate::probe::{Geometry, World};
 use crate::{SampleType, StoredType};
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
 use glam::{DAffine3, DQuat};
+use std::collections::BTreeSet;
 use std::fs::{File, OpenOptions};
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::ops::Range;
@@ -214,7 +215,8 @@ pub struct Reader {
     volumes: Vec<usize>,
     next: usize,
     arrived: f64,
-    damaged: u64,
+    /// Offsets of frames that were left out.
+    damaged: BTreeSet<u64>,
     lost: u64,
     rebuilt: bool,
 }
@@ -269,7 +271,7 @@ impl Reader {
             volumes: Vec::new(),
             next: 0,
             arrived: 0.0,
-            damaged: 0,
+            damaged: BTreeSet::new(),
             lost: 0,
             rebuilt: false,
         };
@@ -299,9 +301,9 @@ impl Reader {
         self.index.len()
     }
 
-    /// Number of frames that were left out so far because of a wrong checksum or field. A frame that is left out again counts again.
+    /// Number of frames that were left out so far because of a wrong checksum or field. One that is left out again counts once.
     pub fn damaged(&self) -> u64 {
-        self.damaged
+        self.damaged.len() as u64
     }
 
     /// Number of bytes at the end of the file that were not read as frames when the index was rebuilt. 0 if the stored index is used.
@@ -373,7 +375,7 @@ impl Reader {
                     self.index.push((at, frame.volume));
                     empty_from = at + record;
                 }
-                _ => self.damaged += 1,
+                _ => _ = self.damaged.insert(at),
             }
             at += record;
             if at - empty_from > MAX_GAP.max(4 * record) {
@@ -455,6 +457,10 @@ impl Source for Reader {
         Ok(())
     }
 
+    fn number_of(&self, volume: usize) -> Option<u32> {
+        self.volumes.get(volume).map(|first| self.index[*first].1)
+    }
+
     fn next_frame(&mut self) -> Result<Option<Frame>, InputError> {
         while self.next < self.index.len() {
             let n = self.next;
@@ -464,7 +470,7 @@ impl Source for Reader {
                     self.arrived = arrived;
                     return Ok(Some(frame));
                 }
-                None => self.damaged += 1,
+                None => _ = self.damaged.insert(self.index[n].0),
             }
         }
         Ok(None)

@@ -337,17 +337,10 @@ fn choose_probe_file(path: &Path, given: Option<&Path>, layout: &mut Layout) -> 
     if is_stack && layout.states_geometry {
         return Ok(None);
     }
-    // "sweep.mha.gz" has the probe file of "sweep.mha", and a stack that of its first picture.
+    // A stack has the probe file of its first picture.
     let first =
         layout.pixels.gathered.iter().filter(|_| is_stack).find_map(|pictures| pictures.files().into_iter().next());
-    let named = if let Some(first) = first {
-        first
-    } else if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz")) {
-        path.with_extension("")
-    } else {
-        path.into()
-    };
-    let found = given.map(Path::to_path_buf).or_else(|| ProbeFile::find_for(&named));
+    let found = given.map(Path::to_path_buf).or_else(|| ProbeFile::find_for(first.as_deref().unwrap_or(path)));
     let Some(found) = found else { return Ok(None) };
     let is_for_all = given.is_none() && found.file_name().is_some_and(|n| n == "probe.toml");
     let mut leave_out = |why: &str| {

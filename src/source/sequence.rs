@@ -1,7 +1,7 @@
 //! Polar frames as a PLUS sequence (.mha), with their geometry in a probe file (NAME.probe.toml).
 
 use super::frame::DEMO_DATA;
-use super::frame::Source;
+use super::frame::{Source, VolumeFrames};
 use crate::files::{InputError, Unfinished};
 use crate::probe::SampleType;
 use crate::probe::{Geometry, ProbeFile, Volumes};
@@ -116,9 +116,7 @@ struct CompleteVolume {
 fn choose(source: &mut dyn Source, path: &Path) -> Result<(Vec<CompleteVolume>, usize), InputError> {
     let mut whole: Vec<CompleteVolume> = Vec::new();
     for place in 0..source.volumes() {
-        // If a volume is completely damaged, the next one is read instead, and a second time at its own index.
-        let next = volume(source, place)?.filter(|v| whole.last().is_none_or(|before| before.number != v.number));
-        whole.extend(next);
+        whole.extend(volume(source, place)?);
         if whole.len() * source.frames_per_volume() > MAX_FRAMES {
             let fault = format!("make more than {MAX_FRAMES} frames, which a file does not hold");
             return Err(InputError::new(path, "volumes", fault));
@@ -134,11 +132,11 @@ fn choose(source: &mut dyn Source, path: &Path) -> Result<(Vec<CompleteVolume>, 
 
 /// A volume, if all its frames exist, in order.
 fn volume(source: &mut dyn Source, place: usize) -> Result<Option<CompleteVolume>, InputError> {
-    source.skip_to_volume(place)?;
     let count = source.frames_per_volume();
     let mut kept: Option<CompleteVolume> = None;
+    let mut frames = VolumeFrames::of(source, place)?;
     for n in 0..count {
-        let Some(frame) = source.next_frame()? else { return Ok(None) };
+        let Some(frame) = frames.read()? else { return Ok(None) };
         let volume = kept.get_or_insert_with(|| CompleteVolume {
             place,
             number: frame.volume,
@@ -146,8 +144,7 @@ fn volume(source: &mut dyn Source, place: usize) -> Result<Option<CompleteVolume
             times: Vec::new(),
         });
         let slice = if frame.backward { count - 1 - n } else { n };
-        let is_next = frame.volume == volume.number && frame.backward == volume.backward;
-        if !is_next || (frame.number as usize, frame.slice) != (n, slice) {
+        if frame.backward != volume.backward || (frame.number as usize, frame.slice) != (n, slice) {
             return Ok(None);
         }
         volume.times.push(frame.time.filter(|t| t.is_finite()));

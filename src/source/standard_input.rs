@@ -98,6 +98,10 @@ impl Source for FromInput {
         self.0.skip_to_volume(volume).map_err(renamed)
     }
 
+    fn number_of(&self, volume: usize) -> Option<u32> {
+        self.0.number_of(volume)
+    }
+
     fn next_frame(&mut self) -> Result<Option<Frame>, InputError> {
         self.0.next_frame().map_err(renamed)
     }

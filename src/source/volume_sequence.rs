@@ -2,7 +2,7 @@
 //! time is in memory. A file is complete or absent.
 
 use super::convert::{Target, Volume};
-use super::frame::{Frame, Source};
+use super::frame::{Frame, Source, VolumeFrames};
 use super::volume_file::{SEQUENCE, VolumeFile, nrrd_start, stem};
 use crate::files::{InputError, Unfinished};
 use flate2::Compression;
@@ -45,10 +45,7 @@ impl VolumeSequence {
         let mut kept: Vec<Whole> = Vec::new();
         let count = volumes.len();
         for place in volumes {
-            // If a volume is completely damaged, the next one is read instead, and a second time at its own index.
-            let next =
-                read(source, place, drop)?.filter(|v| kept.last().is_none_or(|before| before.number != v.number));
-            kept.extend(next);
+            kept.extend(read(source, place, drop)?);
         }
         let Some(first) = kept.first() else { return Err(fault(format!("none of {count} is whole"))) };
         let (world, geometry) = (source.world_of(first.place), source.geometry(first.place));
@@ -153,15 +150,11 @@ impl VolumeSequence {
 
 /// Reads one volume, if all of its frames are there.
 fn read(source: &mut dyn Source, place: usize, mut each: impl FnMut(Frame)) -> Result<Option<Whole>, InputError> {
-    source.skip_to_volume(place)?;
     let mut missing = vec![true; source.frames_per_volume()];
     let mut whole: Option<Whole> = None;
-    for _ in 0..missing.len() {
-        let Some(frame) = source.next_frame()? else { return Ok(None) };
+    let mut frames = VolumeFrames::of(source, place)?;
+    while let Some(frame) = frames.read()? {
         let volume = whole.get_or_insert(Whole { place, number: frame.volume, time: None });
-        if volume.number != frame.volume {
-            return Ok(None);
-        }
         if let Some(time) = frame.time.filter(|time| time.is_finite()) {
             volume.time = Some(volume.time.map_or(time, |before| before.min(time)));
         }

@@ -6,7 +6,7 @@ use crate::common::program::run;
 use echolume::low_level::probe::{Advance, Axis, Geometry, Grid, Probe};
 use echolume::low_level::source::live::{Event, Live, Playback, PlaybackSource};
 use echolume::low_level::source::recorder::{Header, Reader, Writer};
-use echolume::low_level::source::{Frame, Source, StoredType};
+use echolume::low_level::source::{Frame, Source, StoredType, VolumeFrames};
 use proptest::prelude::*;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -148,6 +148,40 @@ fn a_damaged_frame_hides_no_other() {
         expected.remove(6);
         assert_eq!(all(&mut replay), expected);
         assert_eq!(replay.damaged(), 1);
+        replay.skip_to_volume(0).expect("skipped");
+        assert_eq!(all(&mut replay), expected);
+        assert_eq!(replay.damaged(), 1, "of the second round");
+    }
+}
+
+/// Of a volume without an intact frame nothing is shown: not the next one in its place.
+#[test]
+fn a_volume_whose_frames_are_all_damaged_is_refused() {
+    let folder = Folder::new("all-damaged");
+    let path = folder.join("sweep.frames");
+    written(&path, true);
+    let mut bytes = std::fs::read(&path).expect("read");
+    let record = 40 + 16 * 6 * 2 + 4;
+    let first = bytes.len() - (8 + 12 * 15 + 16) - 15 * record;
+    (5..10).for_each(|n| bytes[first + n * record + 100] ^= 4);
+    std::fs::write(&path, &bytes).expect("written");
+    let mut reader = Reader::open(&path).expect("opened");
+    for (volume, first) in [(0, Some(0)), (1, None), (2, Some(10))] {
+        let mut of = VolumeFrames::of(&mut reader, volume).expect("there");
+        let mut there = Vec::new();
+        while let Some(frame) = of.read().expect("read") {
+            there.push(frame);
+        }
+        let expected = frames().into_iter().map(|(frame, _)| frame).skip(first.unwrap_or(0)).take(5);
+        assert_eq!(there, if first.is_some() { expected.collect() } else { Vec::new() }, "volume {volume}");
+        assert_eq!(of.count().ok(), first.map(|_| 5));
+    }
+    let path = path.display().to_string();
+    for command in [&["render", "-o", "out.png"][..], &["convert", "out.nrrd"]] {
+        let output = folder.path(command[command.len() - 1]);
+        let (code, _, said) =
+            run(&[&[command[0], &path, "--volume", "1"][..], &command[1..command.len() - 1], &[&output]].concat());
+        assert!(code == Some(2) && said.contains("volume 1: all of its frames are damaged"), "{said}");
     }
 }
 

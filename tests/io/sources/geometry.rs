@@ -2,6 +2,7 @@
 
 use super::recordings::*;
 use echolume::Source;
+use echolume::low_level::probe::ProbeFile;
 const TABLE: &str = "[array]\nkind = 'linear'\n[lines]\nwidth_mm = 20\n[depth]\nend_mm = 3\n[motion]\nkind = 'translated'\n\
                      frame_positions_mm = [0, 1, 3]\nframes_per_volume = 3\nboth_ways = true\nspeed_ratio = 0.5\n";
 
@@ -59,6 +60,19 @@ fn the_range_of_the_probe_file_is_in_the_units_of_the_recording() {
         .write("probe.toml", format!("{}[samples]\nrange = [-100, 400]\n", TABLE.replace("frames_per_volume = 3", "")));
     let path = folder.write("r.mha", image("4 2 3", "MET_SHORT", "", &[0; 48]));
     assert_eq!(open(&path).range(), [32668.0, 33168.0]);
+}
+
+/// For the motor, too, which asks for it without opening the recording.
+#[test]
+fn a_packed_recording_has_the_probe_file_of_the_recording() {
+    let folder = Folder::new("packed-probe");
+    let [packed, shared, own] = ["sweep.mha.gz", "probe.toml", "sweep.probe.toml"].map(|name| folder.join(name));
+    assert_eq!(ProbeFile::find_for(&packed), None);
+    for file in [shared, own] {
+        std::fs::write(&file, "").expect("written");
+        assert_eq!(ProbeFile::find_for(&packed), Some(file));
+    }
+    assert_eq!(ProbeFile::find_for(&folder.join("sweep.mha")), ProbeFile::find_for(&packed));
 }
 
 /// The folder's probe.toml is for recordings that do not say where their samples lie. Kretz volumes and converted volumes do.
