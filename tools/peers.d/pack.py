@@ -20,7 +20,11 @@ RUN = """#!/usr/bin/env bash
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 site=${PEERS_SITE:-$here/site}
-[ -d "$site" ] || python3 -m pip install --quiet --no-index --no-deps --no-compile --target "$site" "$here"/wheels/*.whl
+if [ ! -d "$site" ]; then
+    rm -rf "$site.part"
+    python3 -m pip install --quiet --no-index --no-deps --no-compile --target "$site.part" "$here"/wheels/*.whl
+    mv "$site.part" "$site"
+fi
 export PYTHONPATH=$site PYTHONDONTWRITEBYTECODE=1
 out=${PEERS_OUT:-$here/out}
 mkdir -p "$out"

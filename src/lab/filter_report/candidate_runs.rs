@@ -9,7 +9,7 @@ use crate::picture::Region;
 use crate::scene::load::Layers;
 use crate::scene::{Input, Scene};
 use crate::source::phantom::{Phantom, PhantomOptions, PhantomSource, Speckle};
-use crate::source::{Source, StoredType};
+use crate::source::{Source, StoredType, VolumeFrames};
 use crate::thesis_tables::Spread;
 use std::sync::Arc;
 
@@ -142,18 +142,14 @@ impl Middle {
         let geometry = source.geometry(0);
         let samples = Input { stored: source.stored_type(), range: source.range() };
         let middle = geometry.slices() / 2;
-        source.skip_to_volume(0).map_err(|e| input(e.to_string()))?;
-        let mut bytes = None;
-        while let Some(frame) = source.next_frame().map_err(|e| input(e.to_string()))? {
-            if frame.volume > 0 {
-                break;
+        let mut frames = VolumeFrames::of(source, 0).map_err(|e| input(e.to_string()))?;
+        let bytes = loop {
+            match frames.read().map_err(|e| input(e.to_string()))? {
+                Some(frame) if frame.slice == middle => break frame.bytes,
+                Some(_) => {}
+                None => return Err(input(format!("has no frame {middle}"))),
             }
-            if frame.slice == middle {
-                bytes = Some(frame.bytes);
-                break;
-            }
-        }
-        let bytes = bytes.ok_or_else(|| input(format!("has no frame {middle}")))?;
+        };
         let scene_of = |more: &[String]| {
             let settings = settings(pixels, more).map_err(input)?;
             Scene::new(geometry.clone(), samples, settings).map_err(|e| input(e.to_string()))
