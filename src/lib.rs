@@ -177,7 +177,7 @@ pub use low_level::source::{Header, Recording, Source, open};
 pub mod low_level {
     #[cfg(feature = "verify")]
     pub use crate::batch;
-    pub use echolume_base::{baselines, files, metrics, picture, text};
+    pub use echolume_base::{baselines, files, metrics, picture, text, tree};
     pub use echolume_core::{
         barriers, dump, error_map, exact_ray, mesh, passes, plan, queues, reference, scene, spirv, stated_error,
     };

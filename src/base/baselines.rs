@@ -2,15 +2,14 @@
 
 use crate::files::read_text;
 use crate::text::escaped;
-use serde::de::DeserializeOwned;
-use serde::{Deserialize, Serialize};
+use crate::tree::{self, FromNode, Node, NodeError, ToNode};
 use std::collections::{HashMap, HashSet};
 use std::fmt::Display;
 use std::hash::Hash;
 use std::path::Path;
 
 /// A result that is stored as a JSON file. The field `format` of the file is the name and the version of the format.
-pub trait Stored: Serialize + DeserializeOwned {
+pub trait Stored: ToNode + FromNode {
     /// Content of the field `format` in files that are written: name and version of the format.
     const FORMAT: &'static str;
     /// Contents of the field `format` of earlier versions that can still be read.
@@ -47,7 +46,7 @@ pub trait Stored: Serialize + DeserializeOwned {
     /// One line: [`Stored::check`] refuses the result.
     fn to_json(&self) -> Result<String, String> {
         self.check()?;
-        serde_json::to_string_pretty(self).map(|text| text + "\n").map_err(|e| escaped(&e.to_string()))
+        tree::to_json_lines(self).map(|text| text + "\n").map_err(|e| escaped(&e.to_string()))
     }
 
     /// Reads a result from JSON text and checks it.
@@ -55,13 +54,14 @@ pub trait Stored: Serialize + DeserializeOwned {
     /// # Errors
     /// One line: the text is of another format, is not JSON of such a result, or [`Stored::check`] refuses it.
     fn from_json(text: &str) -> Result<Self, String> {
-        let json = |e: serde_json::Error| format!("not {}: {}", Self::WHAT, escaped(&e.to_string()));
-        let format = stated_format(text).map_err(json)?;
+        let json = |e: NodeError| format!("not {}: {}", Self::WHAT, escaped(&e.to_string()));
+        let mut node = Node::parse_json(text.as_bytes()).map_err(json)?;
+        let format = format_of(&mut node).map_err(json)?;
         if format != Self::FORMAT && !Self::EARLIER.contains(&format.as_str()) {
             let (found, reads, quote, again) = (escaped(&format), Self::FORMAT, Self::QUOTE, Self::AGAIN);
             return Err(format!("format is {quote}{found}{quote}, this program reads {quote}{reads}{quote}; {again}"));
         }
-        let mut result: Self = serde_json::from_str(text).map_err(json)?;
+        let mut result = Self::from_node(node).map_err(json)?;
         result.renew();
         result.check()?;
         Ok(result)
@@ -81,12 +81,13 @@ pub trait Stored: Serialize + DeserializeOwned {
 ///
 /// # Errors
 /// The text is not JSON, or is not a table with a field `format`.
-pub fn stated_format(text: &str) -> serde_json::Result<String> {
-    #[derive(Deserialize)]
-    struct Version {
-        format: String,
-    }
-    serde_json::from_str(text).map(|Version { format }| format)
+pub fn stated_format(text: &str) -> Result<String, NodeError> {
+    format_of(&mut Node::parse_json(text.as_bytes())?)
+}
+
+fn format_of(node: &mut Node) -> Result<String, NodeError> {
+    let format = node.at("format").ok_or_else(|| NodeError::missing("format", &None))?;
+    String::from_node(format.clone())
 }
 
 /// An entry of the old run and the matching entry of the new run. One of them is None if only the other run has the entry.

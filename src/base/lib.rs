@@ -1,9 +1,12 @@
 //! The code that every other member uses: bounded reading and atomic writing of files ([`files`]), the limit of the [`memory`] of a volume,
-//! pictures and films ([`picture`]), drawings and plots ([`canvas`]), digests ([`digest`]), lines of text ([`text`]), values of TOML from which types are
-//! deserialized ([`tree`]), output of commands ([`terminal`]), pages of HTML ([`html_page`]), metrics for Prometheus ([`metrics`]), and
+//! pictures and films ([`picture`]), drawings and plots ([`canvas`]), digests ([`digest`]), lines of text ([`text`]), values of TOML and JSON that types are
+//! read from and written as ([`tree`]), output of commands ([`terminal`]), pages of HTML ([`html_page`]), metrics for Prometheus ([`metrics`]), and
 //! results of earlier runs that new ones are compared with ([`baselines`]).
 
 #![forbid(unsafe_code)]
+
+// The derives of [`tree`] name this crate.
+extern crate self as echolume_base;
 
 pub mod baselines;
 pub mod canvas;

@@ -1,13 +1,13 @@
 //! Comparison of two pictures of one unit: bit for bit on the same device and driver, otherwise within the tolerance of `verify`.
 
 use crate::picture::Picture;
+use crate::tree::{FromNode, ToNode};
 use crate::verify::report::Figure;
 use crate::verify::{Findings, compare_picture};
-use serde::{Deserialize, Serialize};
 
 /// The device that drew a picture, and its driver.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, ToNode, FromNode)]
+#[tree(deny_unknown_fields)]
 pub struct Drawer {
     pub device: String,
     pub driver: String,
@@ -16,8 +16,8 @@ pub struct Drawer {
 }
 
 /// How far two pictures of one unit of a batch may differ.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ToNode, FromNode)]
+#[tree(rename_all = "kebab-case")]
 pub enum Class {
     /// They were drawn by the same device and driver, or by none: their bytes must be equal.
     SameDriver,
@@ -41,8 +41,8 @@ impl Class {
 }
 
 /// The comparison of a second picture of a unit with the stored one.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, ToNode, FromNode)]
+#[tree(deny_unknown_fields)]
 pub struct Agreement {
     pub class: Class,
     /// The device that drew the stored picture; None if none did.
@@ -51,10 +51,10 @@ pub struct Agreement {
     /// True if the difference is within what the class allows.
     pub agrees: bool,
     /// Errors between the two pictures, with their limits in `verify`; empty if the bytes are equal or the sizes differ.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[tree(default, skip_serializing_if = "Vec::is_empty")]
     pub figures: Vec<Figure>,
     /// One line that describes the difference; None if the pictures agree.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[tree(default, skip_serializing_if = "Option::is_none")]
     pub fault: Option<String>,
 }
 

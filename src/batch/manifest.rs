@@ -1,6 +1,6 @@
 //! The manifest: one unit of work a line, as JSON (NDJSON). Only the units of one shard are kept in memory.
 
-use serde::{Deserialize, Serialize};
+use crate::tree::{self, FromNode, ToNode};
 use serde_json::{Map, Value};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
@@ -15,29 +15,29 @@ const MAX_UNITS: usize = 1 << 27;
 const MAX_OUTPUTS: usize = 4;
 
 /// A unit of work, which is one line of the manifest: a recording and what is done with it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, ToNode, FromNode)]
+#[tree(deny_unknown_fields)]
 pub struct Unit {
     /// Path of the recording, absolute or relative to the manifest's folder.
     pub input: String,
     /// SHA-256 of the recording, 64 lower-case hexadecimal digits. None: the recording has to be read to compute the key of its outputs.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[tree(default, skip_serializing_if = "Option::is_none")]
     pub digest: Option<String>,
     /// Length of the recording's files, bytes; None if not given.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[tree(default, skip_serializing_if = "Option::is_none")]
     pub bytes: Option<u64>,
     /// Expected cost, relative to the other lines; 1 if not given.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[tree(default, skip_serializing_if = "Option::is_none")]
     pub cost: Option<f64>,
     /// Settings as in a scene file, with which the recording is rendered. Not allowed together with `command`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[tree(default, skip_serializing_if = "Option::is_none")]
     pub scene: Option<Map<String, Value>>,
     /// What is done: `render`, `convert`, `measure` or `verify` with its flags. None: `render`, with `scene` if that is given.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[tree(default, skip_serializing_if = "Option::is_none")]
     pub command: Option<Vec<String>>,
     /// File names of the outputs, without a folder. Every command makes one output, so that more names are an error when the command is parsed.
     /// Empty: a name by the kind of work, such as `picture.png`.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[tree(default, skip_serializing_if = "Vec::is_empty")]
     pub outputs: Vec<String>,
 }
 
@@ -49,7 +49,7 @@ pub struct Numbered {
 }
 
 /// The part of a line that the division into shards needs.
-#[derive(Deserialize)]
+#[derive(FromNode)]
 struct Cost {
     cost: Option<f64>,
 }
@@ -125,7 +125,7 @@ pub fn costs(file: &Path) -> Result<Vec<f64>, String> {
         if costs.len() >= MAX_UNITS {
             return Err(format!("a manifest has at most {MAX_UNITS} units; divide it"));
         }
-        let line: Cost = serde_json::from_str(text).map_err(|e| format!("is no unit: {e}"))?;
+        let line: Cost = tree::from_json(text.as_bytes()).map_err(|e| format!("is no unit: {e}"))?;
         costs.push(check_cost(line.cost)?);
         Ok(())
     })?;
@@ -144,7 +144,7 @@ pub fn units(file: &Path, is_chosen: impl Fn(usize) -> bool) -> Result<Vec<Numbe
     for_each_line(file, |line, text| {
         place += 1;
         if is_chosen(place - 1) {
-            let unit: Unit = serde_json::from_str(text).map_err(|e| format!("is no unit: {e}"))?;
+            let unit: Unit = tree::from_json(text.as_bytes()).map_err(|e| format!("is no unit: {e}"))?;
             check_cost(unit.cost)?;
             unit.check()?;
             units.push(Numbered { line, unit: Arc::new(unit) });
@@ -161,7 +161,7 @@ pub fn units(file: &Path, is_chosen: impl Fn(usize) -> bool) -> Result<Vec<Numbe
 /// One line that names the file and the fault, and the line if one is wrong.
 pub fn for_each_unit(file: &Path, mut each: impl FnMut(&Unit)) -> Result<(), String> {
     for_each_line(file, |_, text| {
-        each(&serde_json::from_str(text).map_err(|e| format!("is no unit: {e}"))?);
+        each(&tree::from_json(text.as_bytes()).map_err(|e| format!("is no unit: {e}"))?);
         Ok(())
     })
 }

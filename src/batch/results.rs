@@ -5,8 +5,8 @@ use super::shard::Shard;
 use super::unit::Key;
 use crate::digest::sha256_of_file;
 use crate::terminal::remark;
+use crate::tree::{self, FromNode, ToNode};
 use crate::{files, machine};
-use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::collections::{HashMap, HashSet};
 use std::fs::{self, File, OpenOptions};
@@ -21,8 +21,8 @@ pub const FORMAT: &str = "echolume-batch-1";
 const MAX_LINE: u64 = 1 << 20;
 
 /// How an attempt to do a unit ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ToNode, FromNode)]
+#[tree(rename_all = "lowercase")]
 pub enum Status {
     Done,
     /// The recording or the command is wrong, so that another attempt would fail, too.
@@ -34,8 +34,8 @@ pub enum Status {
 }
 
 /// Wall-clock time that a unit took in each stage, s.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, ToNode, FromNode)]
+#[tree(deny_unknown_fields)]
 pub struct Seconds {
     /// Time for reading the recording, on the thread that reads ahead, s.
     pub read: f64,
@@ -48,8 +48,8 @@ pub struct Seconds {
 }
 
 /// An output file of a unit, with its length and digest.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, Eq, ToNode, FromNode)]
+#[tree(deny_unknown_fields)]
 pub struct OutputFile {
     /// Path of the file relative to the batch's folder.
     pub file: String,
@@ -58,8 +58,8 @@ pub struct OutputFile {
 }
 
 /// The result of one attempt to do a unit.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, ToNode, FromNode)]
+#[tree(deny_unknown_fields)]
 pub struct Record {
     /// Name and version of the format; [`FORMAT`] if this version of the program wrote it.
     pub format: String,
@@ -71,22 +71,22 @@ pub struct Record {
     /// The command or the scene of the unit, as text.
     pub work: String,
     pub status: Status,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[tree(default, skip_serializing_if = "Option::is_none")]
     pub error: Option<String>,
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[tree(default, skip_serializing_if = "Vec::is_empty")]
     pub outputs: Vec<OutputFile>,
     pub seconds: Seconds,
     /// The device that was open when the attempt ended; None if the work needs none, or none was open.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[tree(default, skip_serializing_if = "Option::is_none")]
     pub drawer: Option<Drawer>,
     pub program: String,
     pub host: String,
     /// Date and time of the end of the attempt, RFC 3339.
     pub date: String,
-    #[serde(default, skip_serializing_if = "Map::is_empty")]
+    #[tree(default, skip_serializing_if = "Map::is_empty")]
     pub figures: Map<String, Value>,
     /// The comparison with the stored picture; None unless a finished unit was drawn again for it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[tree(default, skip_serializing_if = "Option::is_none")]
     pub agreement: Option<Agreement>,
 }
 
@@ -120,7 +120,7 @@ impl Verified {
 /// digest.
 pub(super) fn read_record(folder: &Path, key: &Key, verified: Option<&Verified>) -> Option<Record> {
     let bytes = files::read(&folder.join(key.record()), MAX_LINE, "record").ok()?;
-    let record: Record = serde_json::from_slice(&bytes).ok()?;
+    let record: Record = tree::from_json(&bytes).ok()?;
     let is_there = |output: &OutputFile| {
         fs::metadata(folder.join(&output.file)).is_ok_and(|there| there.is_file() && there.len() == output.bytes)
     };
@@ -251,9 +251,8 @@ impl Results {
     /// One line that names the file that cannot be written.
     pub fn add(&mut self, record: &Record) -> Result<(), String> {
         let fault = |e: &dyn std::fmt::Display| format!("{}: cannot be written: {e}", self.path.display());
-        let mut line = serde_json::to_vec(record).map_err(|e| fault(&e))?;
-        line.push(b'\n');
-        self.file.write_all(&line).map_err(|e| fault(&e))?;
+        let line = tree::to_json(record).map_err(|e| fault(&e))? + "\n";
+        self.file.write_all(line.as_bytes()).map_err(|e| fault(&e))?;
         if record.status == Status::Done {
             self.earlier.done.insert((record.key.clone(), record.input.clone()));
         }
@@ -288,7 +287,7 @@ fn for_each_record(path: &Path, mut each: impl FnMut(Record)) -> Result<usize, S
         if line.trim_ascii().is_empty() {
             continue;
         }
-        match serde_json::from_slice::<Record>(&line) {
+        match tree::from_json::<Record>(&line) {
             Ok(record) if record.format == FORMAT => each(record),
             _ => torn += 1,
         }

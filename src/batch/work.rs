@@ -14,6 +14,7 @@ use crate::gpu::GpuError;
 use crate::machine;
 use crate::picture::Picture;
 use crate::terminal::{Failure, failed, input, say};
+use crate::tree;
 use serde_json::{Map, Value, json};
 use std::collections::HashMap;
 use std::fs;
@@ -241,9 +242,8 @@ impl Job<'_> {
 /// Writes the record of a unit, which marks it as done. Its outputs must have been written.
 fn commit(folder: &Path, key: Option<&Key>, record: &Record) -> Result<(), String> {
     let Some(key) = key else { return Ok(()) };
-    let mut text = serde_json::to_vec_pretty(record).map_err(|e| e.to_string())?;
-    text.push(b'\n');
-    replace(&folder.join(key.record()), &text)
+    let text = tree::to_json_lines(record).map_err(|e| e.to_string())? + "\n";
+    replace(&folder.join(key.record()), text.as_bytes())
 }
 
 struct Worker<'a> {

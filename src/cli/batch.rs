@@ -12,6 +12,7 @@ use crate::files::replace;
 use crate::files::signals::{self, Held};
 use crate::gpu::{Deadline, DeviceChoice};
 use crate::terminal::{Failure, failed, input, remark, say};
+use crate::tree;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -106,7 +107,7 @@ impl Batch {
             match make::unit(recording, &self.command)? {
                 Found::Unit(unit) => {
                     cost += unit.cost.unwrap_or(1.0);
-                    text += &serde_json::to_string(&unit).map_err(failed)?;
+                    text += &tree::to_json(&unit).map_err(failed)?;
                     text.push('\n');
                     units += 1;
                 }

@@ -10,6 +10,7 @@ use crate::profile::pipelines::{PipelineProfile, measure};
 use crate::scene::Scene;
 use crate::scene::variants;
 use crate::terminal::{Failure, failed, input, remark, say};
+use crate::tree;
 use std::path::{Path, PathBuf};
 
 /// The options of `profile --pipelines`.
@@ -64,7 +65,7 @@ impl Request<'_> {
         let compared = compare(old, new, self.force).map_err(input)?;
         say!("{}", comparison_table(&compared).trim_end());
         if let (Some(file), [_, _]) = (self.json, self.compare) {
-            write_report(file, &serde_json::to_string_pretty(&compared).map_err(failed)?)?;
+            write_report(file, &tree::to_json_lines(&compared).map_err(failed)?)?;
         }
         let worse = compared.worse();
         match worse.first() {

@@ -9,6 +9,7 @@ use crate::profile as model;
 use crate::profile::timed_run;
 use crate::profile::{compare, export};
 use crate::terminal::{Failure, failed, input, say};
+use crate::tree;
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
@@ -180,7 +181,7 @@ impl Profile {
     fn judge(&self, compared: &compare::Comparison) -> Result<(), Failure> {
         say!("{}", export::comparison_table(compared).trim_end());
         if let Some(file) = &self.json {
-            let text = serde_json::to_string_pretty(compared).map_err(failed)?;
+            let text = tree::to_json_lines(compared).map_err(failed)?;
             replace_shared(file, text.as_bytes()).map_err(failed)?;
         }
         let slower: Vec<&str> = compared.regressions().map(|l| l.name.as_str()).collect();

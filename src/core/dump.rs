@@ -5,6 +5,7 @@ use crate::passes::{Slot, Texels, is_hit};
 use crate::picture::Picture;
 use crate::probe::Geometry;
 use crate::scene::Scene;
+use crate::tree::ToNode;
 use glam::DVec3;
 use serde_json::{Value, json};
 
@@ -178,8 +179,8 @@ pub fn scene_description(scene: &Scene) -> Value {
         "format": FORMAT,
         "space": "mm; x lateral, y depth, z elevation; y is 0 at the apex of a curved array and at the face of a linear one",
         "geometry": match &scene.geometry {
-            Geometry::Sweep(probe) => json!({"sweep": probe}),
-            Geometry::Cartesian(grid) => json!({"cartesian": grid}),
+            Geometry::Sweep(probe) => json!({"sweep": probe.to_node()}),
+            Geometry::Cartesian(grid) => json!({"cartesian": grid.to_node()}),
         },
         "slice_pixels": {"origin_mm": scene.grid.origin, "pitch_mm": scene.grid.pitch, "columns_rows": scene.grid.size},
         "box": {"low_mm": at(scene.low), "high_mm": at(scene.high)},
@@ -191,7 +192,7 @@ pub fn scene_description(scene: &Scene) -> Value {
         },
         "step_mm": scene.step,
         "detector": {"step_mm": scene.ring.step, "samples_of_an_edge": scene.ring.half},
-        "settings": scene.settings,
+        "settings": scene.settings.to_node(),
     })
 }
 

@@ -1,14 +1,14 @@
 //! Description of the machine for reports: device, driver, clocks, program, date, and CPU time of the process.
 
 use crate::Context;
-use serde::{Deserialize, Serialize};
+use crate::tree::{FromNode, ToNode};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::SystemTime;
 
 /// A Vulkan device as reports describe it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, ToNode, FromNode)]
+#[tree(deny_unknown_fields)]
 pub struct Device {
     pub name: String,
     pub driver: String,

@@ -9,7 +9,7 @@ pub mod filter_report;
 pub mod profile;
 pub mod thesis_tables;
 
-use echolume_base::{baselines, canvas, picture, statistics, text};
+use echolume_base::{baselines, canvas, picture, statistics, text, tree};
 use echolume_core::{error_map, exact_ray, passes, plan, reference, scene};
 use echolume_gpu::{self as gpu, machine};
 use {echolume_probe as probe, echolume_source as source};

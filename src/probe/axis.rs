@@ -1,12 +1,12 @@
 //! Positions of the scan lines of a frame, or of the slices of a sweep, along their axis.
 
-use serde::{Deserialize, Serialize};
+use crate::tree::{FromNode, ToNode};
 
 /// Strictly increasing positions along an axis, one for each index: angles in rad or lengths in mm.
 ///
 /// The inverse of a uniform axis is `(v - first) / pitch`. A table of positions, as Kretz files have it, is inverted by bracketing and linear
 /// interpolation.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, ToNode, FromNode)]
 pub enum Axis {
     /// Uniformly spaced: `first + pitch * index`.
     Even { first: f64, pitch: f64, count: usize },

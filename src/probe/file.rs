@@ -6,8 +6,7 @@ use super::axis::Axis;
 use super::geometry::{Advance, Array, Firing, GeometryError, Motion, Probe, Volumes};
 use super::motor::MotorTable;
 use crate::files::{self, InputError};
-use crate::tree;
-use serde::Deserialize;
+use crate::tree::{self, FromNode, Node};
 use std::path::{Path, PathBuf};
 
 /// Largest size of a probe file, bytes.
@@ -37,7 +36,7 @@ impl ProbeFile {
     }
 
     pub(super) fn parse(path: &Path, text: &str) -> Result<ProbeFile, InputError> {
-        let tables = tree::from_text::<Tables>(text).map_err(|e| {
+        let tables = tree::from_toml::<Tables>(text).map_err(|e| {
             let before = e.span().and_then(|s| text.get(..s.start)).unwrap_or("");
             let line = before.matches('\n').count() + 1;
             InputError::new(path, format!("line {line}"), e.message().trim().replace('\n', ", "))
@@ -45,14 +44,14 @@ impl ProbeFile {
         ProbeFile { path: path.into(), tables, interval: None }.checked()
     }
 
-    /// Makes a probe file of its tables, given as a JSON object, and checks it as [`ProbeFile::read`] does. `path` is only the name of their origin
+    /// Makes a probe file of its tables, and checks it as [`ProbeFile::read`] does. `path` is only the name of their origin
     /// in messages; nothing is read from there.
     ///
     /// # Errors
     /// A key is unknown, missing or inapplicable, or excludes another. A value has another type or is out of its range. The error is one line that
     /// names `path`.
-    pub fn from_json(path: &Path, tables: serde_json::Value) -> Result<ProbeFile, InputError> {
-        let tables = serde_json::from_value(tables).map_err(|e| InputError::new(path, "probe", e.to_string()))?;
+    pub fn from_tables(path: &Path, tables: Node) -> Result<ProbeFile, InputError> {
+        let tables = Tables::from_node(tables).map_err(|e| InputError::new(path, "probe", e.to_string()))?;
         ProbeFile { path: path.into(), tables, interval: None }.checked()
     }
 
@@ -74,7 +73,7 @@ impl ProbeFile {
         own.into_iter().chain([recording.with_file_name("probe.toml")]).find(|p| p.is_file())
     }
 
-    /// Path of the file that was read, or of the origin that [`ProbeFile::from_json`] was given.
+    /// Path of the file that was read, or of the origin that [`ProbeFile::from_tables`] was given.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -343,49 +342,49 @@ fn spread(span: f64, count: usize) -> Axis {
 }
 
 /// The tables of a probe file, one struct each. Unknown keys are errors, so that a misspelt key is not silently ignored.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, FromNode)]
+#[tree(deny_unknown_fields)]
 struct Tables {
     array: ArrayTable,
     lines: LinesTable,
     depth: DepthTable,
     motion: MotionTable,
-    #[serde(default)]
+    #[tree(default)]
     sound: SoundTable,
-    #[serde(default)]
+    #[tree(default)]
     samples: SamplesTable,
     motor: Option<MotorTable>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, FromNode)]
+#[tree(rename_all = "lowercase")]
 enum ArrayKind {
     Curved,
     Linear,
 }
 
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, FromNode)]
+#[tree(deny_unknown_fields)]
 struct ArrayTable {
     kind: ArrayKind,
     radius_mm: Option<f64>,
 }
 
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, FromNode)]
+#[tree(deny_unknown_fields)]
 struct LinesTable {
     sector_angle_deg: Option<f64>,
     width_mm: Option<f64>,
     angles_deg: Option<Vec<f64>>,
     positions_mm: Option<Vec<f64>>,
-    #[serde(default)]
+    #[tree(default)]
     firing: Firing,
 }
 
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, FromNode)]
+#[tree(deny_unknown_fields)]
 struct DepthTable {
-    #[serde(default)]
+    #[tree(default)]
     start_mm: f64,
     /// Distance between samples.
     sample_pitch_mm: Option<f64>,
@@ -393,24 +392,24 @@ struct DepthTable {
     end_mm: Option<f64>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, FromNode)]
+#[tree(rename_all = "lowercase")]
 enum MotionKind {
     Fan,
     Translated,
     Still,
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode)]
+#[tree(rename_all = "lowercase")]
 enum Direction {
     #[default]
     Forward,
     Backward,
 }
 
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, FromNode)]
+#[tree(deny_unknown_fields)]
 struct MotionTable {
     kind: MotionKind,
     wobble_radius_mm: Option<f64>,
@@ -420,19 +419,19 @@ struct MotionTable {
     frame_positions_mm: Option<Vec<f64>>,
     thickness_mm: Option<f64>,
     /// 0: all frames of the recording are one volume.
-    #[serde(default)]
+    #[tree(default)]
     frames_per_volume: usize,
     /// Every second volume was swept backwards.
-    #[serde(default)]
+    #[tree(default)]
     both_ways: bool,
-    #[serde(default)]
+    #[tree(default)]
     first_direction: Direction,
     speed_ratio: Option<f64>,
     /// Speed of the motor, from which the ratio follows, in the unit of the motion.
     motor_deg_per_s: Option<f64>,
     motor_mm_per_s: Option<f64>,
     /// The motor never stops between frames: the ratio follows from their time stamps.
-    #[serde(default)]
+    #[tree(default)]
     steady: bool,
 }
 
@@ -444,8 +443,8 @@ impl MotionTable {
     }
 }
 
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, FromNode)]
+#[tree(deny_unknown_fields)]
 struct SoundTable {
     speed_m_per_s: f64,
 }
@@ -456,8 +455,8 @@ impl Default for SoundTable {
     }
 }
 
-#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, Default, PartialEq, FromNode)]
+#[tree(deny_unknown_fields)]
 struct SamplesTable {
     range: Option<[f64; 2]>,
 }

@@ -6,12 +6,12 @@
 //! [`Volumes`] is how the frames of a recording make up volumes, and in which direction each was swept.
 
 use super::axis::{Axis, interpolated};
+use crate::tree::{FromNode, ToNode};
 use glam::DVec3;
-use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
 /// Shape of the transducer array.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, ToNode, FromNode)]
 pub enum Array {
     /// Elements on an arc of `radius` mm (Ra, from the apex to the face); radius 0 is a phased array. Positions of scan lines are angles in rad.
     Curved { radius: f64 },
@@ -20,7 +20,7 @@ pub enum Array {
 }
 
 /// How the array moves from frame to frame.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, ToNode, FromNode)]
 pub enum Motion {
     /// The array rotates about an axis `wobble_radius` mm (Rw) behind its face. Positions of slices are angles in rad.
     Fan { wobble_radius: f64 },
@@ -32,7 +32,7 @@ pub enum Motion {
 
 /// Change of a slice's position while its frame is acquired line by line, in the unit of the slice axis (rad or mm). Line n of L lines is at the
 /// slice's position + advance n / L. The advance is negative if the position falls from line to line, whatever the order in time.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, ToNode, FromNode)]
 pub enum Advance {
     /// The motor stops for each frame.
     None,
@@ -43,7 +43,7 @@ pub enum Advance {
 }
 
 /// A swept probe: its geometry determines the position of each sample in space.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, ToNode, FromNode)]
 pub struct Probe {
     pub array: Array,
     /// Position of each scan line: rad (curved array) or mm (linear array).
@@ -437,8 +437,8 @@ pub struct Volumes {
 }
 
 /// Order in which the lines of a frame fire.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode)]
+#[tree(rename_all = "lowercase")]
 pub enum Firing {
     /// From line 0.
     #[default]

@@ -2,13 +2,13 @@
 
 use super::axis::Axis;
 use super::geometry::{Advance, GeometryError, Probe};
-use serde::{Deserialize, Serialize};
+use crate::tree::{FromNode, ToNode};
 
 /// Largest coordinate and spacing, mm. Its square is finite in f32, which the GPU computes in.
 const MAX_LENGTH: f64 = 1e6;
 
 /// Voxels on an axis-aligned Cartesian grid, as in a volume that was scan-converted elsewhere.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, ToNode, FromNode)]
 pub struct Grid {
     /// Number of voxels along x (lateral, fastest), y (depth) and z (elevation). A frame is one slice of constant z.
     pub size: [usize; 3],
@@ -42,7 +42,7 @@ impl Grid {
 }
 
 /// The positions of the samples of a volume.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, ToNode, FromNode)]
 pub enum Geometry {
     /// Polar frames of a probe.
     Sweep(Probe),

@@ -1,6 +1,6 @@
 //! The number types of samples.
 
-use serde::{Deserialize, Serialize};
+use crate::tree::{FromNode, ToNode};
 use std::fmt;
 
 /// Number type of the samples in an input file.
@@ -13,7 +13,7 @@ pub enum SampleType {
 }
 
 /// Number type of the samples in the memory of a [`Frame`](super::Frame).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ToNode, FromNode)]
 pub enum StoredType {
     U8,
     U16,

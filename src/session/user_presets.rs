@@ -4,7 +4,7 @@ use crate::files;
 use crate::scene::Settings;
 use crate::scene::load::{PRESETS, line_of};
 use crate::text::printable;
-use serde::{Deserialize, Serialize};
+use crate::tree::{self, FromNode, ToNode};
 use std::path::Path;
 use toml::Table;
 
@@ -18,19 +18,19 @@ pub const MAX_PRESETS: usize = 32;
 pub const MAX_NAME: usize = 40;
 
 /// A preset that a user saved: a name, and the settings of a look.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields)]
 pub struct UserPreset {
     pub name: String,
     /// Settings of a scene file. They are read when they are used: one preset of another version leaves the others usable.
     settings: Table,
 }
 
-#[derive(Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
+#[derive(FromNode, ToNode)]
+#[tree(deny_unknown_fields)]
 struct Kept {
     version: u32,
-    #[serde(default)]
+    #[tree(default)]
     preset: Vec<UserPreset>,
 }
 
@@ -88,7 +88,7 @@ pub fn read(file: &Path) -> Result<Vec<UserPreset>, String> {
         return Ok(Vec::new());
     }
     let text = files::read_text(file, MAX_BYTES, "list of presets").map_err(|e| fault(&e))?;
-    let kept: Kept = crate::tree::from_text(&text).map_err(|e| {
+    let kept: Kept = tree::from_toml(&text).map_err(|e| {
         let line = e.span().map_or(String::new(), |span| format!("line {}: ", line_of(&text, span.start)));
         fault(&format!("{line}{}", e.message()))
     })?;
@@ -118,7 +118,7 @@ pub fn write(file: &Path, presets: &[UserPreset]) -> Result<(), String> {
         return Err(format!("{MAX_PRESETS} presets are kept: delete one first"));
     }
     let kept = Kept { version: VERSION, preset: presets.to_vec() };
-    let text = toml::to_string(&kept).map_err(|e| format!("presets cannot be written: {e}"))?;
+    let text = tree::to_toml(&kept).map_err(|e| format!("presets cannot be written: {e}"))?;
     let text = format!("# Presets that were saved in `echolume view`; `--preset NAME` takes them too.\n{text}");
     if let Some(folder) = file.parent() {
         std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;

@@ -5,8 +5,7 @@ use crate::files;
 use crate::scene::Settings;
 use crate::scene::load::Layers;
 use crate::text::printable;
-use crate::tree::Node;
-use serde::{Deserialize, Serialize};
+use crate::tree::{FromNode, Node, ToNode};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
@@ -23,27 +22,27 @@ pub const PHANTOM: &str = "phantom";
 const HEAD: u64 = 4096;
 
 /// Which recording and which of its volumes a workspace shows, with the flags of its geometry.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, Default, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields)]
 pub struct Origin {
     version: u32,
     /// Path of the recording, or [`PHANTOM`]. None: the volumes were live and are in no file.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[tree(default, skip_serializing_if = "Option::is_none")]
     pub recording: Option<PathBuf>,
     /// Index of the volume that was shown, from 0.
-    #[serde(default)]
+    #[tree(default)]
     pub volume: usize,
     /// Path of the segmentation that is shown with the recording; None if none is.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[tree(default, skip_serializing_if = "Option::is_none")]
     pub labels: Option<PathBuf>,
     /// Path of the probe file that was given with `--probe`; None if it was not given.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[tree(default, skip_serializing_if = "Option::is_none")]
     pub probe: Option<PathBuf>,
     /// Value of `--depth-axis`, such as `-z`; None if it was not given.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[tree(default, skip_serializing_if = "Option::is_none")]
     pub depth_axis: Option<String>,
     /// Value of `--voxel-spacing`: distance of columns, rows and pictures, mm; None if it was not given.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[tree(default, skip_serializing_if = "Option::is_none")]
     pub voxel_spacing: Option<[f64; 3]>,
 }
 
@@ -103,7 +102,7 @@ impl Workspace {
             return Err(fault("has no table [workspace]: a file of settings alone is given with --scene"));
         };
         let mut origin =
-            Origin::deserialize(Node::from(origin)).map_err(|e| fault(&format!("[workspace]: {}", e.message())))?;
+            Origin::from_node(Node::from(origin)).map_err(|e| fault(&format!("[workspace]: {}", e.message())))?;
         if origin.version != VERSION {
             let version = origin.version;
             return Err(fault(&format!("[workspace] is of version {version}, this program reads version {VERSION}")));
@@ -152,7 +151,7 @@ fn belong_to(table: &mut Table, volume: usize) {
 /// One line: the settings cannot be written as TOML, or the text would be longer than 4 MiB.
 pub fn text(settings: &Settings, origin: &Origin) -> Result<String, String> {
     let fault = |e: &dyn std::fmt::Display| format!("a workspace cannot be written: {e}");
-    let head = Table::from_iter([(TABLE.to_string(), Value::try_from(origin).map_err(|e| fault(&e))?)]);
+    let head = Table::from_iter([(TABLE.to_string(), origin.to_node().into_toml().map_err(|e| fault(&e))?)]);
     let (head, settings) = (toml::to_string(&head), settings.to_toml());
     let (head, settings) = (head.map_err(|e| fault(&e))?, settings.map_err(|e| fault(&e))?);
     // The settings begin with values that belong to no table, which the table follows.

@@ -3,8 +3,8 @@
 use crate::files::InputError;
 use crate::memory;
 pub use crate::probe::{Advance, Frame, Geometry, SampleType, StoredType, World, is_rigid};
+use crate::tree::{FromNode, ToNode};
 use glam::{DAffine3, DMat4, DVec3};
-use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -30,8 +30,8 @@ fn memory_fault(geometry: &Geometry, stored: StoredType) -> Option<String> {
 }
 
 /// The properties that all frames of a file or of a live source have in common.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, ToNode, FromNode)]
+#[tree(deny_unknown_fields)]
 pub struct Header {
     /// Geometry of a volume that is swept forwards.
     pub forward: Geometry,
@@ -41,10 +41,10 @@ pub struct Header {
     /// Stored values that are displayed as 0 and 1; both finite, the second larger than the first.
     pub range: [f64; 2],
     /// True if frames may have poses.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    #[tree(default, skip_serializing_if = "std::ops::Not::not")]
     pub posed: bool,
     /// True if the frames are of the phantom, not of a patient.
-    #[serde(skip)]
+    #[tree(skip)]
     pub synthetic: bool,
 }
 

@@ -32,8 +32,8 @@ use crate::Frame;
 use crate::SampleType;
 use crate::files::InputError;
 use crate::probe::{Geometry, Grid, ProbeFile, Volumes};
+use crate::tree::{FromNode, Node};
 use glam::DAffine3;
-use serde::Deserialize;
 use std::collections::VecDeque;
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::Path;
@@ -110,42 +110,42 @@ const VERSIONS: [u64; 3] = [1, 2, 3];
 /// Margin of a freehand volume around its first pictures, mm: more come.
 const MARGIN: f64 = 20.0;
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(FromNode)]
+#[tree(deny_unknown_fields)]
 struct Keys {
-    #[serde(rename = "echolume")]
+    #[tree(rename = "echolume")]
     version: u64,
     samples: Option<usize>,
     lines: Option<usize>,
     frames: Option<usize>,
-    #[serde(rename = "type")]
+    #[tree(rename = "type")]
     sample: Sample,
     range: Option<[f64; 2]>,
     both_ways: Option<bool>,
     speed_ratio: Option<f64>,
-    #[serde(default)]
+    #[tree(default)]
     stamped: bool,
-    #[serde(default)]
+    #[tree(default)]
     posed: bool,
     lines_at_once: Option<usize>,
-    probe: Option<serde_json::Value>,
+    probe: Option<Node>,
     cartesian: Option<Lattice>,
 }
 
-#[derive(Clone, Copy, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, FromNode)]
+#[tree(rename_all = "lowercase")]
 enum Sample {
     U8,
     U16,
     F32,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(FromNode)]
+#[tree(deny_unknown_fields)]
 struct Lattice {
     size: [usize; 3],
     spacing: [f64; 3],
-    #[serde(default)]
+    #[tree(default)]
     origin: [f64; 3],
 }
 
@@ -180,18 +180,17 @@ impl StreamHeader {
     /// # Errors
     /// The line is not a header, or its frames are too large, without a geometry, or without a range of values. Nothing is allocated for them.
     pub fn parse(line: &[u8], probe: Option<ProbeFile>) -> Result<StreamHeader, InputError> {
-        let no_json = |e: serde_json::Error| InputError::new(Path::new(NAME), "header", e.to_string());
-        let value: serde_json::Value = serde_json::from_slice(line).map_err(|e| {
+        let mut node = Node::parse_json(line).map_err(|e| {
             let fault = format!("is no line of JSON ({e}); a stream begins as that of tools/pipe_frames.py");
             InputError::new(Path::new(NAME), "header", fault)
         })?;
         // Checked before the keys: another version may have other keys.
-        match value.get("echolume").map(serde_json::Value::as_u64) {
+        match node.at("echolume").map(|version| version.as_u64()) {
             Some(Some(version)) if VERSIONS.contains(&version) => {}
             Some(_) => return fault("echolume", "must be 1, 2 or 3, the versions that this program reads"),
             None => return fault("header", "has no key \"echolume\": this is no stream of frames"),
         }
-        let keys: Keys = serde_json::from_slice(line).map_err(no_json)?;
+        let keys = Keys::from_node(node).map_err(|e| InputError::new(Path::new(NAME), "header", e.to_string()))?;
         if keys.posed && keys.version < 2 {
             return fault("posed", "needs version 2: \"echolume\": 2");
         }
@@ -214,7 +213,7 @@ impl StreamHeader {
                 (geometry.clone(), geometry, Volumes { both_ways, ..Volumes::forward(size[2], 1) }, None)
             }
             None => {
-                let of_stream = keys.probe.map(|tables| ProbeFile::from_json(Path::new(NAME), tables)).transpose()?;
+                let of_stream = keys.probe.map(|tables| ProbeFile::from_tables(Path::new(NAME), tables)).transpose()?;
                 let Some(file) = probe.or(of_stream) else {
                     return fault(
                         "probe",

@@ -26,6 +26,7 @@ use crate::files::progress::CountedFile;
 use crate::files::{InputError, private, progress};
 use crate::frame::check_volume;
 use crate::probe::{Geometry, World};
+use crate::tree;
 use crate::{SampleType, StoredType};
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
 use glam::{DAffine3, DQuat};
@@ -74,7 +75,7 @@ impl Writer {
     /// The header is not valid, or the file exists or cannot be created.
     pub fn create(path: &Path, header: Header) -> Result<Writer, InputError> {
         header.check().map_err(|(field, fault)| InputError::new(path, field, fault))?;
-        let text = serde_json::to_vec(&header).map_err(|e| InputError::new(path, "header", e.to_string()))?;
+        let text = tree::to_json(&header).map_err(|e| InputError::new(path, "header", e.to_string()))?;
         if text.len() > MAX_HEADER_BYTES as usize {
             return Err(InputError::new(
                 path,
@@ -89,7 +90,7 @@ impl Writer {
         start.extend(MAGIC);
         start.extend(VERSION.to_le_bytes());
         start.extend((text.len() as u32).to_le_bytes());
-        start.extend(text);
+        start.extend(text.as_bytes());
         start.extend(CRC.checksum(&start).to_le_bytes());
         let mut writer =
             Writer { path: path.into(), file, header, index: Vec::new(), at: 0, frame: start, torn: false };
@@ -261,7 +262,7 @@ impl Reader {
         if digest.finalize().to_le_bytes() != sum {
             return Err(fault("header", "its checksum is wrong".into()));
         }
-        let header: Header = serde_json::from_slice(text).map_err(|e| fault("header", e.to_string()))?;
+        let header: Header = tree::from_json(text).map_err(|e| fault("header", e.to_string()))?;
         header.check().map_err(|(field, wrong)| fault(field, wrong))?;
         let mut replay = Reader {
             path: path.into(),

@@ -9,8 +9,7 @@ use super::transforms::Poses;
 use super::{OpenOptions, describe};
 use crate::files::{self, InputError, escaped, progress, quoted};
 use crate::probe::{AxisOrder, Grid, World};
-use crate::tree;
-use serde::Deserialize;
+use crate::tree::{self, FromNode};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -126,14 +125,14 @@ pub(super) fn read(path: &Path, options: &OpenOptions) -> Result<Layout, InputEr
 }
 
 /// A probe file of a stack of slices: nothing but their spacing.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(FromNode)]
+#[tree(deny_unknown_fields)]
 struct StackFile {
     voxels: Voxels,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(FromNode)]
+#[tree(deny_unknown_fields)]
 struct Voxels {
     spacing_mm: [f64; 3],
 }
@@ -146,7 +145,7 @@ fn stated_spacing(file: &Path) -> Result<Option<[f64; 3]>, InputError> {
         // What is wrong with it is said by its own reader.
         return Ok(None);
     }
-    let read = tree::from_text::<StackFile>(&text);
+    let read = tree::from_toml::<StackFile>(&text);
     let read = read.map_err(|e| InputError::new(file, "voxels", e.message().trim().replace('\n', ", ")))?;
     Ok(Some(read.voxels.spacing_mm))
 }

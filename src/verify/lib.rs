@@ -33,7 +33,7 @@ pub mod time_stamps;
 
 pub use compare::{Comparison, ExtraTolerance, compare_outputs, compare_picture, expect_same_picture};
 
-use echolume_base::{baselines, files, html_page, metrics, picture, terminal, text};
+use echolume_base::{baselines, files, html_page, metrics, picture, terminal, text, tree};
 use echolume_core::{passes, plan, queues, reference, scene, spirv};
 use echolume_gpu::{self as gpu, machine};
 use echolume_lab::profile;

@@ -8,6 +8,7 @@ use echolume::low_level::passes::chain::distance_end;
 use echolume::low_level::passes::{Slot, Texels, is_hit};
 use echolume::low_level::scene::{Input, Scene};
 use echolume::low_level::source::Recording;
+use echolume::low_level::tree::{FromNode, ToNode};
 use glam::{DVec2, DVec3};
 
 /// Viewed from the probe along parallel rays, below the uterine wall (3 .. 15 mm). The same holds with any one of these
@@ -132,7 +133,7 @@ fn the_wobblers_head_is_found_where_it_was_simulated_and_not_mirrored() {
         let mut recording = Recording::open(&data("wobbler-4dc7/sweep.mha"), None).expect("recording");
         let input = Input { stored: recording.stored_type(), range: recording.range() };
         let mut settings = settings(SETTINGS);
-        settings.surface.detector = toml::Value::from(detector).try_into().expect("a detector");
+        settings.surface.detector = FromNode::from_node(detector.to_node()).expect("a detector");
         let scene = Scene::new(recording.geometry(0), input, settings).expect("scene");
         let mut renderer = Renderer::new(&device, scene.clone(), &RendererOptions::default()).expect("renderer");
         while let Some(frame) = recording.next_frame().expect("frame") {

@@ -174,7 +174,7 @@ fn a_rotating_view_reruns_the_picture_and_not_the_frames() {
         assert!(of("scan_convert").is_none_or(|p| p.runs_per_picture == 0), "{mode}");
         assert_eq!(profile.turn, 170.0);
         // The requested camera, not the rotated one.
-        assert_eq!(profile.scene, toml::to_string(&scene.settings).expect("settings"));
+        assert_eq!(profile.scene, scene.settings.to_toml().expect("settings"));
         if cfg!(target_os = "linux") {
             assert_eq!(profile.cpu_ns.len(), 3);
         }

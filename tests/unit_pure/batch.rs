@@ -9,6 +9,7 @@ use echolume::low_level::batch::results::{self, Asked, Earlier, OutputFile, Reco
 use echolume::low_level::batch::shard::{Shard, assign};
 use echolume::low_level::batch::unit::{Kind, Work};
 use echolume::low_level::picture::Picture;
+use echolume::low_level::tree::{FromNode, ToNode};
 use proptest::prelude::*;
 use serde_json::{Map, json};
 use std::collections::BTreeMap;
@@ -112,7 +113,7 @@ fn a_wrong_line_of_a_manifest_is_named_and_no_name_leaves_the_folder() {
 }
 
 fn unit(text: serde_json::Value) -> Unit {
-    serde_json::from_value(text).expect("a unit")
+    FromNode::from_node(text.to_node()).expect("a unit")
 }
 
 #[test]

@@ -338,7 +338,7 @@ fn flat(settings: &Settings) -> BTreeMap<String, toml::Value> {
         }
     }
     let mut all = BTreeMap::new();
-    collect("", &toml::Table::try_from(settings).expect("TOML"), &mut all);
+    collect("", &settings.to_table().expect("TOML"), &mut all);
     all
 }
 

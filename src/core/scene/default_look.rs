@@ -19,6 +19,7 @@ use super::{
     TransferPoint, Volume, transfer,
 };
 use crate::probe::{Geometry, Motion};
+use crate::tree::ToNode;
 use std::path::Path;
 use toml::{Table, Value};
 
@@ -186,8 +187,8 @@ impl Layers {
     /// The layers with this mode and layout on top, as if the user had set them. None if the layers cannot be merged with them.
     pub fn in_mode(mut self, mode: Mode, layout: Layout) -> Option<Layers> {
         let table = Table::from_iter([
-            ("mode".to_string(), Value::try_from(mode).ok()?),
-            ("layout".to_string(), Value::try_from(layout).ok()?),
+            ("mode".to_string(), mode.to_node().into_toml().ok()?),
+            ("layout".to_string(), layout.to_node().into_toml().ok()?),
         ]);
         self.table("mode", table, Path::new("")).ok()?;
         Some(self)
@@ -419,7 +420,7 @@ impl Found<'_> {
                 let (from, to) = (rounded(threshold), rounded(bright.max(threshold + 0.02).min(1.0)));
                 let (points, cut) = fitting_ramp(from, to, &self.chosen.volume);
                 said.push(format!("volume.transfer: opaque from {from} to {to}, {source}{}", cut.unwrap_or_default()));
-                put(under, "volume.transfer", Value::try_from(points).unwrap_or(Value::Array(Vec::new())));
+                put(under, "volume.transfer", points.to_node().into_toml().unwrap_or(Value::Array(Vec::new())));
                 let extinction = rounded(OPTICAL_DEPTH / smoothing(geometry));
                 put(under, "volume.extinction", extinction.into());
             }
@@ -481,7 +482,7 @@ impl Found<'_> {
 /// The light of preset `face`.
 fn light_of_face() -> Option<Value> {
     let settings = preset_settings("face")?;
-    Value::try_from(settings.light).ok()
+    settings.light.to_node().into_toml().ok()
 }
 
 /// The points of preset `face`, a soft shell from dark to light skin, over another interval of echoes. Where the table of `volume` is too small for them,

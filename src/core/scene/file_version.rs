@@ -1,7 +1,6 @@
 //! The version that files of settings state.
 
-use serde::de::Error;
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use crate::tree::{FromNode, Node, NodeError, ToNode};
 
 /// The version of a file of settings, its key `version`: 1, also where the file states none. A file of any other version is refused, because its keys
 /// may have other meanings. New keys that change nothing where they are absent do not make a new version.
@@ -12,19 +11,18 @@ impl FileVersion {
     const NUMBER: i64 = 1;
 }
 
-impl<'de> Deserialize<'de> for FileVersion {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<FileVersion, D::Error> {
-        match i64::deserialize(deserializer)? {
+impl FromNode for FileVersion {
+    fn from_node(node: Node) -> Result<FileVersion, NodeError> {
+        let wrong = |version: i64| format!("version {version}: this program reads version {}", FileVersion::NUMBER);
+        match i64::from_node(node.clone())? {
             FileVersion::NUMBER => Ok(FileVersion),
-            other => {
-                Err(D::Error::custom(format!("version {other}: this program reads version {}", FileVersion::NUMBER)))
-            }
+            other => Err(node.fault(wrong(other))),
         }
     }
 }
 
-impl Serialize for FileVersion {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_i64(FileVersion::NUMBER)
+impl ToNode for FileVersion {
+    fn to_node(&self) -> Node {
+        FileVersion::NUMBER.to_node()
     }
 }

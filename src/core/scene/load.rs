@@ -5,8 +5,7 @@ use super::look::is_look;
 use super::{Settings, SharedLabels, TransferPoint};
 use crate::files;
 use crate::text::printable;
-use crate::tree::{self, Fault, NodeError};
-use serde::Deserialize;
+use crate::tree::{self, Fault, FromNode, Node, NodeError, ToNode};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
@@ -198,7 +197,7 @@ impl Layers {
         let fault = |e: &NodeError| LoadError::Layer { layer: layer.into(), fault: one_line(e, text) };
         let mut table = toml::from_str::<Table>(text).map_err(|e| fault(&e.into()))?;
         if let Some(version) = table.remove("version") {
-            FileVersion::deserialize(version).map_err(|e| fault(&NodeError::from(e)))?;
+            FileVersion::from_node(Node::from(version)).map_err(|e| fault(&e))?;
         }
         // Check this layer alone first: only then can a message name its line.
         if transfer_file(&table).is_none() {
@@ -329,15 +328,15 @@ pub fn transfer_file(table: &Table) -> Option<String> {
 
 /// Reads a transfer function file: a list `points` of { at, colour, opacity }.
 fn points(path: &Path) -> Result<Value, LoadError> {
-    #[derive(Deserialize)]
-    #[serde(deny_unknown_fields)]
+    #[derive(FromNode)]
+    #[tree(deny_unknown_fields)]
     struct Listed {
         points: Vec<TransferPoint>,
     }
     let text = read(path, "transfer function")?;
     let fault = |e: &dyn std::fmt::Display| LoadError::File { path: path.display().to_string(), fault: e.to_string() };
-    let listed = tree::from_text::<Listed>(&text).map_err(|e| fault(&one_line(&e, &text)))?;
-    Value::try_from(listed.points).map_err(|e| fault(&e))
+    let listed = tree::from_toml::<Listed>(&text).map_err(|e| fault(&one_line(&e, &text)))?;
+    listed.points.to_node().into_toml().map_err(|e| fault(&e))
 }
 
 /// Merges `over` into `under`, which is at `path` in the scene. The word `none` removes a setting that may be absent.

@@ -144,7 +144,7 @@ mod tests {
         let both = look.look_over(&present);
         let table = |settings: &Settings| {
             let mut found = Vec::new();
-            values(&Table::try_from(settings).unwrap(), "", &mut found);
+            values(&settings.to_table().unwrap(), "", &mut found);
             found
         };
         let (of_look, of_present, of_both) = (table(&look), table(&present), table(&both));

@@ -6,14 +6,14 @@
 use super::dials::{self, Dial};
 use super::{Errors, Kind, OwnError, Reference};
 use crate::scene::Scene;
-use serde::{Deserialize, Serialize};
+use crate::tree::{FromNode, ToNode};
 
 /// Name of the share that remains with the finest setting of every source: the device's arithmetic in f32, and its texel formats.
 pub const FLOOR: &str = "device";
 
 /// How much each approximation contributes to the error of a scene.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, ToNode, FromNode)]
+#[tree(deny_unknown_fields)]
 pub struct Budget {
     pub reference: Reference,
     /// Estimate of the error of the reference itself; 0 for [`Reference::F64`].
@@ -25,8 +25,8 @@ pub struct Budget {
 }
 
 /// The error of one source: it has the scene's own setting, while all others have their finest.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, ToNode, FromNode)]
+#[tree(deny_unknown_fields)]
 pub struct Share {
     /// The name of the dial that is the source, or [`FLOOR`].
     pub source: String,

@@ -1,10 +1,10 @@
 //! Orders of convergence: a fit of the error over the step size.
 
-use serde::{Deserialize, Serialize};
+use crate::tree::{FromNode, ToNode};
 
 /// Which points an order is fitted to. Points with coarser steps are not yet asymptotic; errors near the floor are not caused by the step.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, PartialEq, ToNode, FromNode)]
+#[tree(deny_unknown_fields)]
 pub struct Range {
     /// Smallest and largest step, in the unit of the dial.
     pub step: [f64; 2],
@@ -18,8 +18,8 @@ pub struct Range {
 const ABOVE_FLOOR: f64 = 3.0;
 
 /// The fit error = coefficient * step^order, by least squares on the logarithms.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, PartialEq, ToNode, FromNode)]
+#[tree(deny_unknown_fields)]
 pub struct Fit {
     pub order: f64,
     /// Standard error of the order, from the residuals of the fit.

@@ -6,6 +6,7 @@ use super::Kind;
 use crate::error_map::step_fault;
 use crate::passes::light_volume;
 use crate::scene::{Compositing, Edge, Mode, PeronaMalik, Sampling, Scene, Scheme, Volume, VolumeFormat, transfer};
+use crate::tree::{FromNode, ToNode};
 
 /// One setting of a dial.
 #[derive(Clone, Debug)]
@@ -178,7 +179,7 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
             need(composites, "composites nothing")?;
             is_one_picture()?;
             let kinds = ["riemann", "corrected", "pre-integrated", "exponential"];
-            let now = serde_word(&s.volume.compositing);
+            let now = word(&s.volume.compositing);
             // The table of pairs is refused for points that are very close.
             let pairs = Volume { compositing: Compositing::PreIntegrated, ..s.volume.clone() };
             let finest = if transfer::entries(&pairs).is_ok() { "pre-integrated" } else { "corrected" };
@@ -207,20 +208,20 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
             let now = scene.volume_format();
             let all = [VolumeFormat::R8, VolumeFormat::R16, VolumeFormat::R16f, VolumeFormat::R32f];
             let others = all.into_iter().filter(|f| *f != now);
-            let others = others.map(|f| at(serde_word(&f), &[format!("slices.format={}", serde_word(&f))], bits(f)));
+            let others = others.map(|f| at(word(&f), &[format!("slices.format={}", word(&f))], bits(f)));
             let best = ["slices.format=r32f".to_string(), "ray.sampling=exact".into()];
             let nearly = ["slices.format=r16".to_string(), "ray.sampling=exact".into()];
-            made("format", "bits", is(serde_word(&now), bits(now)), others.collect(), &best, &nearly)
+            made("format", "bits", is(word(&now), bits(now)), others.collect(), &best, &nearly)
         }
         "sampling" => {
             let all = [Sampling::Hardware, Sampling::Exact, Sampling::PackedNeighbours];
             let others = all.iter().enumerate().filter(|(_, w)| **w != s.ray.sampling);
-            let set = |w: &Sampling| [format!("ray.sampling={}", serde_word(w))];
-            let others = others.map(|(n, w)| at(serde_word(w), &set(w), n as f64));
+            let set = |w: &Sampling| [format!("ray.sampling={}", word(w))];
+            let others = others.map(|(n, w)| at(word(w), &set(w), n as f64));
             // `auto` is resolved to one of them.
             let value = all.iter().position(|w| *w == scene.sampling).unwrap_or(0) as f64;
             let exact = set(&Sampling::Exact);
-            made("sampling", "", is(serde_word(&s.ray.sampling), value), others.collect(), &exact, &exact)
+            made("sampling", "", is(word(&s.ray.sampling), value), others.collect(), &exact, &exact)
         }
         "filter3d" => {
             need(marches, "casts no ray")?;
@@ -289,15 +290,14 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
             let p = now.unwrap_or(PeronaMalik { edge: 0.1, step: 0.25, repeat: 8, ..PeronaMalik::default() });
             let time = p.step * f64::from(p.repeat);
             let diffused = |scheme: Scheme, n: u32| {
-                let (scheme, conductance, step) =
-                    (serde_word(&scheme), serde_word(&p.conductance), time / f64::from(n));
+                let (scheme, conductance, step) = (word(&scheme), word(&p.conductance), time / f64::from(n));
                 let edge = p.edge;
                 vec![format!(
                     "slices.perona_malik={{scheme='{scheme}',edge={edge:?},conductance='{conductance}',step={step:?},repeat={n}}}"
                 )]
             };
             let place = |scheme: Scheme, n: u32| {
-                at(format!("{} {n}", serde_word(&scheme)), &diffused(scheme, n), time / f64::from(n))
+                at(format!("{} {n}", word(&scheme)), &diffused(scheme, n), time / f64::from(n))
             };
             // The explicit scheme is stable up to steps of 1/4.
             let least = (4.0 * time).ceil().clamp(1.0, 100.0) as u32;
@@ -311,7 +311,7 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
             match now {
                 None => look("perona-malik", "step", others),
                 Some(_) => {
-                    let label = format!("{} {}", serde_word(&p.scheme), p.repeat);
+                    let label = format!("{} {}", word(&p.scheme), p.repeat);
                     others.retain(|other| other.label != label);
                     let fine = |f: u32| diffused(Scheme::Explicit, least * f);
                     made("perona-malik", "step", is(label, p.step), others, &fine(10), &fine(5))
@@ -391,7 +391,7 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
             need(composites, "composites nothing")?;
             let now = scene.transfer_entries();
             // Assigning the rule too keeps the two dials from being combined: the table of pairs has a limit of its own.
-            let rule = serde_word(&s.volume.compositing);
+            let rule = word(&s.volume.compositing);
             let set = |n: usize| [format!("volume.entries={n}"), format!("volume.compositing={rule}")];
             let pairs = matches!(s.volume.compositing, Compositing::PreIntegrated | Compositing::Exponential);
             let most = if pairs { 1024 } else { 4096 };
@@ -468,8 +468,7 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
                     f if f <= 0.25 => VolumeFormat::R32f,
                     _ => format,
                 };
-                let mut set =
-                    vec![format!("ray.step={}", step * factor), format!("slices.format={}", serde_word(&format))];
+                let mut set = vec![format!("ray.step={}", step * factor), format!("slices.format={}", word(&format))];
                 if let Some(cell) = lit {
                     set.push(format!("light.volume.cell={}", cell * factor));
                     set.push(format!("light.volume.cells={MOST_LIGHT_CELLS}"));
@@ -487,8 +486,8 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
 }
 
 /// The name of a setting value as in a scene file.
-fn serde_word(value: &impl serde::Serialize) -> String {
-    toml::Value::try_from(value).ok().and_then(|v| v.as_str().map(str::to_string)).unwrap_or_default()
+fn word(value: &impl ToNode) -> String {
+    String::from_node(value.to_node()).unwrap_or_default()
 }
 
 #[cfg(test)]

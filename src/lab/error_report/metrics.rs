@@ -2,7 +2,7 @@
 
 use crate::passes::{Texels, is_hit};
 use crate::statistics::quantile;
-use serde::{Deserialize, Serialize};
+use crate::tree::{FromNode, ToNode};
 
 /// Edge of SSIM's window, pixels, and the deviation of its Gaussian (Wang, Bovik, Sheikh, Simoncelli 2004, section III-B).
 const WINDOW: usize = 11;
@@ -27,8 +27,8 @@ pub struct PictureError {
 }
 
 /// Statistics of the absolute values of errors.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, PartialEq, ToNode, FromNode)]
+#[tree(deny_unknown_fields)]
 pub struct ErrorStatistics {
     pub rms: f64,
     pub median: f64,
@@ -41,8 +41,8 @@ pub struct ErrorStatistics {
 
 /// Differences of two pictures as the screen shows them, in levels of 255, not rounded. The difference of a pixel is that of its channel that differs
 /// most.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, ToNode, FromNode)]
+#[tree(deny_unknown_fields)]
 pub struct Levels {
     pub rms: f64,
     pub median: f64,
@@ -56,8 +56,8 @@ pub struct Levels {
 }
 
 /// Differences of two maps of a surface: of distances, mm, or of normals, degrees.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, PartialEq, ToNode, FromNode)]
+#[tree(deny_unknown_fields)]
 pub struct SurfaceError {
     /// Error over the pixels that are hit in both maps and are no jumps, mm or degrees. None if there are no such pixels.
     pub error: Option<ErrorStatistics>,

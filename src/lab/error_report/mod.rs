@@ -15,17 +15,17 @@ mod running;
 
 use crate::baselines::stated_format;
 use crate::scene::Scene;
+use crate::tree::{self, FromNode, NodeError, ToNode};
 use budget::Budget;
 use convergence::Fit;
 use metrics::{Levels, SurfaceError};
-use serde::{Deserialize, Serialize};
 
 /// Name and version of the format of a stored report; other versions are refused.
 pub const FORMAT: &str = "echolume error report 3";
 
 /// The measured errors and times of one scene on one device.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, ToNode, FromNode)]
+#[tree(deny_unknown_fields)]
 pub struct Report {
     /// The name of the format: [`FORMAT`].
     pub format: String,
@@ -47,8 +47,8 @@ pub struct Report {
 }
 
 /// Settings of one or several dials at once, or the scene's own settings, with their errors and times.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, ToNode, FromNode)]
+#[tree(deny_unknown_fields)]
 pub struct Combination {
     /// What differs from the scene's own settings: name of each dial, and label of its point. Empty for the scene's own settings.
     pub changed: Vec<(String, String)>,
@@ -64,8 +64,8 @@ pub struct Combination {
 
 /// An estimate of the error of a reference. Of [`Reference::Exact`], `rmse` is its `estimate`, also where that is in mm, and `levels` is 255 times
 /// `rmse`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, ToNode, FromNode)]
+#[tree(deny_unknown_fields)]
 pub struct OwnError {
     /// RMSE of the reference's picture, 0..1.
     pub rmse: f64,
@@ -81,8 +81,8 @@ impl OwnError {
 }
 
 /// What the settings of a dial have in common.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ToNode, FromNode)]
+#[tree(rename_all = "kebab-case")]
 pub enum Kind {
     /// The settings compute the same picture more or less accurately. A choice may vary the dial together with others.
     Numerical,
@@ -95,8 +95,8 @@ pub enum Kind {
 }
 
 /// Sizes of the volume and of the picture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ToNode, FromNode)]
+#[tree(deny_unknown_fields)]
 pub struct Sizes {
     /// Columns, rows and slices of the volume, texels.
     pub volume: [u32; 3],
@@ -105,8 +105,8 @@ pub struct Sizes {
 }
 
 /// Measurements of one dial, an approximation or look that is varied while all other settings stay the scene's own.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, ToNode, FromNode)]
+#[tree(deny_unknown_fields)]
 pub struct Dial {
     pub name: String,
     pub kind: Kind,
@@ -120,11 +120,11 @@ pub struct Dial {
     pub order: Option<Fit>,
     /// RMSE, 0..1, of the device with the settings of the reference against the reference in f64 or of exact rays: what arithmetic and texel formats
     /// alone make. None for other references, and for other dials than `step`.
-    #[serde(default)]
+    #[tree(default)]
     pub floor: Option<f64>,
     /// For a dial that changes how rays take samples, why its reference is not exact rays. None if it is, if another reference was asked for, and for
     /// other dials.
-    #[serde(default)]
+    #[tree(default)]
     pub note: Option<String>,
 }
 
@@ -136,8 +136,8 @@ impl Dial {
 }
 
 /// What the errors of a dial are measured against.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, ToNode, FromNode)]
+#[tree(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Reference {
     /// The picture of the reference renderer, in f64 on the CPU.
     F64,
@@ -174,8 +174,8 @@ pub enum Reference {
 }
 
 /// A measured setting of a dial.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, ToNode, FromNode)]
+#[tree(deny_unknown_fields)]
 pub struct Point {
     /// Short label for plots: "0.25", "pre-integrated".
     pub label: String,
@@ -195,8 +195,8 @@ pub struct Point {
 /// Errors of a picture against a reference, and of the surface if it shows one. With layout `single`, pixels that hit a surface in only one of the
 /// two, or surfaces further apart than [`Scene::cliff`](crate::scene::Scene::cliff), are left out of the errors of the picture, and so are their
 /// neighbours. `mm` has the shares of such pixels, without the neighbours.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, ToNode, FromNode)]
+#[tree(deny_unknown_fields)]
 pub struct Errors {
     /// Root mean square difference of red, green and blue before toning, 0..1.
     pub rmse: f64,
@@ -215,8 +215,8 @@ pub struct Errors {
 }
 
 /// Statistics of a time over several runs, ns, or of the ratio of two times.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, PartialEq, ToNode, FromNode)]
+#[tree(deny_unknown_fields)]
 pub struct Time {
     pub median: f64,
     /// Confidence interval of the median (`low`, `high`): 95 % by order statistics. With fewer than 6 runs it is from the shortest to the longest.
@@ -249,8 +249,8 @@ impl Time {
 }
 
 /// GPU times, ns, or ratios of them.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, PartialEq, ToNode, FromNode)]
+#[tree(deny_unknown_fields)]
 pub struct Times {
     /// Work for each frame and volume: upload, stage 1 (preprocess), and the value ranges of bricks.
     pub volume: Time,
@@ -335,7 +335,7 @@ impl Report {
     /// One line: an error, a time or the value of a point is not finite, or an error or time is negative.
     pub fn to_json(&self) -> Result<String, String> {
         self.check()?;
-        serde_json::to_string_pretty(self).map_err(|e| format!("error report: {e}"))
+        tree::to_json_lines(self).map_err(|e| format!("error report: {e}"))
     }
 
     /// Reads a report.
@@ -347,13 +347,13 @@ impl Report {
     }
 
     fn read(text: &str) -> Result<Report, String> {
-        let unread = |e: serde_json::Error| format!("error report: cannot be read: {e}");
+        let unread = |e: NodeError| format!("error report: cannot be read: {e}");
         // The version first: a newer report would otherwise fail by its fields, with a less clear message.
         let format = stated_format(text).map_err(unread)?;
         if format != FORMAT {
             return Err(format!("error report: format is '{format}', this program reads '{FORMAT}'"));
         }
-        let report: Report = serde_json::from_str(text).map_err(unread)?;
+        let report: Report = tree::from_json(text.as_bytes()).map_err(unread)?;
         report.check()?;
         Ok(report)
     }

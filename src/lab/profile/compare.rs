@@ -26,7 +26,7 @@ use super::statistics::{
 };
 use super::{LEVEL, PassProfile, Profile};
 use crate::baselines::{Stored, Threshold, differing, matched};
-use serde::Serialize;
+use crate::tree::ToNode;
 use std::collections::{BTreeMap, BTreeSet};
 use toml::{Table, Value};
 
@@ -65,8 +65,8 @@ pub enum CompareError {
 }
 
 /// Result of the comparison of one line.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ToNode)]
+#[tree(rename_all = "kebab-case")]
 pub enum Verdict {
     Faster,
     Slower,
@@ -77,8 +77,8 @@ pub enum Verdict {
 }
 
 /// What a line's times are of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ToNode)]
+#[tree(rename_all = "kebab-case")]
 pub enum Kind {
     Pass,
     /// A span of the host, or the wall time where CPU times are compared. It is reported, but is never a regression.
@@ -90,7 +90,7 @@ pub enum Kind {
 }
 
 /// Ratio of the new times to the old ones; below 1 is faster.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, ToNode)]
 pub struct Ratio {
     pub estimate: f64,
     /// Confidence interval of the ratio (`low`, `high`), of this line alone and not corrected for the other lines.
@@ -106,7 +106,7 @@ pub struct Ratio {
 }
 
 /// The comparison of one pass, host span, or of the wall or CPU time.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, ToNode)]
 pub struct Line {
     pub name: String,
     pub stage: String,
@@ -131,7 +131,7 @@ pub struct Line {
 }
 
 /// The comparison of two profiles.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, ToNode)]
 pub struct Comparison {
     pub format: &'static str,
     /// Which times are compared, in words.

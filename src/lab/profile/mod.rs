@@ -9,15 +9,15 @@ pub mod timed_run;
 
 use crate::baselines::Stored;
 use crate::machine::Device;
-use serde::{Deserialize, Serialize};
+use crate::tree::{FromNode, ToNode};
 use statistics::Sample;
 
 /// Requested coverage of confidence intervals.
 pub const LEVEL: f64 = 0.95;
 
 /// The result of one run of `echolume profile`. Lists of times are in ns, with one entry per repeat in the order in which they were measured.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, ToNode, FromNode)]
+#[tree(deny_unknown_fields)]
 pub struct Profile {
     /// The name of the file format: [`Stored::FORMAT`].
     pub format: String,
@@ -40,7 +40,7 @@ pub struct Profile {
     /// Number of repeats that are run first and not measured.
     pub warm_up: usize,
     /// Growth of the view's azimuth from each repeat to the next, deg.
-    #[serde(default)]
+    #[tree(default)]
     pub turn: f64,
     /// The times of the passes, in running order, copies to and from the device included. Without time stamps there are none.
     pub passes: Vec<PassProfile>,
@@ -51,23 +51,23 @@ pub struct Profile {
     pub wall_ns: Vec<f64>,
     /// CPU time of the process over the same intervals, all threads, user and system. On a software device it is the cost of the work. Empty if the
     /// system does not report it.
-    #[serde(default)]
+    #[tree(default)]
     pub cpu_ns: Vec<f64>,
     /// Time from the begin of the first pass to the end of the last one, by the device's clock. Empty without time stamps.
     pub device_ns: Vec<f64>,
     /// The measured roofline ceilings of the device. None if they were not asked for, or the device has no time stamps.
     pub ceilings: Option<Ceilings>,
     /// How the volume is sampled and how texels are read, in words. None in files of earlier versions.
-    #[serde(default)]
+    #[tree(default)]
     pub sampling: Option<String>,
     /// Largest error of the position of device spans on the host's clock, ns. None if the device's clock cannot be read.
-    #[serde(default)]
+    #[tree(default)]
     pub clock_deviation_ns: Option<u64>,
 }
 
 /// Sizes of the data that is processed.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, ToNode, FromNode)]
+#[tree(deny_unknown_fields)]
 pub struct Sizes {
     /// Samples per line, and number of lines; columns and rows of a Cartesian frame.
     pub frame: [u32; 2],
@@ -79,8 +79,8 @@ pub struct Sizes {
 }
 
 /// The least time in which sound can acquire a volume.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, PartialEq, ToNode, FromNode)]
+#[tree(deny_unknown_fields)]
 pub struct Acquisition {
     /// Travel time of sound from the face to the last sample and back, summed over all lines of all slices, s.
     pub seconds: f64,
@@ -89,8 +89,8 @@ pub struct Acquisition {
 }
 
 /// Times and work of a pass on the device, or times of a span of the host.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, ToNode, FromNode)]
+#[tree(deny_unknown_fields)]
 pub struct PassProfile {
     /// Name, unique among the passes or the host spans.
     pub name: String,
@@ -102,29 +102,29 @@ pub struct PassProfile {
     /// Time of all runs together, ns, for each repeat. Empty for a pass without time stamps.
     pub samples_ns: Vec<f64>,
     /// CPU time of all threads in each repeat, ns, if the device is the CPU; otherwise empty.
-    #[serde(default)]
+    #[tree(default)]
     pub cpu_ns: Vec<f64>,
     /// Number of bytes that a repeat can read. Each run counts every texel once that it can reach in a bound slot (image or buffer).
     pub bytes_read: u64,
     /// Number of bytes that a repeat can write, counted like `bytes_read`.
     pub bytes_written: u64,
     /// Number of unfiltered texel fetches in a repeat. None if they cannot be counted.
-    #[serde(default)]
+    #[tree(default)]
     pub fetches: Option<u64>,
     /// Number of filtered texture samples in a repeat. None if they are not counted, which holds for every profile that this program measures.
-    #[serde(default)]
+    #[tree(default)]
     pub filtered: Option<u64>,
     /// Number of invocations that a repeat needs, without those that fill up workgroups. None for a copy or a host span.
-    #[serde(default)]
+    #[tree(default)]
     pub dispatched: Option<u64>,
     /// Number of compute shader invocations in the first repeat by pipeline statistics. None if the device does not count them.
-    #[serde(default)]
+    #[tree(default)]
     pub invocations: Option<u64>,
 }
 
 /// The rate, per second, of a micro-benchmark, over its repeats. The rates of passes are compared with its median.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, PartialEq, ToNode, FromNode)]
+#[tree(deny_unknown_fields)]
 pub struct Ceiling {
     pub median: f64,
     /// 5th and 95th percentile over the repeats of the micro-benchmark.
@@ -133,15 +133,15 @@ pub struct Ceiling {
 }
 
 /// The roofline ceilings of a device, each a rate per second.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, PartialEq, ToNode, FromNode)]
+#[tree(deny_unknown_fields)]
 pub struct Ceilings {
     /// Copying: bytes read plus bytes written, so that a copied byte counts as two.
     pub copy: Ceiling,
     /// Texture samples through the device's filter.
     pub sampling: Ceiling,
     /// Samples that the shader interpolates from eight texels. None if that was not measured.
-    #[serde(default)]
+    #[tree(default)]
     pub exact: Option<Ceiling>,
     /// Reads of single texels, in the way that is faster on the device: texel fetches, or loads from storage images on a software device.
     pub fetch: Ceiling,

@@ -1,14 +1,14 @@
 //! The `[motor]` table of a probe file, and conversions between degrees and the units of the module. Angles are those of the sweep, in
 //! degrees: 0 in the middle, increasing forwards.
 
-use serde::Deserialize;
+use crate::tree::FromNode;
 
 /// Clock of the motion controllers whose velocities are not in microsteps a second, Hz.
 const TMC429_CLOCK: f64 = 16e6;
 
 /// How the motor finds home, the position from which all others are counted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode)]
+#[tree(rename_all = "kebab-case")]
 pub enum Home {
     /// The module does its own reference search (the TMCL command RFS), in the mode that is set in the module.
     #[default]
@@ -18,8 +18,8 @@ pub enum Home {
 }
 
 /// A direction of rotation of the motor.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode)]
+#[tree(rename_all = "lowercase")]
 pub enum Side {
     /// Towards smaller position counts of the module.
     #[default]
@@ -39,8 +39,8 @@ impl Side {
 }
 
 /// Unit in which the module states velocities and accelerations.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode)]
+#[tree(rename_all = "lowercase")]
 pub enum Units {
     /// Microsteps/s and microsteps/s2.
     #[default]
@@ -50,8 +50,8 @@ pub enum Units {
 }
 
 /// The `[motor]` table of a probe file. `tests/data/motor/probe.toml` is a commented example.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, FromNode)]
+#[tree(deny_unknown_fields)]
 pub struct MotorTable {
     /// Full steps in one revolution of the motor, 4 to 10000.
     pub steps_per_turn: u32,
@@ -60,26 +60,26 @@ pub struct MotorTable {
     /// Revolutions of the motor for one revolution of the array, 0.001 to 10000.
     pub gear: f64,
     /// True if increasing positions of the motor move the array towards smaller angles.
-    #[serde(default)]
+    #[tree(default)]
     pub reversed: bool,
     /// Address of the module in TMCL requests, 1 to 255.
-    #[serde(default = "one")]
+    #[tree(default = "one")]
     pub address: u8,
     /// Number of the motor's axis in its module, 0 to 5.
-    #[serde(default)]
+    #[tree(default)]
     pub motor: u8,
     /// Type of the module that the firmware has to report (1140 for a TMCM-1140); None: any TMCL module.
     pub module: Option<u16>,
-    #[serde(default)]
+    #[tree(default)]
     pub home: Home,
     /// Direction in which the home switch is searched for first, with `home = 'switch'`.
-    #[serde(default)]
+    #[tree(default)]
     pub home_direction: Side,
     /// True if the input of the home switch reads 0 while the switch is closed; false if it then reads 1.
-    #[serde(default)]
+    #[tree(default)]
     pub home_inverted: bool,
     /// Angle of the array at home, degrees; 0 is the middle of the sweep.
-    #[serde(default)]
+    #[tree(default)]
     pub home_angle_deg: f64,
     /// Speed of the array while home is searched, deg/s. None: the module's own speed for its reference search; for a search by the switch 10, or the
     /// largest speed if that is lower.
@@ -92,12 +92,12 @@ pub struct MotorTable {
     pub largest_speed_deg_per_s: f64,
     /// Acceleration of the array at both ends of a pass, deg/s2. The motor must be able to follow it under its load.
     pub acceleration_deg_per_s2: f64,
-    #[serde(default)]
+    #[tree(default)]
     pub units: Units,
     /// Pulse divisor that is set in the module, 0 to 13; used only with `units = 'tmc429'`.
-    #[serde(default)]
+    #[tree(default)]
     pub pulse_divisor: u8,
-    #[serde(default)]
+    #[tree(default)]
     pub ramp_divisor: u8,
     /// Time-out of the module's own watchdog, 100 to 65535 ms: the module stops the motor if no command arrives for this time. 0 switches
     /// the watchdog off. None leaves the setting of the module unchanged.

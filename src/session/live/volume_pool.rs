@@ -1,11 +1,11 @@
 //! Assigns volume images: which one a frame goes into, and which one is shown. If volumes are shown whole, no picture mixes slices of two
 //! volumes. It has no side effects.
 
-use serde::{Deserialize, Serialize};
+use crate::tree::{FromNode, ToNode};
 
 /// How arriving frames become visible.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ToNode, FromNode)]
+#[tree(rename_all = "lowercase")]
 pub enum Update {
     /// A volume becomes visible when all its frames have arrived. Several volume images are used in rotation.
     #[default]

@@ -4,12 +4,12 @@ use super::contours::{self, Stack};
 use super::shapes::{self, Ellipse};
 use crate::scene::{MeasureKind, Measurement};
 use crate::text::csv_quoted;
+use crate::tree::ToNode;
 use glam::DVec3;
-use serde::Serialize;
 use std::fmt::Write as _;
 
 /// A measured quantity.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, ToNode)]
 pub struct Quantity {
     pub name: &'static str,
     pub value: f64,

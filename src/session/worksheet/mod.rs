@@ -12,7 +12,7 @@ use crate::measure::outcome::{self, Quantity};
 use crate::picture::Picture;
 use crate::scene::{Made, MeasureKind, Measurement, Scene, Settings};
 use crate::text::{csv_quoted, printable};
-use serde::{Deserialize, Serialize};
+use crate::tree::{self, FromNode, Node, NodeError, ToNode};
 use toml::{Table, Value};
 
 /// The version of the JSON that this program writes and reads.
@@ -23,8 +23,8 @@ const FOOTER: &str = "Not a medical device";
 const NO_INTERVAL: &str = "no interval stated";
 
 /// The content of a worksheet.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields)]
 pub struct Sheet {
     /// Version of this form: [`VERSION`].
     pub echolume_worksheet: u32,
@@ -43,8 +43,8 @@ pub struct Sheet {
 }
 
 /// The recording that was measured.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields)]
 pub struct Recording {
     /// File name.
     pub name: String,
@@ -60,7 +60,7 @@ pub struct Recording {
 }
 
 /// A measurement on the worksheet: its result, what it was made on, and its picture.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, FromNode, ToNode)]
 pub struct Entry {
     /// Number of the measurement in the list of the workspace's settings, from 1.
     pub number: usize,
@@ -68,18 +68,18 @@ pub struct Entry {
     pub text: String,
     /// What was measured. The JSON has it for other programs. It is empty in a sheet that was read, because it is computed again from
     /// [`Sheet::source`].
-    #[serde(skip_deserializing)]
+    #[tree(skip_deserializing)]
     pub quantities: Vec<Quantity>,
     /// How a volume follows from its contours or voxels, or why the measurement has no result; None for others.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[tree(skip_serializing_if = "Option::is_none")]
     pub method: Option<String>,
     /// What is stated of the confidence interval of a volume; None for other measurements.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[tree(skip_serializing_if = "Option::is_none")]
     pub interval: Option<String>,
     /// Number of its volume, from 0.
     pub volume: u32,
     /// Time stamp of that volume, s; None if it has none.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[tree(skip_serializing_if = "Option::is_none")]
     pub time: Option<f64>,
     /// The plane or the view that the measurement was made on; if that was not recorded, the one that its picture shows. Empty if neither is known.
     pub plane: String,
@@ -89,8 +89,8 @@ pub struct Entry {
 }
 
 /// The picture of a measurement.
-#[derive(Clone, Debug, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, Eq, FromNode, ToNode)]
+#[tree(deny_unknown_fields)]
 pub struct Shown {
     /// What differs from the settings of [`Sheet::source`], as assignments of `render --set`.
     pub set: Vec<String>,
@@ -261,13 +261,13 @@ impl Sheet {
     /// # Errors
     /// One line without the file's name: it is no worksheet, or one of another version.
     pub fn read(text: &str) -> Result<Sheet, String> {
-        let fault = |e: serde_json::Error| printable(&format!("is no worksheet: {e}"));
-        let value: serde_json::Value = serde_json::from_str(text).map_err(fault)?;
-        match value["echolume_worksheet"].as_u64() {
+        let fault = |e: NodeError| printable(&format!("is no worksheet: {e}"));
+        let mut node = Node::parse_json(text.as_bytes()).map_err(fault)?;
+        match node.at("echolume_worksheet").and_then(|version| version.as_u64()) {
             Some(version) if version != u64::from(VERSION) => {
                 Err(format!("is of version {version}, this program reads version {VERSION}"))
             }
-            _ => serde_json::from_value(value).map_err(fault),
+            _ => Sheet::from_node(node).map_err(fault),
         }
     }
 
@@ -276,7 +276,7 @@ impl Sheet {
     /// # Errors
     /// One line: the sheet cannot be written as JSON.
     pub fn json(&self) -> Result<String, String> {
-        serde_json::to_string_pretty(self).map(|text| text + "\n").map_err(|e| e.to_string())
+        tree::to_json_lines(self).map(|text| text + "\n").map_err(|e| e.to_string())
     }
 
     /// The results as CSV, a line for each quantity: the columns that the viewer saves, and digests, the program's version and the device.

@@ -3,6 +3,7 @@
 use crate::measure::{made, overlay, shapes};
 use crate::scene::load::Layers;
 use crate::scene::{MeasureKind, Measurement, Mode, PlaneName, Scene};
+use crate::tree::ToNode;
 use glam::DVec3;
 
 /// Largest distance of a point from the plane that is moved to it, mm.
@@ -86,8 +87,8 @@ fn turned(scene: &Scene, measured: &Measurement) -> Option<Vec<String>> {
 }
 
 /// A value for a setting, as `--set` takes it.
-fn assigned(key: &str, value: impl serde::Serialize) -> Option<String> {
-    Some(match toml::Value::try_from(value).ok()? {
+fn assigned(key: &str, value: impl ToNode) -> Option<String> {
+    Some(match value.to_node().into_toml().ok()? {
         toml::Value::String(word) => format!("{key}={word}"),
         value => format!("{key}={value}"),
     })

@@ -9,10 +9,10 @@ use crate::machine::Device;
 use crate::picture::Picture;
 use crate::report::{CheckName, Outcome, PictureComparison};
 use crate::terminal::Failure;
+use crate::tree::{self, FromNode, ToNode};
 use crate::{Check, DeviceUnderTest};
 use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
-use serde::{Deserialize, Serialize};
 use std::io::{BufRead, Write};
 use std::sync::mpsc;
 use std::time::Duration;
@@ -24,7 +24,7 @@ const MARK: &str = "echolume-verify-worker: ";
 const GRACE: Duration = Duration::from_secs(2);
 
 /// A message from a worker to the process that started it, on a line of standard output.
-#[derive(Serialize, Deserialize)]
+#[derive(ToNode, FromNode)]
 pub(super) enum Message {
     /// A Vulkan call begins: name of the call, and of the shader or device that it is for.
     Calls(String, String),
@@ -37,7 +37,7 @@ pub(super) enum Message {
 }
 
 /// What a worker says of itself: its device, and the checks that it can run.
-#[derive(Serialize, Deserialize)]
+#[derive(ToNode, FromNode)]
 pub struct Ready {
     pub device: Device,
     /// True if the validation layer is active and detects a missing barrier.
@@ -48,13 +48,13 @@ pub struct Ready {
 }
 
 /// An outcome together with its pictures, which the JSON of an outcome leaves out.
-#[derive(Serialize, Deserialize)]
+#[derive(ToNode, FromNode)]
 pub(super) struct Done {
     outcome: Outcome,
     pictures: Vec<SentComparison>,
 }
 
-#[derive(Serialize, Deserialize)]
+#[derive(ToNode, FromNode)]
 struct SentComparison {
     what: String,
     /// Actual, expected, difference.
@@ -63,7 +63,7 @@ struct SentComparison {
     fault: Option<usize>,
 }
 
-#[derive(Serialize, Deserialize)]
+#[derive(ToNode, FromNode)]
 struct SentPicture {
     width: u32,
     height: u32,
@@ -127,11 +127,11 @@ impl Message {
     /// Parses the message in a line. None if the line has no message's mark, or is damaged.
     pub(super) fn parse(line: &str) -> Option<Message> {
         let (_, json) = line.split_once(MARK)?;
-        serde_json::from_str(json).inspect_err(|fault| tracing::warn!("a message of a worker: {fault}")).ok()
+        tree::from_json(json.as_bytes()).inspect_err(|fault| tracing::warn!("a message of a worker: {fault}")).ok()
     }
 
     fn send(&self) -> Result<(), String> {
-        let json = serde_json::to_string(self).map_err(|e| e.to_string())?;
+        let json = tree::to_json(self).map_err(|e| e.to_string())?;
         // A line break first: the driver may have left its line unfinished.
         let line = format!("\n{MARK}{json}\n");
         let mut out = std::io::stdout().lock();

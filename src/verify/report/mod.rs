@@ -14,15 +14,15 @@ use crate::machine::Device;
 use crate::picture::Picture;
 use crate::profile::statistics::{Sample, SampleError};
 use crate::text::escaped;
+use crate::tree::{FromNode, ToNode};
 use baseline::{BaselineComparison, Class};
-use serde::{Deserialize, Serialize};
 use std::collections::{HashMap, HashSet};
 use std::fmt::Write as _;
 use std::time::Duration;
 
 /// How thoroughly a device is checked.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ToNode, FromNode)]
+#[tree(rename_all = "lowercase")]
 pub enum Level {
     /// For CI: every pass, mode and path once.
     Quick,
@@ -32,8 +32,8 @@ pub enum Level {
 }
 
 /// One run of `echolume verify` on one device.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, ToNode, FromNode)]
+#[tree(deny_unknown_fields)]
 pub struct Run {
     /// The name of the file format: [`Stored::FORMAT`].
     pub format: String,
@@ -88,8 +88,8 @@ impl Run {
 }
 
 /// The result of running one check.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, ToNode, FromNode)]
+#[tree(deny_unknown_fields)]
 pub struct Outcome {
     /// Group of checks: `passes`, `modes`, `known answers` ...
     pub group: String,
@@ -99,24 +99,24 @@ pub struct Outcome {
     /// Duration by the clock of the host, s; it includes the computation of the reference.
     pub seconds: f64,
     /// Measured errors and times.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[tree(default, skip_serializing_if = "Vec::is_empty")]
     pub figures: Vec<Figure>,
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[tree(default, skip_serializing_if = "Vec::is_empty")]
     pub faults: Vec<Fault>,
     /// Remarks, such as the reason why the check was skipped, and fallbacks that were used.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[tree(default, skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,
     /// How often the check failed before it passed. If it is not 0, the check is flaky.
-    #[serde(default, skip_serializing_if = "is_zero")]
+    #[tree(default, skip_serializing_if = "is_zero")]
     pub failed_before: u32,
     /// Comparison pictures, also those of passed checks.
-    #[serde(skip)]
+    #[tree(skip)]
     pub pictures: Vec<PictureComparison>,
 }
 
 /// Names a check by its group and its name.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, Eq, ToNode, FromNode)]
+#[tree(deny_unknown_fields)]
 pub struct CheckName {
     pub group: String,
     /// Name of the check, unique in its group.
@@ -124,8 +124,8 @@ pub struct CheckName {
 }
 
 /// How a check ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ToNode, FromNode)]
+#[tree(rename_all = "kebab-case")]
 pub enum Verdict {
     Passed,
     Failed,
@@ -136,31 +136,31 @@ pub enum Verdict {
 }
 
 /// A number that a check measured.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, ToNode, FromNode)]
+#[tree(deny_unknown_fields)]
 pub struct Figure {
     /// Name of the number, unique in its check.
     pub what: String,
     /// The measured number: an error (the largest), a count, a time (the median of `samples`, if there are any) or a share. NaN if the output was
     /// NaN.
-    #[serde(with = "any_number")]
+    #[tree(with = "any_number")]
     pub value: f64,
     /// The largest value that passes. None if every value passes.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[tree(default, skip_serializing_if = "Option::is_none")]
     pub allowed: Option<f64>,
     pub unit: Unit,
     /// The single measurements in their order: times of which `value` is the median, or shares of which `value` is the largest. Empty for errors,
     /// counts, and times that were measured once.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[tree(default, skip_serializing_if = "Vec::is_empty")]
     pub samples: Vec<f64>,
     /// True if the figure depends on circumstances of the run and not on the device. It is reported, but not compared with a baseline.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    #[tree(default, skip_serializing_if = "std::ops::Not::not")]
     pub fleeting: bool,
 }
 
 /// Unit of a figure.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ToNode, FromNode)]
+#[tree(rename_all = "kebab-case")]
 pub enum Unit {
     /// The unit of the compared output: mm for distances, 1 for values from 0 to 1.
     Value,
@@ -175,36 +175,36 @@ pub enum Unit {
 }
 
 /// A fault that a check found in the device.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, ToNode, FromNode)]
+#[tree(deny_unknown_fields)]
 pub struct Fault {
     /// One line that describes the fault.
     pub what: String,
     /// The pass that computes wrongly, if known.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[tree(default, skip_serializing_if = "Option::is_none")]
     pub pass: Option<String>,
     /// Description of the input with which it occurred.
-    #[serde(default, skip_serializing_if = "String::is_empty")]
+    #[tree(default, skip_serializing_if = "String::is_empty")]
     pub input: String,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[tree(default, skip_serializing_if = "Option::is_none")]
     pub worst: Option<Worst>,
     /// Names of the picture files once they are written: actual, expected, difference.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[tree(default, skip_serializing_if = "Vec::is_empty")]
     pub files: Vec<String>,
 }
 
 /// The texel with the largest error.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, ToNode, FromNode)]
+#[tree(deny_unknown_fields)]
 pub struct Worst {
     /// Name of the output, as in the shader.
     pub output: String,
     /// Position of the texel: column, row, slice.
     pub at: [usize; 3],
     pub channel: usize,
-    #[serde(with = "any_number")]
+    #[tree(with = "any_number")]
     pub expected: f64,
-    #[serde(with = "any_number")]
+    #[tree(with = "any_number")]
     pub got: f64,
     /// Number of values of the output that are beyond tolerance; a texel has one for each channel.
     pub beyond: usize,
@@ -432,52 +432,27 @@ fn figure_fault(figure: &Figure) -> Option<String> {
     figure.samples.iter().enumerate().find_map(sample)
 }
 
-/// Serialization of numbers that may not be finite. JSON has no such numbers: they are the strings `NaN`, `Infinity` and `-Infinity`.
+/// Numbers that may not be finite. JSON has no such numbers: they are the strings `NaN`, `Infinity` and `-Infinity`.
 mod any_number {
-    use serde::de::{Error, Unexpected, Visitor};
-    use serde::{Deserializer, Serializer};
+    use crate::tree::{FromNode, Node, NodeError, ToNode};
 
-    pub fn serialize<S: Serializer>(value: &f64, serializer: S) -> Result<S::Ok, S::Error> {
+    pub fn to_node(value: &f64) -> Node {
         match value {
-            v if v.is_nan() => serializer.serialize_str("NaN"),
-            v if v.is_infinite() && *v > 0.0 => serializer.serialize_str("Infinity"),
-            v if v.is_infinite() => serializer.serialize_str("-Infinity"),
-            v => serializer.serialize_f64(*v),
+            v if v.is_nan() => "NaN".to_node(),
+            v if v.is_infinite() && *v > 0.0 => "Infinity".to_node(),
+            v if v.is_infinite() => "-Infinity".to_node(),
+            v => v.to_node(),
         }
     }
 
-    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-        deserializer.deserialize_any(Number)
-    }
-
-    struct Number;
-
-    impl Visitor<'_> for Number {
-        type Value = f64;
-
-        fn expecting(&self, to: &mut std::fmt::Formatter) -> std::fmt::Result {
-            to.write_str("a number, \"NaN\", \"Infinity\" or \"-Infinity\"")
-        }
-
-        fn visit_f64<E: Error>(self, value: f64) -> Result<f64, E> {
-            Ok(value)
-        }
-
-        fn visit_u64<E: Error>(self, value: u64) -> Result<f64, E> {
-            Ok(value as f64)
-        }
-
-        fn visit_i64<E: Error>(self, value: i64) -> Result<f64, E> {
-            Ok(value as f64)
-        }
-
-        fn visit_str<E: Error>(self, text: &str) -> Result<f64, E> {
-            match text {
-                "NaN" => Ok(f64::NAN),
-                "Infinity" => Ok(f64::INFINITY),
-                "-Infinity" => Ok(f64::NEG_INFINITY),
-                _ => Err(E::invalid_value(Unexpected::Str(text), &self)),
-            }
+    pub fn from_node(node: Node) -> Result<f64, NodeError> {
+        let word = String::from_node(node.clone());
+        match word.as_deref() {
+            Ok("NaN") => Ok(f64::NAN),
+            Ok("Infinity") => Ok(f64::INFINITY),
+            Ok("-Infinity") => Ok(f64::NEG_INFINITY),
+            _ => f64::from_node(node.clone())
+                .map_err(|_| node.invalid("a number, \"NaN\", \"Infinity\" or \"-Infinity\"")),
         }
     }
 }

@@ -9,6 +9,7 @@ use crate::common::program::PROGRAM;
 use echolume::low_level::scene::{Number, Settings, numbers};
 use echolume::low_level::source::formats::FORMATS;
 use echolume::low_level::source::keys::{Row, Use};
+use echolume::low_level::tree::ToNode;
 use serde_json::{Map, Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
@@ -239,17 +240,17 @@ fn doc(attributes: &[Attribute]) -> String {
     plain + rest
 }
 
-/// The arguments of `#[serde(...)]` by name, in order; those without a value have an empty one.
-fn serde_arguments(attributes: &[Attribute]) -> Vec<(String, String)> {
+/// The arguments of `#[tree(...)]` by name, in order; those without a value have an empty one.
+fn tree_arguments(attributes: &[Attribute]) -> Vec<(String, String)> {
     let mut found = Vec::new();
-    for attribute in attributes.iter().filter(|attribute| attribute.path().is_ident("serde")) {
-        let arguments = attribute.parse_args_with(Punctuated::<Meta, Token![,]>::parse_terminated).expect("serde");
+    for attribute in attributes.iter().filter(|attribute| attribute.path().is_ident("tree")) {
+        let arguments = attribute.parse_args_with(Punctuated::<Meta, Token![,]>::parse_terminated).expect("tree");
         for argument in arguments {
             let name = argument.path().get_ident().expect("a name").to_string();
             let value = match &argument {
                 Meta::NameValue(pair) => match &pair.value {
                     Expr::Lit(ExprLit { lit: Lit::Str(text), .. }) => text.value(),
-                    _ => panic!("serde's {name} is no text"),
+                    _ => panic!("{name} of tree is no text"),
                 },
                 _ => String::new(),
             };
@@ -263,7 +264,7 @@ fn argument<'a>(arguments: &'a [(String, String)], name: &str) -> Option<&'a str
     arguments.iter().find(|(key, _)| key == name).map(|(_, value)| value.as_str())
 }
 
-/// A variant's name as serde writes it.
+/// A variant's name as files have it.
 fn renamed(name: &str, rule: Option<&str>) -> String {
     match rule {
         None => name.to_string(),
@@ -275,11 +276,11 @@ fn renamed(name: &str, rule: Option<&str>) -> String {
             };
             name.chars().enumerate().map(dash).collect()
         }
-        Some(other) => panic!("serde's rename_all = {other} is not known here"),
+        Some(other) => panic!("rename_all = {other} is not known here"),
     }
 }
 
-/// Every public type of src/core/scene/settings with serde attributes, by name.
+/// Every public type of src/core/scene/settings with attributes of `tree`, by name.
 fn described_types() -> BTreeMap<String, Described> {
     let mut types = BTreeMap::new();
     for file in files("src/core/scene/settings", "rs") {
@@ -287,17 +288,17 @@ fn described_types() -> BTreeMap<String, Described> {
         for item in parsed.items {
             let (name, attributes, body) = match item {
                 Item::Struct(item) => {
-                    let all_default = argument(&serde_arguments(&item.attrs), "default").is_some();
+                    let all_default = argument(&tree_arguments(&item.attrs), "default").is_some();
                     let Fields::Named(fields) = item.fields else {
                         panic!("{file}: {} has no named fields", item.ident)
                     };
                     // What is skipped is in no file.
-                    let is_key = |field: &syn::Field| argument(&serde_arguments(&field.attrs), "skip").is_none();
+                    let is_key = |field: &syn::Field| argument(&tree_arguments(&field.attrs), "skip").is_none();
                     let keys = fields.named.into_iter().filter(is_key).map(|field| {
-                        let arguments = serde_arguments(&field.attrs);
+                        let arguments = tree_arguments(&field.attrs);
                         for (name, _) in &arguments {
                             let is_known = ["default", "skip_serializing_if"].contains(&name.as_str());
-                            assert!(is_known, "{file}: {name}: an argument of serde that is not known here");
+                            assert!(is_known, "{file}: {name}: an argument that is not known here");
                         }
                         Key {
                             name: field.ident.expect("a name").to_string(),
@@ -309,9 +310,9 @@ fn described_types() -> BTreeMap<String, Described> {
                     (item.ident, item.attrs, Body::Struct(keys.collect()))
                 }
                 Item::Enum(item) => {
-                    let rule = serde_arguments(&item.attrs);
+                    let rule = tree_arguments(&item.attrs);
                     let choices = item.variants.into_iter().map(|variant| {
-                        let arguments = serde_arguments(&variant.attrs);
+                        let arguments = tree_arguments(&variant.attrs);
                         let by_rule = || renamed(&variant.ident.to_string(), argument(&rule, "rename_all"));
                         let name = argument(&arguments, "rename").map_or_else(by_rule, str::to_string);
                         let aliases = arguments.into_iter().filter(|(key, alias)| key == "alias" && *alias != name);
@@ -406,12 +407,12 @@ fn with(settings: &mut Value, path: &[String], value: Value) {
     *place = value;
 }
 
-/// What serde makes of `value` at a path of otherwise default settings.
+/// What is read of `value` at a path of otherwise default settings.
 fn defaults(path: &[String], value: Value) -> Value {
     let mut asked = json!({});
     with(&mut asked, path, value);
-    let settings: Settings = serde_json::from_value(asked).unwrap_or_else(|e| panic!("{path:?}: {e}"));
-    let all = serde_json::to_value(settings).expect("settings");
+    let settings = Settings::read(asked.to_node()).unwrap_or_else(|e| panic!("{path:?}: {e}"));
+    let all = serde_json::to_value(settings.to_node()).expect("settings");
     path.iter().fold(all, |value, key| value[key.as_str()].clone())
 }
 
@@ -531,9 +532,9 @@ fn generated_settings_page_is_what_the_types_say() {
     let left: Vec<&str> = types.values().map(|t| t.name.as_str()).filter(|name| *name != "Settings").collect();
     let left: Vec<&&str> = left.iter().filter(|name| !page.met.contains(**name)).collect();
     assert!(left.is_empty(), "no setting has the type {left:?}");
-    let known = serde_json::to_value(Settings::default()).expect("settings");
+    let known = serde_json::to_value(Settings::default().to_node()).expect("settings");
     let known: BTreeSet<&String> = known.as_object().expect("a table").keys().collect();
-    assert_eq!(keys.iter().map(|key| &key.name).collect::<BTreeSet<_>>(), known, "keys that serde names otherwise");
+    assert_eq!(keys.iter().map(|key| &key.name).collect::<BTreeSet<_>>(), known, "keys that files name otherwise");
 
     let mut presets = String::new();
     for file in files("src/core/scene/presets", "toml") {

@@ -1,6 +1,7 @@
 //! One volume in memory: read from a file, computed, or copied from an array.
 
 use crate::{array, invalid};
+use echolume_base::tree::Node;
 use echolume_core::scene::{EchoHistogram, EchoLevels, Input, default_look::block_edge};
 use echolume_probe::{AxisOrder, Frame, Geometry, Indices, Probe, ProbeFile, SampleType, World};
 use echolume_source::phantom::{Phantom, PhantomOptions, PhantomSource};
@@ -235,8 +236,8 @@ impl Tables {
     fn file(self) -> PyResult<ProbeFile> {
         match self {
             Tables::Json(tables) => {
-                let tables = serde_json::from_str(&tables).map_err(invalid)?;
-                ProbeFile::from_json(Path::new("probe"), tables).map_err(invalid)
+                let tables = Node::parse_json(tables.as_bytes()).map_err(invalid)?;
+                ProbeFile::from_tables(Path::new("probe"), tables).map_err(invalid)
             }
             Tables::File(path) => ProbeFile::read(&path).map_err(invalid),
         }

@@ -3,7 +3,7 @@
 
 use crate::scene::number::Allowed::Range;
 use crate::scene::number::{ANGLE, Number, SHARE, number};
-use serde::{Deserialize, Serialize};
+use crate::tree::{FromNode, ToNode};
 
 /// Most body marks of a scene.
 pub const MAX_BODY_MARKS: usize = 4;
@@ -11,14 +11,14 @@ pub const MAX_BODY_MARKS: usize = 4;
 pub const BODY_MARK_SIZES: [f64; 2] = [0.06, 0.5];
 
 /// A body mark. It keeps its place on the picture whatever the view.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Copy, Debug, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields, default)]
 pub struct BodyMark {
     /// The part of the body.
     pub body: Body,
     /// Exchanges left and right of the outline, for example for the left breast, or for a fetus whose back is on the other side. `probe` and `angle`
     /// stay as they are.
-    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    #[tree(skip_serializing_if = "std::ops::Not::not")]
     pub mirrored: bool,
     /// Its centre, as shares of the picture's width and height from the upper left corner. Near an edge of the picture the mark is drawn further
     /// inside, so that all of it is on the picture. Absent: 0.12, 0.8.
@@ -47,8 +47,8 @@ impl Default for BodyMark {
 }
 
 /// The part of the body that a body mark shows; all but the head are seen from the front.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode, ToNode)]
+#[tree(rename_all = "kebab-case")]
 pub enum Body {
     /// The trunk from the ribs to the groins.
     #[default]

@@ -2,11 +2,11 @@
 
 use crate::scene::number::Allowed::Range;
 use crate::scene::number::{Number, number};
-use serde::{Deserialize, Serialize};
+use crate::tree::{FromNode, ToNode};
 
 /// The cine loop. The viewer plays it; `render --volumes loop` draws it.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Copy, Debug, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields, default)]
 pub struct Cine {
     /// The first volume that is played, by its number in the recording, from 0. Absent: the first one.
     pub first: Option<u32>,

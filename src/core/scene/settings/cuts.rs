@@ -2,7 +2,7 @@
 
 use crate::scene::number::Allowed::Range;
 use crate::scene::number::{LARGEST, LENGTH, LENGTH_OR_0, Number, PLACE, number};
-use serde::{Deserialize, Serialize};
+use crate::tree::{FromNode, ToNode};
 
 /// Most cuts of a scene.
 pub const MAX_CUTS: usize = 32;
@@ -15,30 +15,30 @@ pub const MAX_BRUSH_POINTS: usize = 512;
 /// A cut. What lies within its contour, seen from where that was drawn, is removed from renderings; with `keep = 'inside'` it is what lies outside.
 /// The cut keeps its place in the volume whatever the view: a prism of a parallel view, a cone of one in perspective. With `brush`, what lies near
 /// its strokes is removed instead.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, Default, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields)]
 pub struct Cut {
     /// Corners of the closed contour, 3 to 512: mm to the right of `view.at` and up, in the plane through it that faces the view. What the contour
     /// winds about is inside, also where it crosses itself. Required without `brush`, absent with it.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[tree(default, skip_serializing_if = "Vec::is_empty")]
     pub contour: Vec<[f64; 2]>,
     /// The view at which the contour was drawn. Absent: from the point 0, 0, 0 down, with +elevation up.
-    #[serde(default)]
+    #[tree(default)]
     pub view: CutView,
     /// The side of the contour that stays.
-    #[serde(default)]
+    #[tree(default)]
     pub keep: KeptSide,
     /// How deep the cut is: nothing is removed more than so many mm behind the contour's plane. Absent: it goes through everything.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[tree(default, skip_serializing_if = "Option::is_none")]
     pub depth: Option<f64>,
     /// A brush in place of a contour; `contour`, `view`, `keep` and `depth` are then absent.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[tree(default, skip_serializing_if = "Option::is_none")]
     pub brush: Option<Brush>,
 }
 
 /// A brush: what lies within a radius of its strokes is removed from renderings.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, Default, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields)]
 pub struct Brush {
     /// Distance from its strokes, mm, within which it removes.
     pub radius: f64,
@@ -55,8 +55,8 @@ impl Brush {
 }
 
 /// The view at which the contour of a cut was drawn.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields)]
 pub struct CutView {
     /// A point of the contour's plane, its origin, in mm: lateral, depth (from the probe's face), elevation.
     pub at: [f64; 3],
@@ -65,7 +65,7 @@ pub struct CutView {
     /// The upward direction of the view, not parallel to `direction`; only its part in the contour's plane counts.
     pub up: [f64; 3],
     /// Perspective: distance of the viewer's eye from the contour's plane, mm, in front of its origin. Absent: a parallel view.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[tree(default, skip_serializing_if = "Option::is_none")]
     pub eye: Option<f64>,
 }
 
@@ -77,8 +77,8 @@ impl Default for CutView {
 }
 
 /// The side of a cut's contour that stays.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode, ToNode)]
+#[tree(rename_all = "lowercase")]
 pub enum KeptSide {
     /// What is within the contour is removed.
     #[default]

@@ -4,12 +4,12 @@ use crate::scene::Settings;
 use crate::scene::labels::SharedLabels;
 use crate::scene::number::Allowed::Any;
 use crate::scene::number::{Group, Number, SHARE, number};
-use serde::{Deserialize, Serialize};
+use crate::tree::{FromNode, ToNode};
 
 /// Labels: a segmentation that is shown with the echoes (`render --labels`, `view --labels`). Planes show the boundary of each label and a
 /// translucent fill, renderings a translucent shell. They lie over the finished picture, in the colours of the file; without a file nothing of this applies.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Debug, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields, default)]
 pub struct Labels {
     /// Opacity of the fill on planes.
     pub fill: f64,
@@ -20,7 +20,7 @@ pub struct Labels {
     /// Share of the shell's opacity that is left where it lies at least 1.5 voxels behind a rendered surface. 0 hides it there.
     pub behind: f64,
     /// The labels themselves, which are in a file of their own.
-    #[serde(skip)]
+    #[tree(skip)]
     pub volume: Option<SharedLabels>,
 }
 

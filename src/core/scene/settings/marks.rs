@@ -1,11 +1,11 @@
 //! Settings of marks: the sides of the patient on every tile, and the bar of a written picture. No pass reads them.
 
+use crate::tree::{FromNode, ToNode};
 use glam::DVec3;
-use serde::{Deserialize, Serialize};
 
 /// Marks beside and on the picture. The viewer shows the sides and the dot of the probe's marker on every tile; `render` draws them only with `bar`.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, FromNode, ToNode)]
+#[tree(deny_unknown_fields, default)]
 pub struct Marks {
     /// The scan line at which the marker on the probe's housing is. A dot on each tile shows its side.
     pub probe: ProbeMarker,
@@ -22,8 +22,8 @@ pub struct Marks {
 }
 
 /// Where the marker of the probe is.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode, ToNode)]
+#[tree(rename_all = "kebab-case")]
 pub enum ProbeMarker {
     /// At the first scan line.
     #[default]
@@ -35,8 +35,8 @@ pub enum ProbeMarker {
 }
 
 /// The sides of the patient at the two ends of an axis, from the low end to the high one.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode, ToNode)]
+#[tree(rename_all = "kebab-case")]
 pub enum Sides {
     /// Not known: no letters.
     #[default]

@@ -3,7 +3,7 @@
 
 use crate::scene::number::Allowed::Range;
 use crate::scene::number::{Number, SHARE, number};
-use serde::{Deserialize, Serialize};
+use crate::tree::{FromNode, ToNode};
 
 /// Largest number of measurements and annotations of a scene.
 pub const MAX_MEASURES: usize = 64;
@@ -19,60 +19,60 @@ pub const MAX_TEXT: usize = 80;
 pub(crate) const MAX_MADE: usize = 200;
 
 /// A measurement or an annotation. It keeps its place in the volume whatever the view.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, Default, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields)]
 pub struct Measurement {
     /// What is measured.
     pub kind: MeasureKind,
     /// Its points in mm: lateral, depth (from the probe's face), elevation. A text has 1; a distance and an arrow (tip first) have 2, and an
     /// automatic volume has 2 corners of its box. An angle has 3 (its vertex is the second), and so has an ellipse (the ends of one axis and one of
     /// the other). A trace has 3 to 512, a distance on the surface 2 to 512, a volume by contours none.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[tree(default, skip_serializing_if = "Vec::is_empty")]
     pub points: Vec<[f64; 3]>,
     /// Of a volume: its 2 to 64 contours, each of 3 to 512 points in mm, in parallel planes or in planes through one axis.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[tree(default, skip_serializing_if = "Vec::is_empty")]
     pub contours: Vec<Vec<[f64; 3]>>,
     /// Text beside it, at most 80 characters.
-    #[serde(default, skip_serializing_if = "String::is_empty")]
+    #[tree(default, skip_serializing_if = "String::is_empty")]
     pub text: String,
     /// Of an automatic volume: the echo at the surface of the body, as a share of the sample range.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[tree(default, skip_serializing_if = "Option::is_none")]
     pub threshold: Option<f64>,
     /// Of an automatic volume: its result, mm^3. It belongs to the volume of the recording that was shown then.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[tree(default, skip_serializing_if = "Option::is_none")]
     pub counted: Option<f64>,
     /// Of an automatic volume: both ends of its interval of 95 %, mm^3. Absent: the result is the volume of all voxels of the box whose echo reaches
     /// the threshold, and has no interval.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[tree(default, skip_serializing_if = "Option::is_none")]
     pub interval: Option<[f64; 2]>,
     /// Its points were picked on the rendered surface: it is drawn on renderings. Others are drawn on the planes that they lie in.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    #[tree(default, skip_serializing_if = "std::ops::Not::not")]
     pub on_surface: bool,
     /// What it was made on. Absent: nothing in particular. While another volume than that in `made` is shown, the measurement is drawn dimmed.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[tree(default, skip_serializing_if = "Option::is_none")]
     pub made: Option<Made>,
 }
 
 /// What a measurement was made on: the volume, the plane or view, and the settings. The viewer writes it.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, Default, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields)]
 pub struct Made {
     /// The number of its volume in the recording, or since the start of a live source, from 0.
     pub volume: u32,
     /// The time stamp of that volume, s. Absent: the source states none.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[tree(default, skip_serializing_if = "Option::is_none")]
     pub time: Option<f64>,
     /// The plane or the view, in words with its place in mm and its directions, at most 200 characters.
-    #[serde(default, skip_serializing_if = "String::is_empty")]
+    #[tree(default, skip_serializing_if = "String::is_empty")]
     pub plane: String,
     /// The mode, and a digest of all settings but `picture`, `measure`, `body_marks`, `marks` and `cine`. At most 200 characters.
-    #[serde(default, skip_serializing_if = "String::is_empty")]
+    #[tree(default, skip_serializing_if = "String::is_empty")]
     pub settings: String,
 }
 
 /// What is measured or marked.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode, ToNode)]
+#[tree(rename_all = "lowercase")]
 pub enum MeasureKind {
     /// Caliper: the straight distance of two points.
     #[default]

@@ -31,15 +31,15 @@ pub use unveil::*;
 use super::MAX_PICTURE;
 use super::number::Allowed::{Any, Range};
 use super::number::{Group, LARGEST, LENGTH_OR_0, Number, PLACE, SHARE, number};
-use serde::{Deserialize, Serialize};
+use crate::tree::{FromNode, ToNode};
 
 /// Fewest points of a curved render start (`region.start_curve`).
 pub const MIN_START_POINTS: usize = 3;
 pub const MAX_START_POINTS: usize = 5;
 
 /// All settings of a scene.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Debug, Default, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields, default)]
 pub struct Settings {
     /// What a pixel shows.
     pub mode: Mode,
@@ -131,28 +131,28 @@ impl Settings {
 }
 
 /// What a pixel shows.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode, ToNode)]
+#[tree(rename_all = "lowercase")]
 pub enum Mode {
     /// VR: volume rendering, emission and absorption through a transfer function.
-    #[serde(alias = "vr")]
+    #[tree(alias = "vr")]
     Volume,
     /// SR: surface rendering, the first surface on each ray, lit.
     #[default]
-    #[serde(alias = "sr")]
+    #[tree(alias = "sr")]
     Surface,
     /// VR over SR: the volume in front of the surface is composited over it.
     Mixed,
     /// Maximum intensity projection: the largest sample on the ray.
     Mip,
     /// Minimum intensity projection: the smallest sample on the ray, within the insonified region.
-    #[serde(alias = "minip")]
+    #[tree(alias = "minip")]
     MinIp,
     /// X-ray: the mean of the samples on the ray, within the insonified region.
-    #[serde(alias = "xray")]
+    #[tree(alias = "xray")]
     Mean,
     /// MPR: one free plane through the volume.
-    #[serde(alias = "mpr")]
+    #[tree(alias = "mpr")]
     Plane,
     /// MPR: three orthogonal planes with cross-lines.
     Orthogonal,
@@ -184,14 +184,14 @@ impl Mode {
 }
 
 /// How the picture is divided.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode, ToNode)]
+#[tree(rename_all = "lowercase")]
 pub enum Layout {
     /// One picture: the rendering or the planes of the mode.
     #[default]
     Single,
     /// 4-up: the three orthogonal planes and the rendering of the mode.
-    #[serde(alias = "4up", alias = "4-up")]
+    #[tree(alias = "4up", alias = "4-up")]
     Four,
     /// The rendering of the mode, and the three orthogonal planes in a column on its right; in a picture that is higher than wide, in a row below it.
     Beside,
@@ -200,8 +200,8 @@ pub enum Layout {
 }
 
 /// The picture.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Debug, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields, default)]
 pub struct Picture {
     /// Width and height in pixels.
     pub size: [u32; 2],
@@ -214,8 +214,8 @@ impl Default for Picture {
 }
 
 /// The values of the samples. Applies to recordings that are opened to be rendered; a stream has the range that its source states.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Debug, Default, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields, default)]
 pub struct Samples {
     /// The values of the file that become 0 and 1; samples beyond are clamped. Absent: those that the probe file states, otherwise 0 and 255 for 8
     /// bits, otherwise the smallest and largest sample, without far outliers.
@@ -224,8 +224,8 @@ pub struct Samples {
 
 /// Region of interest: the box that is rendered, mm. Lateral counts from the middle, depth from the probe's face, elevation from the
 /// middle frame; a Cartesian volume uses its own axes. Where bounds are absent, the volume is whole along their axis.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Debug, Default, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields, default)]
 pub struct Region {
     /// Lower and upper lateral bound, mm.
     pub lateral: Option<[f64; 2]>,
@@ -245,8 +245,8 @@ pub struct Region {
 }
 
 /// A clip plane. It removes the side that its normal points to. Coordinates are lateral, depth (from the probe's face), elevation.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields)]
 pub struct Clip {
     /// Any point of the plane, mm.
     pub at: [f64; 3],
@@ -258,8 +258,8 @@ pub struct Clip {
 /// of the section there, as planes show it (`planes.window`), without light. Fluid stays open, so that one looks into a cavity. What is drawn
 /// translucent, such as preset glass, has no cut faces, and neither have renderings of what is dark. Cut faces show the volume that is rendered, with
 /// its filters.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Copy, Debug, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields, default)]
 pub struct Cap {
     /// Show the echoes of cut faces.
     pub enabled: bool,

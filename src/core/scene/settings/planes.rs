@@ -6,14 +6,14 @@ use crate::scene::number::Group::Planes as Group;
 use crate::scene::number::{ANGLE, Allowed, LARGEST, LENGTH, LENGTH_OR_0, Number, PLACE, SHARE, number};
 use crate::scene::planes::MAX_TILES;
 use crate::scene::{Mode, Scene, Settings};
-use serde::{Deserialize, Serialize};
+use crate::tree::{FromNode, ToNode};
 
 /// Modes plane, orthogonal and tomography, and the planes of layouts four and beside. A position and three angles define one coordinate frame for all
 /// planes. A is the B-mode plane (lateral to the right, depth down), B is perpendicular to it (elevation to the right, depth down), C is the coronal
 /// plane (lateral to the right, elevation up). All tiles are centred on the middle of the region, so that scrolling does not shift them, and have the
 /// same scale unless the line of a curved plane is too long for it.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Debug, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields, default)]
 pub struct Planes {
     /// Grey window: samples in this interval are stretched to 0..1.
     pub window: [f64; 2],
@@ -58,8 +58,8 @@ pub struct Planes {
 }
 
 /// The line of a curved plane: `curve = { plane = 'a', points = [[-20, 40], [0, 50], [20, 40]] }`.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Debug, Default, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields, default)]
 pub struct Curve {
     /// The plane that the line is drawn on. The line turns with that plane, and stays in the volume when the plane is stepped.
     pub plane: PlaneName,
@@ -97,8 +97,8 @@ impl Default for Planes {
 
 /// How the samples through a slab are combined. Only samples that are inside the insonified region and are not cut off by region or clip planes
 /// count.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode, ToNode)]
+#[tree(rename_all = "lowercase")]
 pub enum Slab {
     /// Mean: less speckle, contrast of soft tissue.
     #[default]
@@ -110,8 +110,8 @@ pub enum Slab {
 }
 
 /// The three orthogonal planes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode, ToNode)]
+#[tree(rename_all = "lowercase")]
 pub enum PlaneName {
     /// The B-mode plane: lateral to the right, depth down.
     #[default]
@@ -123,8 +123,8 @@ pub enum PlaneName {
 }
 
 /// Mode cube: the region as a solid block. Its faces show the samples that they cut.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Debug, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields, default)]
 pub struct Cube {
     /// Grey window: samples in this interval are stretched to 0..1.
     pub window: [f64; 2],
@@ -145,8 +145,8 @@ impl Default for Cube {
 }
 
 /// Inset of each face of the block, mm.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields, default)]
 pub struct Inset {
     /// How far the face towards -lateral is moved inwards, mm.
     pub left: f64,
@@ -163,8 +163,8 @@ pub struct Inset {
 }
 
 /// Tilt of each face of the block: two angles in deg about the two axes in the face.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields, default)]
 pub struct Tilt {
     /// Tilt of the face towards -lateral: right-handed about depth, then elevation, deg.
     pub left: [f64; 2],

@@ -4,12 +4,12 @@ use crate::scene::number::Allowed::{Any, Odd, OneOf, Range};
 use crate::scene::number::Group::Filters;
 use crate::scene::number::{Allowed, LENGTH, LENGTH_OR_0, NOT_NEGATIVE, Number, number};
 use crate::scene::{MAX_DEVIATION, MAX_WINDOW};
-use serde::{Deserialize, Serialize};
+use crate::tree::{FromNode, ToNode};
 
 /// Conditioning of the samples of polar frames before scan conversion (thesis 4.3), in this order: time gain compensation, low pass and
 /// decimation, log compression. Everything is off by default.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Debug, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields, default)]
 pub struct Conditioning {
     /// Time gain compensation: gains at increasing depths. Linear in dB between them, constant beyond the first and the last.
     pub tgc: Vec<Gain>,
@@ -40,8 +40,8 @@ impl Default for Conditioning {
 }
 
 /// A point of the time gain compensation curve.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields)]
 pub struct Gain {
     /// Depth along the line from the probe's face, mm.
     pub depth: f64,
@@ -78,8 +78,8 @@ impl Conditioning {
 }
 
 /// Stage 1: how a frame becomes a slice. The filters run in the order in which they are listed.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Debug, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields, default)]
 pub struct Slices {
     /// Pixels along the longer edge of a slice (sweeps only; a Cartesian volume keeps its voxels).
     pub pixels: u32,
@@ -131,8 +131,8 @@ impl Default for Slices {
 }
 
 /// Texel format of the volume: memory against error.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode, ToNode)]
+#[tree(rename_all = "lowercase")]
 pub enum VolumeFormat {
     /// `r16f`. On a device that truncates what it stores as such (llvmpipe) `r16`, which is more accurate there in the same time, unless a filter
     /// may leave values beyond 0..1 (`slices.perona_malik` with scheme aos-richardson).
@@ -163,8 +163,8 @@ impl VolumeFormat {
 
 /// Lee's sigma filter: the mean of the pixels of a window whose values lie within 2 sigma of the centre. Where too few do, it is the mean of the four
 /// neighbours.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Copy, Debug, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields, default)]
 pub struct Sigma {
     /// Window size, pixels; odd.
     pub window: u32,
@@ -186,8 +186,8 @@ impl Default for Sigma {
 }
 
 /// Noise model (Lee 1983): how the noise depends on the value.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode, ToNode)]
+#[tree(rename_all = "lowercase")]
 pub enum Noise {
     /// Independent of the value: speckle after log compression. A neighbour counts within 2 sigma.
     #[default]
@@ -198,8 +198,8 @@ pub enum Noise {
 
 /// The enhanced sigma filter (thesis 5.4): a sigma filter that estimates the centre first. Its window grows, ring by ring, until as many pixels are
 /// within 2 sigma of the estimate as the starting window holds, or until it has its largest size.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Copy, Debug, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields, default)]
 pub struct EnhancedSigma {
     /// Starting window size, pixels; odd.
     pub window: u32,
@@ -240,8 +240,8 @@ impl Default for EnhancedSigma {
 }
 
 /// Estimate of a pixel without noise from its neighbourhood (thesis 5.3.1).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode, ToNode)]
+#[tree(rename_all = "kebab-case")]
 pub enum Estimator {
     /// Median of 3x3.
     #[default]
@@ -267,8 +267,8 @@ impl Estimator {
 }
 
 /// Anisotropic diffusion with four neighbours (Perona and Malik 1990; thesis 5-9..5-12).
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Copy, Debug, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields, default)]
 pub struct PeronaMalik {
     /// Time stepping.
     pub scheme: Scheme,
@@ -318,8 +318,8 @@ impl PeronaMalik {
 }
 
 /// Time stepping of the diffusion equation.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode, ToNode)]
+#[tree(rename_all = "kebab-case")]
 pub enum Scheme {
     /// Forward Euler: one dispatch per step.
     #[default]
@@ -338,8 +338,8 @@ pub enum Scheme {
 
 /// Conductance as a function of the difference g of two neighbours, with the edge constant k: the two of Perona and Malik (1990, section V), which
 /// the thesis takes over (5.4.2). The paper says what each of them favours.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode, ToNode)]
+#[tree(rename_all = "lowercase")]
 pub enum Conductance {
     /// 1 / (1 + (g/k)^2): favours wide regions.
     #[default]
@@ -349,8 +349,8 @@ pub enum Conductance {
 }
 
 /// Separable 3D Gaussian in texture space: standard deviations (0 for none), or the size of a small kernel.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields, default)]
 pub struct Smooth {
     /// Standard deviation along lateral, mm.
     pub lateral: f64,
@@ -464,16 +464,16 @@ mod tests {
 }
 
 /// Whether slices get a slight blur.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(untagged, expecting = "must be true, false, or \"rendered\"")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, FromNode, ToNode)]
+#[tree(untagged, expecting = "must be true, false, or \"rendered\"")]
 pub enum Blur {
     Always(bool),
     Named(BlurName),
 }
 
 /// The named choices of a blur.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, FromNode, ToNode)]
+#[tree(rename_all = "lowercase")]
 pub enum BlurName {
     /// In modes that cast rays, and not in modes of planes.
     Rendered,

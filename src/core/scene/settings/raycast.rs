@@ -4,12 +4,12 @@ use crate::scene::number::Allowed::{Any, OffOr, OneOf, Range};
 use crate::scene::number::Group::{Quality, Volume as Group};
 use crate::scene::number::{ANGLE, LENGTH, Number, PLACE, SHARE, number, start_depths};
 use crate::scene::{Mode, Settings};
-use serde::{Deserialize, Serialize};
+use crate::tree::{FromNode, ToNode};
 
 /// The camera. With all angles zero it looks from the probe into the body, with lateral to the right. A single frame is seen from the side instead,
 /// like a B-mode picture.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Debug, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields, default)]
 pub struct Camera {
     /// Angle by which the direction of view turns towards +lateral, deg.
     pub azimuth: f64,
@@ -32,8 +32,8 @@ impl Default for Camera {
 }
 
 /// The rays of every mode that casts some.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Debug, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields, default)]
 pub struct Ray {
     /// Distance between samples, mm. Absent: one slice pixel.
     pub step: Option<f64>,
@@ -104,8 +104,8 @@ impl Default for Ray {
 }
 
 /// How a sample is interpolated between texels.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode, ToNode)]
+#[tree(rename_all = "lowercase")]
 pub enum Sampling {
     /// The fastest for the device. A GPU filters in hardware. A CPU loads texels faster than it emulates a sampler; it uses quads if a picture takes
     /// at least six samples per texel, or with `slices.still`, and if the volume has at most 2^27 texels.
@@ -117,7 +117,7 @@ pub enum Sampling {
     Exact,
     /// Like `exact`, from two texels that hold four packed neighbours each. For volumes of 8 or 16 bits. Needs four times the volume's
     /// memory in addition, and one more pass over every new slice.
-    #[serde(rename = "quads")]
+    #[tree(rename = "quads")]
     PackedNeighbours,
 }
 
@@ -134,8 +134,8 @@ impl Sampling {
 }
 
 /// How the slice index at a position of the sweep is computed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode, ToNode)]
+#[tree(rename_all = "lowercase")]
 pub enum SliceIndex {
     /// By a polynomial with an error of at most 1e-6 slices; by the table for a fan so wide that the polynomial would need more than 10 terms.
     #[default]
@@ -145,8 +145,8 @@ pub enum SliceIndex {
 }
 
 /// How a sample is interpolated between slices. Within a slice it is bilinear.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode, ToNode)]
+#[tree(rename_all = "kebab-case")]
 pub enum Elevation {
     /// Linear between two slices: slopes change at every slice.
     #[default]
@@ -161,8 +161,8 @@ pub enum Elevation {
 }
 
 /// Volume rendering.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Debug, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields, default)]
 pub struct Volume {
     /// Grey window: samples in this interval are stretched to 0..1 before the transfer function is applied.
     pub window: [f64; 2],
@@ -219,8 +219,8 @@ impl Default for Volume {
 }
 
 /// Compositing rule: the opacity a of a step of length h, with y = kappa h and kappa the absorption of the transfer function.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode, ToNode)]
+#[tree(rename_all = "kebab-case")]
 pub enum Compositing {
     /// a = min(y, 1): accurate for thin steps only.
     Riemann,
@@ -236,8 +236,8 @@ pub enum Compositing {
 }
 
 /// Shading of volume rendering.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode, ToNode)]
+#[tree(rename_all = "kebab-case")]
 pub enum Shading {
     /// Colours of the transfer function alone.
     #[default]
@@ -249,8 +249,8 @@ pub enum Shading {
 }
 
 /// A named transfer function, or its points.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(
+#[derive(Clone, Debug, PartialEq, FromNode, ToNode)]
+#[tree(
     untagged,
     expecting = "must be grey, sepia, skin, bone, cool, warm, a .toml file of points, or a list of points { at, colour, opacity }"
 )]
@@ -260,8 +260,8 @@ pub enum Transfer {
 }
 
 /// The named transfer functions.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, FromNode, ToNode)]
+#[tree(rename_all = "lowercase")]
 pub enum TransferName {
     /// Grey ramp.
     Grey,
@@ -278,8 +278,8 @@ pub enum TransferName {
 }
 
 /// A point of a transfer function. Colour and opacity are linear between points.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields)]
 pub struct TransferPoint {
     /// Sample value after the grey window, 0..1.
     pub at: f64,
@@ -290,8 +290,8 @@ pub struct TransferPoint {
 }
 
 /// Surface rendering: the surface detector (thesis, equation 4-3).
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Debug, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields, default)]
 pub struct Surface {
     /// Grey window: samples in this interval are stretched to 0..1 before the surface is detected.
     pub window: [f64; 2],
@@ -347,8 +347,8 @@ impl Default for Surface {
 }
 
 /// The colour of a surface that is lit.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode, ToNode)]
+#[tree(rename_all = "lowercase")]
 pub enum SurfaceColour {
     /// `light.surface_colour`.
     #[default]
@@ -361,8 +361,8 @@ pub enum SurfaceColour {
 }
 
 /// Length of an edge.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(untagged, expecting = "must be a length in mm, or \"samples\"")]
+#[derive(Clone, Copy, Debug, PartialEq, FromNode, ToNode)]
+#[tree(untagged, expecting = "must be a length in mm, or \"samples\"")]
 pub enum Edge {
     /// In mm.
     Length(f64),
@@ -370,16 +370,16 @@ pub enum Edge {
 }
 
 /// The named lengths of an edge.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, FromNode, ToNode)]
+#[tree(rename_all = "lowercase")]
 pub enum EdgeName {
     /// Four steps of the rays (thesis).
     Samples,
 }
 
 /// Detection rule of a surface.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode, ToNode)]
+#[tree(rename_all = "lowercase")]
 pub enum Detector {
     /// The difference exceeds the threshold (thesis).
     #[default]
@@ -396,8 +396,8 @@ pub enum Detector {
 }
 
 /// Sign of the edge at a surface; the thesis lists it among the settings, too (4.4.2.1).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode, ToNode)]
+#[tree(rename_all = "lowercase")]
 pub enum Sign {
     /// Bright tissue in dark fluid.
     #[default]
@@ -409,8 +409,8 @@ pub enum Sign {
 }
 
 /// Location of the surface within the edge.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode, ToNode)]
+#[tree(rename_all = "kebab-case")]
 pub enum Place {
     /// The maximum of the difference, refined by a parabola: a place that does not depend on the edge's height. The difference is followed until it
     /// falls below 0.7 of its maximum, over at most the edge's length times 0.25 / threshold, which counts as at least 1 and at most 16.
@@ -423,8 +423,8 @@ pub enum Place {
 }
 
 /// Projections: modes mip, minip and mean.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Debug, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields, default)]
 pub struct Projection {
     /// Grey window: samples in this interval are stretched to 0..1 before the projection.
     pub window: [f64; 2],

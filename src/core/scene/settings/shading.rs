@@ -5,12 +5,12 @@ use crate::scene::number::Allowed::{OffOr, OffOrOdd, Range};
 use crate::scene::number::Group::{Image, Light as Group, Surface};
 use crate::scene::number::{Allowed, LENGTH, LENGTH_OR_0, Number, PLACE, SHARE, number};
 use crate::scene::{MAX_WINDOW, Settings};
+use crate::tree::{FromNode, ToNode};
 use glam::DVec3;
-use serde::{Deserialize, Serialize};
 
 /// Stage 3: edge-preserving filters of the distance map, which run in the order in which they are listed.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Debug, Default, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields, default)]
 pub struct Distance {
     /// Window size of the median filter, pixels of the distance map; odd, 0 for none.
     pub median: u32,
@@ -56,20 +56,20 @@ impl Distance {
 }
 
 /// Bilateral filter: Gaussian in space and in distance.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields)]
 pub struct Bilateral {
     /// Standard deviation in the picture, pixels of the distance map.
-    #[serde(default)]
+    #[tree(default)]
     pub pixels: f64,
     /// Standard deviation in the picture in mm at the middle of the region, in place of `pixels`. It is limited to 10 pixels; below a tenth of a pixel
     /// there is no filter.
-    #[serde(default)]
+    #[tree(default)]
     pub mm: Option<f64>,
     /// Standard deviation of the distance, mm.
     pub distance: f64,
     /// How many times the filter is applied.
-    #[serde(default = "once")]
+    #[tree(default = "once")]
     pub repeat: u32,
 }
 
@@ -84,8 +84,8 @@ fn once() -> u32 {
 }
 
 /// Stage 3: the light. The direction uses the axes that `follows` names, the position those of the camera: right, up, towards the viewer.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Debug, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields, default)]
 pub struct Light {
     /// Direction from the surface to a distant light, in the axes that `follows` names. Its length does not matter, but must not be 0.
     pub direction: DVec3,
@@ -121,8 +121,8 @@ pub struct Light {
 }
 
 /// What the direction to a light is relative to.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode, ToNode)]
+#[tree(rename_all = "lowercase")]
 pub enum Follows {
     /// The camera: the light stays where it is in the picture.
     #[default]
@@ -158,8 +158,8 @@ impl Default for Light {
 /// spread as it goes, and scattered on in tissue. The coefficients of the light are those of `light`. Surfaces have no film curve: for them ambient
 /// and diffuse are divided by their sum where that exceeds 1. Colours are linear light: Narkowicz's fit (2015) of the ACES film curve compresses
 /// them, so that no highlight is cut off, and a gamma of 2.2 encodes them for a screen.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Copy, Debug, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields, default)]
 pub struct LightVolume {
     /// Edge of a cell, mm. Absent: half the standard deviation of the Gaussian that the volume is smoothed with (`slices.smooth`), and a slice pixel
     /// at least. Where there would be more cells than `cells` they are larger; `--explain` says what they are and why.
@@ -201,8 +201,8 @@ pub struct LightVolume {
 
 /// A backdrop that is brightest a little above the middle of the picture and falls off to its edges. Colours are linear light, like those of the
 /// transfer function, and may exceed 1.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Copy, Debug, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields, default)]
 pub struct Ground {
     /// Colour where it is brightest.
     pub middle: [f64; 3],
@@ -240,8 +240,8 @@ impl Default for LightVolume {
 }
 
 /// Shadow by tracing the distance map towards the light (thesis Fig. 41).
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Copy, Debug, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields, default)]
 pub struct Shadow {
     /// Share of the light named by `dims` that a full shadow removes.
     pub strength: f64,
@@ -258,8 +258,8 @@ pub struct Shadow {
 }
 
 /// What a shadow dims.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode, ToNode)]
+#[tree(rename_all = "lowercase")]
 pub enum Dims {
     /// Diffuse and specular light: ambient light still arrives.
     #[default]
@@ -275,8 +275,8 @@ impl Default for Shadow {
 }
 
 /// Ambient occlusion from the distance map around each pixel.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Copy, Debug, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields, default)]
 pub struct Occlusion {
     /// Radius around a place on the surface within which the surface occludes it, mm.
     pub radius: f64,
@@ -291,8 +291,8 @@ impl Default for Occlusion {
 }
 
 /// Skin shading: light wraps around the terminator, red further than blue, and shines through thin tissue.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Copy, Debug, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields, default)]
 pub struct Skin {
     /// How far the light wraps around the terminator: 0 not at all, 1 fully.
     pub wrap: f64,
@@ -311,8 +311,8 @@ impl Default for Skin {
 }
 
 /// Stage 4, postprocessing. The filters run in the order in which they are listed, then contrast, brightness, gamma and the colour map.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Debug, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields, default)]
 pub struct Post {
     /// Sigma filter.
     pub sigma: Option<Sigma>,
@@ -353,8 +353,8 @@ impl Default for Post {
 }
 
 /// Colour map of the picture's brightness.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode, ToNode)]
+#[tree(rename_all = "lowercase")]
 pub enum ColourMap {
     /// Keeps the colours.
     #[default]

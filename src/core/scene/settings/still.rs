@@ -2,14 +2,14 @@
 
 use crate::scene::number::Allowed::Range;
 use crate::scene::number::{Number, SHARE, number};
-use serde::{Deserialize, Serialize};
+use crate::tree::{FromNode, ToNode};
 
 /// A still: mode volume by paths of light that collide many times, without a denoiser. The transfer function describes the medium: its opacities give the
 /// extinction, and its colours are those that a half-space of the medium has under even light. The key light is `light.diffuse` in `light.direction`, and
 /// light comes from all around with the radiance `light.ambient`. Back light, exposure and ground are those of `light.volume`; without it there is no back
 /// light and no ground, and the exposure is 1. Specular light, cut faces of clip planes and early ray termination do not apply.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Copy, Debug, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields, default)]
 pub struct Still {
     /// Paths of a pixel. The standard error of the picture falls with the square root of their number.
     pub samples: u32,

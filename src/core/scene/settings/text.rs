@@ -1,10 +1,8 @@
-//! Settings as TOML and JSON. Serde's code for their some hundred types is compiled here, once for reading and once for writing. Other
-//! members call these functions.
+//! Settings as TOML and JSON.
 
 use super::Settings;
 use crate::scene::file_version::FileVersion;
-use crate::tree::{Node, NodeError};
-use serde::Deserialize;
+use crate::tree::{self, FromNode, Node, NodeError, ToNode};
 use std::sync::Once;
 use toml::{Table, Value};
 
@@ -26,15 +24,15 @@ impl Settings {
     /// # Errors
     /// The text is not valid TOML, a key is unknown, a value does not fit its type, or the version is not 1. The error has the position.
     pub fn from_toml(text: &str) -> Result<Settings, NodeError> {
-        Settings::from_node(Node::parse(text)?)
+        Settings::read(Node::parse(text)?)
     }
 
     /// Reads settings from a node of a larger parsed text. Limits of values are left to [`Settings::check`].
     ///
     /// # Errors
     /// A key is unknown, a value does not fit its type, or the version is not 1. The error has the position in the text.
-    pub fn from_node(mut node: Node) -> Result<Settings, NodeError> {
-        node.take("version").map(FileVersion::deserialize).transpose()?;
+    pub fn read(mut node: Node) -> Result<Settings, NodeError> {
+        node.take("version").map(FileVersion::from_node).transpose()?;
         if let Some(ray) = node.at("ray") {
             let pixels = subsampling(|name| {
                 let is_set = ray.at(name).and_then(|flag| flag.as_bool())?;
@@ -44,7 +42,7 @@ impl Settings {
                 ray.add("subsampling", pixels);
             }
         }
-        Settings::deserialize(node)
+        Settings::from_node(node)
     }
 
     /// Reads settings from a table with the keys of a scene file. Limits of values are left to [`Settings::check`].
@@ -52,7 +50,7 @@ impl Settings {
     /// # Errors
     /// A key is unknown, a value does not fit its type, or the version is not 1.
     pub fn from_table(table: Table) -> Result<Settings, NodeError> {
-        Settings::from_node(Node::from(Value::Table(table)))
+        Settings::read(Node::from(Value::Table(table)))
     }
 
     /// The settings as a scene file.
@@ -60,15 +58,15 @@ impl Settings {
     /// # Errors
     /// TOML cannot represent a value.
     pub fn to_toml(&self) -> Result<String, toml::ser::Error> {
-        toml::to_string(self.erased())
+        tree::to_toml(self)
     }
 
     /// The settings as a table with the keys of a scene file.
     ///
     /// # Errors
     /// TOML cannot represent a value.
-    pub fn to_table(&self) -> Result<Table, toml::ser::Error> {
-        Table::try_from(self.erased())
+    pub fn to_table(&self) -> Result<Table, NodeError> {
+        Table::from_node(self.to_node())
     }
 
     /// The settings as JSON. Numbers that are infinite or NaN become `null`.
@@ -76,7 +74,7 @@ impl Settings {
     /// # Errors
     /// A value cannot be serialized.
     pub fn to_json(&self) -> Result<String, serde_json::Error> {
-        serde_json::to_string(self.erased())
+        tree::to_json(self)
     }
 
     /// Renames keys of former versions in a table of settings to those of today, so that a later table overrides them.
@@ -90,9 +88,5 @@ impl Settings {
                 ray.entry("subsampling").or_insert(Value::Integer(pixels));
             }
         }
-    }
-
-    fn erased(&self) -> &dyn erased_serde::Serialize {
-        self
     }
 }

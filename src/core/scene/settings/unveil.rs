@@ -3,14 +3,14 @@
 use crate::scene::Settings;
 use crate::scene::number::Allowed::{Any, Range};
 use crate::scene::number::{Group, Number, number};
-use serde::{Deserialize, Serialize};
+use crate::tree::{FromNode, ToNode};
 
 /// Automatic render start: what lies in front of the fluid before a face, such as the uterine wall, is not rendered. In each volume the start surface
 /// is the near face of the pocket of fluid, within the region. Planes and the block of mode cube show everything; planes beside a rendering have the
 /// surface as a green line. Where no pocket can be told from the tissue around it, nothing is removed and one line says so: rendering starts at the
 /// region's or the mode's start depth. Takes a second volume, the whole sector in stage 1, and time of the CPU for each volume.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Copy, Debug, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields, default)]
 pub struct Unveil {
     /// Find the fluid and start there.
     pub enabled: bool,

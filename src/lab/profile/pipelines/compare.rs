@@ -3,13 +3,13 @@
 
 use super::{Pipeline, PipelineProfile};
 use crate::baselines::{differing, matched};
-use serde::Serialize;
+use crate::tree::ToNode;
 
 /// Ratio above which more registers or instructions are reported as worse.
 const GROWTH: f64 = 1.05;
 
 /// A pipeline whose value in a column differs between two profiles.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, ToNode)]
 pub struct Change {
     /// Shader, constants and formats in one line.
     pub pipeline: String,
@@ -22,7 +22,7 @@ pub struct Change {
 }
 
 /// The comparison of two sets of pipeline statistics.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, ToNode)]
 pub struct PipelineComparison {
     pub format: &'static str,
     /// Number of pipelines, by shader, constants and formats, that both sets have.

@@ -14,13 +14,13 @@ use crate::gpu::pipeline_measure::{self, MeasuredPipeline};
 use crate::gpu::{Context, GpuError, Shaders};
 use crate::machine;
 use crate::scene::Scene;
-use serde::{Deserialize, Serialize};
+use crate::tree::{self, FromNode, ToNode};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// The statistics of compiled pipelines on one device.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, ToNode, FromNode)]
+#[tree(deny_unknown_fields)]
 pub struct PipelineProfile {
     /// The name of the file format: [`Stored::FORMAT`].
     pub format: String,
@@ -41,34 +41,34 @@ pub struct PipelineProfile {
 }
 
 /// A measured pipeline, identified by its shader, constants and formats.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, ToNode, FromNode)]
+#[tree(deny_unknown_fields)]
 pub struct Pipeline {
     /// The first pass that uses it; None if not stored.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[tree(default, skip_serializing_if = "Option::is_none")]
     pub pass: Option<String>,
     pub shader: String,
     /// Values of specialization constants by name.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[tree(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub constants: BTreeMap<String, i32>,
     /// Formats of the inputs, such as `R8`, in the order in which the pass declares them.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[tree(default, skip_serializing_if = "Vec::is_empty")]
     pub formats: Vec<String>,
     /// Compile time without any cache, ms.
     pub(crate) cold_ms: f64,
     /// Compile time with a pipeline cache that holds it, ms.
     pub(crate) warm_ms: f64,
     /// True if the driver took the pipeline from the cache when `warm_ms` was measured. `None` if the driver does not report it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[tree(default, skip_serializing_if = "Option::is_none")]
     pub(crate) from_cache: Option<bool>,
     /// The executables that the driver compiled for it. The driver chooses one for a dispatch.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[tree(default, skip_serializing_if = "Vec::is_empty")]
     pub executables: Vec<Executable>,
 }
 
 /// An executable of a pipeline (VK_KHR_pipeline_executable_properties).
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, ToNode, FromNode)]
+#[tree(deny_unknown_fields)]
 pub struct Executable {
     pub name: String,
     /// Number of invocations in a subgroup.
@@ -187,8 +187,8 @@ impl Stored for PipelineProfile {
         self.check()?;
         let json = |fault: serde_json::Error| fault.to_string();
         let without = PipelineProfile { pipelines: Vec::new(), ..self.clone() };
-        let head = serde_json::to_string(&without).map_err(json)?;
-        let lines: Result<Vec<String>, _> = self.pipelines.iter().map(serde_json::to_string).collect();
+        let head = tree::to_json(&without).map_err(json)?;
+        let lines: Result<Vec<String>, _> = self.pipelines.iter().map(|pipeline| tree::to_json(pipeline)).collect();
         let lines = lines.map_err(json)?.join(",\n");
         // The list of pipelines is the last field and empty.
         let head = head.strip_suffix("]}").unwrap_or(&head);

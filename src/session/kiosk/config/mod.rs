@@ -9,9 +9,7 @@ use crate::live::Update;
 use crate::scene::load::{self, Layers, LoadError, line_of, transfer_file};
 use crate::scene::{FileVersion, Settings};
 use crate::text::printable;
-use crate::tree::{self, Node, NodeError};
-use serde::de::Error;
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use crate::tree::{self, FromNode, Node, NodeError, ToNode};
 use std::fmt;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -29,8 +27,8 @@ pub const PHANTOM: &str = "phantom";
 ///
 /// The keys at the top select the source. They are the flags of `echolume stream` with `_` for `-`, and are checked as those. Everything else is
 /// in tables.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Debug, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields, default)]
 pub struct Config {
     /// The version of this file's keys. Default: 1, the only one.
     version: FileVersion,
@@ -45,7 +43,7 @@ pub struct Config {
     /// Number of times that a recording is played, 1 or more. Default: 1.
     pub rounds: Option<u32>,
     /// Play a recording again and again, for demonstrations. Default: false.
-    #[serde(rename = "loop")]
+    #[tree(rename = "loop")]
     pub(crate) forever: bool,
     /// OpenIGTLink: the TRANSFORM or the tool of TDATA that gives the poses of 2D frames; `image`: the matrix of each image. Default: any
     /// TRANSFORM.
@@ -75,13 +73,13 @@ pub struct Config {
     pub live: Live,
     pub files: Files,
     /// Path of the file, and where its keys are.
-    #[serde(skip)]
+    #[tree(skip)]
     locations: KeyLocations,
 }
 
 /// The motor of the probe: the flags that `echolume stream --motor` has. `port` and `sweeps` are required.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Debug, Default, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields, default)]
 pub struct Motor {
     /// Serial port of the motor, for example `/dev/ttyUSB0`.
     pub port: Option<String>,
@@ -106,8 +104,8 @@ pub struct Motor {
 }
 
 /// Table `display`: the screen and the window.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Debug, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields, default)]
 pub struct Display {
     /// Show the window in full screen. Default: true.
     pub full_screen: bool,
@@ -124,15 +122,15 @@ pub struct Display {
     /// Scale of text and buttons, 0.5 to 4. Default: 1.
     pub scale: f64,
     /// Frame budget: longest time of a picture while the view moves, 1 ms to 10 s; `none` (None): no limit. Default: 33 ms.
-    #[serde(with = "optional_duration")]
+    #[tree(with = "optional_duration")]
     pub budget: Option<Duration>,
     /// Path of the error.json of `echolume report error` from which the quality ladder for the budget is made. Default: the built-in ladder.
     pub report: Option<PathBuf>,
 }
 
 /// How pictures reach the screen: the present mode of the swapchain.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode, ToNode)]
+#[tree(rename_all = "lowercase")]
 pub enum Present {
     /// Every picture, in order.
     #[default]
@@ -142,17 +140,17 @@ pub enum Present {
 }
 
 /// Table `keys`: key combinations of the kiosk.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Debug, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields, default)]
 pub struct Keys {
     /// The key combination that ends the program; `none` (the value None): no combination does. Default: ctrl+alt+q.
-    #[serde(with = "optional_chord")]
+    #[tree(with = "optional_chord")]
     pub exit: Option<Chord>,
 }
 
 /// Table `live`: how live volumes are shown and kept.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Debug, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields, default)]
 pub struct Live {
     /// How arriving frames become visible. Default: whole.
     pub update: Update,
@@ -161,15 +159,15 @@ pub struct Live {
     /// Largest memory of the cine loop, 16 to 65536 MiB, which also limits the number of its volumes. Default: 512.
     pub cine_memory_mb: u32,
     /// Time between attempts to open the source, 100 ms to 10 min. Default: 2 s.
-    #[serde(with = "duration")]
+    #[tree(with = "duration")]
     pub retry: Duration,
     /// Folder in which all frames that arrive are recorded. Default: none, no recording.
     pub record: Option<PathBuf>,
 }
 
 /// Table `files`: files that the program writes.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Debug, PartialEq, FromNode, ToNode)]
+#[tree(deny_unknown_fields, default)]
 pub struct Files {
     /// Folder for saved pictures and cine loops. Default: the current folder.
     pub pictures: Option<PathBuf>,
@@ -271,7 +269,7 @@ impl Config {
     /// One line that names the file and, as far as they are known, the line, the key and the allowed values.
     pub fn parse(text: &str, path: &Path) -> Result<Config, ConfigError> {
         let locations = KeyLocations::of(text, path)?;
-        let mut config: Config = tree::from_text(text).map_err(|e| locations.parse_error(&e))?;
+        let mut config: Config = tree::from_toml(text).map_err(|e| locations.parse_error(&e))?;
         config.locations = locations;
         config.check(text)?;
         config.resolve_paths()?;
@@ -283,7 +281,7 @@ impl Config {
     /// # Errors
     /// One line: a path is not UTF-8.
     pub fn to_toml(&self) -> Result<String, String> {
-        toml::to_string(self).map_err(|e| printable(&e.to_string()))
+        tree::to_toml(self).map_err(|e| printable(&e.to_string()))
     }
 
     /// The settings of the scene as layers, of which later ones take precedence: the presets of the phantom if that is the source, the presets,
@@ -365,7 +363,7 @@ impl Config {
         if transfer_file(&self.scene).is_none() {
             let scene = Node::parse(text).map(|mut all| all.take("scene"));
             scene
-                .and_then(|scene| scene.map_or(Ok(Settings::default()), Settings::from_node))
+                .and_then(|scene| scene.map_or(Ok(Settings::default()), Settings::read))
                 .map_err(|e| self.locations.parse_error(&e))?;
         }
         for preset in &self.preset {
@@ -378,41 +376,38 @@ impl Config {
     }
 }
 
-fn parse_time<E: Error>(text: &str) -> Result<Duration, E> {
-    humantime::parse_duration(text).map_err(|fault| E::custom(format!("{text:?} is not a time: {fault}")))
-}
-
-fn serialize_time<S: Serializer>(time: Duration, serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.collect_str(&humantime::format_duration(time))
-}
-
 /// A time as text, such as `2s`.
 mod duration {
     use super::*;
 
-    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Duration, D::Error> {
-        parse_time(&String::deserialize(deserializer)?)
+    pub fn from_node(node: Node) -> Result<Duration, NodeError> {
+        let text = String::from_node(node.clone())?;
+        humantime::parse_duration(&text).map_err(|fault| node.fault(format!("{text:?} is not a time: {fault}")))
     }
 
-    pub fn serialize<S: Serializer>(time: &Duration, serializer: S) -> Result<S::Ok, S::Error> {
-        serialize_time(*time, serializer)
+    pub fn to_node(time: &Duration) -> Node {
+        humantime::format_duration(*time).to_string().to_node()
     }
+}
+
+/// The value None of a key with a value of its own for that.
+const NONE: &str = "none";
+
+/// True if the value is the word `none`.
+fn is_none(node: &Node) -> bool {
+    String::from_node(node.clone()).is_ok_and(|word| word == NONE)
 }
 
 /// A time as text, or `none`.
 mod optional_duration {
     use super::*;
 
-    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Duration>, D::Error> {
-        let text = String::deserialize(deserializer)?;
-        if text == "none" { Ok(None) } else { parse_time(&text).map(Some) }
+    pub fn from_node(node: Node) -> Result<Option<Duration>, NodeError> {
+        if is_none(&node) { Ok(None) } else { duration::from_node(node).map(Some) }
     }
 
-    pub fn serialize<S: Serializer>(time: &Option<Duration>, serializer: S) -> Result<S::Ok, S::Error> {
-        match time {
-            Some(time) => serialize_time(*time, serializer),
-            None => serializer.serialize_str("none"),
-        }
+    pub fn to_node(time: &Option<Duration>) -> Node {
+        time.as_ref().map_or(NONE.to_node(), duration::to_node)
     }
 }
 
@@ -420,18 +415,16 @@ mod optional_duration {
 mod optional_chord {
     use super::*;
 
-    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Chord>, D::Error> {
-        match String::deserialize(deserializer)?.as_str() {
-            "none" => Ok(None),
-            text => Chord::parse(text).map(Some).map_err(Error::custom),
+    pub fn from_node(node: Node) -> Result<Option<Chord>, NodeError> {
+        if is_none(&node) {
+            return Ok(None);
         }
+        let text = String::from_node(node.clone())?;
+        Chord::parse(&text).map(Some).map_err(|fault| node.fault(fault.to_string()))
     }
 
-    pub fn serialize<S: Serializer>(keys: &Option<Chord>, serializer: S) -> Result<S::Ok, S::Error> {
-        match keys {
-            Some(chord) => serializer.collect_str(chord),
-            None => serializer.serialize_str("none"),
-        }
+    pub fn to_node(keys: &Option<Chord>) -> Node {
+        keys.as_ref().map_or(NONE.to_node(), |chord| chord.to_string().to_node())
     }
 }
 

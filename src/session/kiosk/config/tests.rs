@@ -23,12 +23,12 @@ fn keys(above: &str, table: &toml::Table) -> BTreeSet<String> {
     named.collect()
 }
 
-/// The keys of [`Config`], as serde lists them for an unknown key.
+/// The keys of [`Config`], as the error lists them for an unknown key.
 fn keys_of_the_type() -> BTreeSet<String> {
     let mut all = BTreeSet::new();
     for (above, text) in ["", "motor", "display", "keys", "live", "files"].map(|t| (t, format!("[{t}]\nzz = 1"))) {
         let text = if above.is_empty() { "zz = 1" } else { &text };
-        let message = toml::from_str::<Config>(text).expect_err("zz is unknown").message().to_string();
+        let message = tree::from_toml::<Config>(text).expect_err("zz is unknown").message().to_string();
         let names = message.split('`').skip(3).step_by(2);
         all.extend(names.map(|name| if above.is_empty() { name.into() } else { format!("{above}.{name}") }));
     }
@@ -48,8 +48,8 @@ fn the_example_has_every_key_and_marks_values_that_are_not_the_default() {
     parse(&off.replace("rounds = 3", "").replace("stamps = true", "")).expect("all of it");
 
     let example = parse(EXAMPLE).expect("the example");
-    let shown = toml::Table::try_from(&example).expect("tables");
-    let defaults = toml::Table::try_from(Config::default()).expect("tables");
+    let shown = toml::Table::from_node(example.to_node()).expect("tables");
+    let defaults = toml::Table::from_node(Config::default().to_node()).expect("tables");
     for (name, value) in keys("", &shown).iter().map(|key| (key, at(&shown, key))) {
         let line =
             EXAMPLE.lines().position(|l| l.starts_with(&format!("{} =", name.rsplit('.').next().expect("a name"))));
