@@ -1,8 +1,8 @@
 //! The pipelines that the first geometry of a stream needs. They are compiled on a thread while the window stays responsive, and again for
 //! settings that the user changes meanwhile.
 
+use super::asked::Asked;
 use crate::gpu::{GpuError, Preparation, Prepared};
-use crate::scene::Settings;
 
 /// Limit of the changes of settings that are followed while pipelines are compiled, before the geometry begins.
 const MOST_CHANGES: u32 = 2;
@@ -19,8 +19,8 @@ pub(super) struct FirstPipelines {
 
 struct Making {
     preparation: Preparation,
-    /// The settings that it was begun for, as drawn and at full quality.
-    settings: [Settings; 2],
+    /// The settings that it was begun for.
+    asked: Asked,
     /// How many were begun before, for settings that have changed since.
     changes: u32,
 }
@@ -42,22 +42,22 @@ impl FirstPipelines {
     }
 
     /// True if the pipelines of these settings are compiled, or will be when the geometry begins. Otherwise they are being compiled: `begin` starts
-    /// that unless a compilation still runs. `settings`: as drawn, and at full quality. `begin` returns None if there is nothing to compile in
+    /// that unless a compilation still runs. `begin` returns None if there is nothing to compile in
     /// advance; then the result is true.
     ///
     /// # Errors
     /// The error with which a renderer of the settings would fail, a lost device, or the error of `begin`.
     pub fn advance<E: From<GpuError>>(
         &mut self,
-        settings: [Settings; 2],
-        begin: impl FnOnce(&[Settings; 2]) -> Result<Option<Preparation>, E>,
+        asked: Asked,
+        begin: impl FnOnce(&Asked) -> Result<Option<Preparation>, E>,
     ) -> Result<bool, E> {
         if self.is_working() == Some(true) {
             return Ok(false);
         }
         let mut changes = 0;
         if let Some(done) = self.making.take() {
-            let is_current = done.settings == settings || done.changes == MOST_CHANGES;
+            let is_current = done.asked == asked || done.changes == MOST_CHANGES;
             match done.preparation.finish() {
                 // None after a panic: what is missing is compiled when the geometry begins, and what was compiled before is kept.
                 Ok(made) => self.made = made.or(self.made.take()),
@@ -69,7 +69,7 @@ impl FirstPipelines {
             }
             changes = done.changes + 1;
         }
-        self.making = begin(&settings)?.map(|preparation| Making { preparation, settings, changes });
+        self.making = begin(&asked)?.map(|preparation| Making { preparation, asked, changes });
         Ok(self.making.is_none())
     }
 

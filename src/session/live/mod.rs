@@ -6,6 +6,7 @@
 //! [`cine`] keeps the last volumes for review. After the first frame of a geometry nothing allocates, compiles or waits for the whole
 //! device.
 
+mod asked;
 pub mod cine;
 pub mod feed;
 mod first_pipelines;

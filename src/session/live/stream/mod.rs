@@ -2,6 +2,7 @@
 
 mod state;
 
+use super::asked::Asked;
 use super::cine::{Cine, CineLimits};
 use super::feed::{Arrived, Feed, FeedCounts};
 use super::first_pipelines::FirstPipelines;
@@ -37,15 +38,6 @@ pub enum StartStep {
     Picture,
 }
 
-/// Settings whose picture takes a 16th of the rays.
-fn coarse(settings: &Settings) -> Settings {
-    let mut coarse = settings.clone();
-    if !settings.mode.is_flat() {
-        (coarse.ray.subsampling, coarse.ray.rays) = (4, 1);
-    }
-    coarse
-}
-
 /// What a call of [`Stream::step`] did.
 #[derive(Debug)]
 pub enum Step {
@@ -75,9 +67,7 @@ pub struct Stream {
     feed: Feed,
     /// The counts of earlier feeds.
     earlier_feeds: FeedCounts,
-    settings: Settings,
-    /// The settings at full quality, if [`Stream::settings`] are lowered ones.
-    full: Option<Settings>,
+    asked: Asked,
     options: StreamOptions,
     first_volume: Option<FirstVolume>,
     /// The basis of default settings that was found and not yet returned by [`Stream::take_found`].
@@ -100,8 +90,6 @@ pub struct Stream {
     /// Its counts go on in the next session.
     previous_pool: Option<VolumePool>,
     first_pipelines: FirstPipelines,
-    /// The next picture is drawn with few rays.
-    is_coarse: bool,
     /// The source has ended, and why.
     end: Option<Option<String>>,
     began: Instant,
@@ -119,12 +107,10 @@ impl Stream {
             context: context.clone(),
             feed,
             earlier_feeds: FeedCounts::default(),
-            settings,
-            full: None,
+            asked: Asked { full: settings, lowered: None, is_coarse: options.coarse_first },
             first_volume: options.chosen.clone().map(FirstVolume::new),
             found: None,
             first_pipelines: FirstPipelines::default(),
-            is_coarse: options.coarse_first,
             options,
             session: None,
             cine: Cine::new(CineLimits::default(), 0),
@@ -234,10 +220,11 @@ impl Stream {
 
     /// The first picture is there: what follows is drawn in full. True if it had fewer rays.
     fn draw_in_full(&mut self) -> Result<bool, StreamError> {
-        let was_coarse = std::mem::take(&mut self.is_coarse) && coarse(&self.settings) != self.settings;
+        let coarse = self.asked.drawn();
+        self.asked.is_coarse = false;
+        let was_coarse = coarse != self.asked.drawn();
         if let (true, Some(session), Some(header)) = (was_coarse, &mut self.session, &self.header) {
-            let full = views(header, &self.settings, self.full.as_ref(), &self.options)?;
-            session.pending = Pending::Ready(full);
+            session.pending = Pending::Ready(views(header, &self.asked, &self.options)?);
         }
         Ok(was_coarse)
     }
@@ -260,9 +247,7 @@ impl Stream {
             Begun::Refused(fault) => {
                 // Another geometry or device does not try the refused settings again.
                 if session.pending.is_none() {
-                    let shown = session.views.first().settings.clone();
-                    let ray = if self.is_coarse { self.settings.ray.clone() } else { shown.ray.clone() };
-                    (self.settings, self.full) = (Settings { ray, ..shown }, None);
+                    self.asked.go_back_to(&session.views.first().settings);
                 }
                 return Ok(Some(Step::Fault(fault)));
             }
@@ -281,25 +266,22 @@ impl Stream {
             self.first_pipelines = pipelines;
             return Ok(true);
         };
-        let settings = self.first_settings(header);
-        let begin = |settings: &[Settings; 2]| {
-            let views = views(header, &settings[0], Some(&settings[1]), &self.options)?;
+        let asked = self.first_asked(header);
+        let begin = |asked: &Asked| {
+            let views = views(header, asked, &self.options)?;
             let options = self.renderer_options(self.options.images);
             Ok(Preparation::begin(&self.context, views.first().clone(), &options, wake.clone())?)
         };
-        let is_prepared = pipelines.advance(settings, begin);
+        let is_prepared = pipelines.advance(asked, begin);
         self.first_pipelines = pipelines;
         is_prepared
     }
 
-    /// The settings that a geometry would begin with now, as drawn and at full quality.
-    fn first_settings(&self, header: &Header) -> [Settings; 2] {
+    /// The settings that a geometry would begin with now.
+    fn first_asked(&self, header: &Header) -> Asked {
         let found = self.first_volume.as_ref().and_then(|search| search.at_begin(header));
         let found = found.and_then(|found| found.settings().ok());
-        let found = found.map(|found| Settings { picture: self.settings.picture.clone(), ..found });
-        let settings = self.drawn(found.as_ref().unwrap_or(&self.settings));
-        let full = if found.is_some() { None } else { self.full.as_ref() };
-        [settings, full.or(found.as_ref()).unwrap_or(&self.settings).clone()]
+        found.map_or_else(|| self.asked.clone(), |found| self.asked.with_look(found))
     }
 
     /// The next geometry cannot begin. After the loss of the device it is prepared again, otherwise it may begin on another device.
@@ -313,11 +295,6 @@ impl Stream {
             self.cine = Cine::new(CineLimits::default(), 0);
             self.header = next;
         }
-    }
-
-    /// Settings as the next picture is drawn with them.
-    fn drawn(&self, settings: &Settings) -> Settings {
-        if self.is_coarse { coarse(settings) } else { settings.clone() }
     }
 
     fn renderer_options(&self, volume_images: u32) -> gpu::RendererOptions {
@@ -449,9 +426,9 @@ impl Stream {
     fn look_at(&mut self, frame: &Frame) {
         let Some(found) = self.first_volume.as_mut().and_then(|search| search.frame(frame)) else { return };
         // A user may have changed settings meanwhile. The caller knows, and lays its own over these.
-        match found.settings().map(|settings| Settings { picture: self.settings.picture.clone(), ..settings }) {
-            Ok(settings) => {
-                if let Err(fault) = self.change(settings) {
+        match found.settings().map(|settings| self.asked.with_look(settings)) {
+            Ok(asked) => {
+                if let Err(fault) = self.change_to(asked) {
                     tracing::debug!("windows of the first volume: {fault}");
                 }
                 self.found = Some(found);
@@ -477,16 +454,14 @@ impl Stream {
         self.frames_before = self.statistics.frames;
         let found = self.first_volume.as_mut().and_then(|search| search.begin(&header));
         if let Some(settings) = found.as_ref().and_then(|found| found.settings().ok()) {
-            self.settings = Settings { picture: self.settings.picture.clone(), ..settings };
-            self.full = None;
+            self.asked = self.asked.with_look(settings);
             self.found = found;
         }
         // Freed before the new one is created: both may not fit into device memory.
         if let Some(Session { pool, .. }) = session {
             self.previous_pool = Some(pool);
         }
-        let full = self.full.as_ref().unwrap_or(&self.settings);
-        let views = views(&header, &self.drawn(&self.settings), Some(full), &self.options)?;
+        let views = views(&header, &self.asked, &self.options)?;
         if let Some(cut) = views.first().probe().and_then(Probe::folded) {
             tracing::warn!("{cut}");
         }
@@ -527,7 +502,7 @@ impl Stream {
     /// The geometry cannot be drawn with the settings; the previous ones remain. If only the device refuses them, a later [`Step::Fault`]
     /// reports it.
     pub fn change(&mut self, settings: Settings) -> Result<(), StreamError> {
-        self.change_to(settings, None)
+        self.change_to(Asked { full: settings, lowered: None, is_coarse: self.asked.is_coarse })
     }
 
     /// Changes the settings as [`Stream::change`] does, to ones of lower quality that temporarily replace `full`, those at full quality.
@@ -535,16 +510,14 @@ impl Stream {
     /// # Errors
     /// The geometry cannot be drawn with the settings; the previous ones remain.
     pub fn lower(&mut self, settings: Settings, full: Settings) -> Result<(), StreamError> {
-        self.change_to(settings, Some(full))
+        self.change_to(Asked { full, lowered: Some(settings), is_coarse: self.asked.is_coarse })
     }
 
-    fn change_to(&mut self, settings: Settings, full: Option<Settings>) -> Result<(), StreamError> {
-        let drawn = self.drawn(&settings);
+    fn change_to(&mut self, asked: Asked) -> Result<(), StreamError> {
         if let (Some(session), Some(header)) = (&mut self.session, &self.header) {
-            let full = full.as_ref().unwrap_or(&settings);
-            session.pending = Pending::Ready(views(header, &drawn, Some(full), &self.options)?);
+            session.pending = Pending::Ready(views(header, &asked, &self.options)?);
         }
-        (self.settings, self.full) = (settings, full);
+        self.asked = asked;
         Ok(())
     }
 
@@ -620,7 +593,11 @@ impl Stream {
         let scenes = next.into_iter().map(|(settings, full)| {
             let (header, options, backward) = (header.clone(), options.clone(), session.swept_backward().to_vec());
             let make = move || {
-                let views = views(&header, &settings, full.as_ref(), &options).ok()?;
+                let asked = match full {
+                    Some(full) => Asked { full, lowered: Some(settings), is_coarse: false },
+                    None => Asked { full: settings, lowered: None, is_coarse: false },
+                };
+                let views = views(&header, &asked, &options).ok()?;
                 Some(views.of(&backward).into_owned())
             };
             Box::new(make) as SceneMaker
@@ -645,16 +622,11 @@ impl Stream {
     }
 }
 
-/// The views of settings, which may be lowered from `full`.
-fn views(
-    header: &Header,
-    settings: &Settings,
-    full: Option<&Settings>,
-    options: &StreamOptions,
-) -> Result<Views, SceneError> {
-    let views = Views::new(header, settings, options.update)?;
+/// The scenes of the settings that were asked for.
+fn views(header: &Header, asked: &Asked, options: &StreamOptions) -> Result<Views, SceneError> {
+    let views = Views::new(header, &asked.drawn(), options.update)?;
     match &options.lowered {
-        Some(lowered) => views.sharing(header, full.unwrap_or(settings), &**lowered),
+        Some(lowered) => views.sharing(header, &asked.full, &**lowered),
         None => Ok(views),
     }
 }
