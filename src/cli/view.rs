@@ -31,6 +31,7 @@ use std::time::Duration;
                   echolume view --source igtl://localhost:18944 --full-screen\n  \
                   echolume view --source phantom --rate 3 --budget 16ms --report error.json\n  \
                   echolume view --direct --monitor HDMI --size 1920x1080\n  \
+                  echolume view --unseen --size 1920x1080 --for 1m\n  \
                   echolume view --kiosk --config /etc/echolume/echolume.toml"
 )]
 pub struct View {
@@ -67,6 +68,9 @@ pub struct View {
     /// Use a monitor without a desktop (VK_KHR_display); keys, mice and touch screens come from the kernel (needs the group input)
     #[arg(long, conflicts_with = "full_screen")]
     direct: bool,
+    /// Present on a surface that nobody sees (VK_EXT_headless_surface), without input: to measure a machine without a monitor. --size is its size
+    #[arg(long, conflicts_with_all = ["full_screen", "monitor", "direct", "kiosk", "config"])]
+    unseen: bool,
     /// Refresh rate of the monitor [default: the highest at its size; --size selects a size]
     #[arg(long, value_name = "HZ", requires = "direct")]
     refresh: Option<f64>,
@@ -147,6 +151,7 @@ impl View {
         if self.direct || place.direct.is_some() {
             place.direct = Some(self.monitor_request(place.direct)?);
         }
+        place.unseen = self.unseen;
         place.shape.full_screen |= self.full_screen;
         place.shape.stays_open = kiosk;
         place.shape.time = self.time.map(Into::into);

@@ -2,7 +2,7 @@
 
 use super::error_report::read_report;
 use crate::args::{SceneArgs, SourceArgs, pipeline_folder};
-use crate::gpu::window::{MonitorChoice, PresentMode};
+use crate::gpu::window::{MonitorChoice, PresentMode, Target};
 use crate::gpu::{Context, ContextOptions, GpuError, Wake};
 use crate::kiosk::config::{Config, Present};
 use crate::live::StreamOptions;
@@ -32,6 +32,8 @@ pub struct WindowConfig {
     pub shape: WindowOptions,
     /// The monitor to draw on directly, without a window system. None: a window.
     pub direct: Option<MonitorChoice>,
+    /// Present on a surface of the window's size that nobody sees.
+    pub unseen: bool,
 }
 
 impl WindowConfig {
@@ -43,6 +45,7 @@ impl WindowConfig {
         WindowConfig {
             device,
             direct,
+            unseen: false,
             shape: WindowOptions {
                 size: DEFAULT_SIZE,
                 full_screen: false,
@@ -61,17 +64,17 @@ impl WindowConfig {
     /// There is no window system or no such monitor, no device can present there, the input devices of a direct monitor cannot be read, or the device
     /// or the monitor is lost repeatedly.
     pub fn run(self, make: Box<MakeConsole>) -> Result<(Console, Arc<Context>), GpuError> {
-        match self.direct {
+        let unseen = self.unseen.then_some(Target::Unseen(self.shape.size));
+        match unseen.or(self.direct.map(Target::Monitor)) {
             None => window::run(&self.device, self.shape, make),
             #[cfg(target_os = "linux")]
-            Some(wanted) => {
-                // Grab the keyboard: otherwise the shell of the terminal would run what is typed.
+            Some(target) => {
                 let (present_mode, time) = (self.shape.present_mode, self.shape.time);
-                let shape = crate::ui::direct::DirectOptions { monitor: wanted, present_mode, grab: true, time };
-                crate::ui::direct::run(&self.device, shape, make)
+                let options = crate::ui::direct::DirectOptions { target, present_mode, time };
+                crate::ui::direct::run(&self.device, options, make)
             }
             #[cfg(not(target_os = "linux"))]
-            Some(_) => Err(GpuError::Window("--direct is for Linux".into())),
+            Some(_) => Err(GpuError::Window("--direct and --unseen are for Linux".into())),
         }
     }
 

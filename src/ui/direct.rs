@@ -1,11 +1,12 @@
-//! The console directly on a monitor (VK_KHR_display), with input from the kernel: for a cart without a windowing system.
+//! The console without a windowing system: directly on a monitor (VK_KHR_display), with input from the kernel, for a cart; or on a surface that
+//! nobody sees, without input, to measure a machine without a monitor.
 
 use super::console::Console;
 use super::devices::{DeviceMessage, Devices};
 use super::input::Input;
 use super::recovery::{self, Lost, Output, Recovery, RecoveryStep};
 use super::window::MakeConsole;
-use crate::gpu::window::{MonitorChoice, PresentMode, Screen, Target, monitor_size};
+use crate::gpu::window::{PresentMode, Screen, Target, fixed_size};
 use crate::gpu::{Context, ContextOptions, GpuError};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -13,19 +14,17 @@ use std::time::{Duration, Instant};
 /// How long the cursor is visible after the mouse moved.
 const CURSOR_TIME: Duration = Duration::from_secs(3);
 
-/// How the console is shown on a monitor without a window system.
+/// How the console is shown without a window system.
 pub struct DirectOptions {
-    /// Which monitor and which of its modes is used.
-    pub monitor: MonitorChoice,
+    /// A monitor, or the surface that nobody sees.
+    pub target: Target,
     pub present_mode: PresentMode,
-    /// True if no other program, such as the text console, gets events of the input devices.
-    pub grab: bool,
     /// The console ends after this time; None: it does not end by itself.
     pub time: Option<Duration>,
 }
 
-/// Takes over a monitor and runs the console that `make` creates, until the user leaves or `options.time` is over. Returns the console and its last
-/// context.
+/// Takes over a monitor and all input devices, and runs the console that `make` creates, until the user leaves or `options.time` is over. A surface
+/// that nobody sees has no input. Returns the console and its last context.
 ///
 /// # Errors
 /// No device has such a monitor, or another program uses it; the input devices cannot be read; or the device or the monitor is lost repeatedly.
@@ -34,21 +33,23 @@ pub fn run(
     options: DirectOptions,
     mut make: Box<MakeConsole>,
 ) -> Result<(Console, Arc<Context>), GpuError> {
-    let output =
-        Output { device, target: Target::Monitor(options.monitor.clone()), present_mode: options.present_mode };
+    let output = Output { device, target: options.target, present_mode: options.present_mode };
     let context = Context::for_presentation(device, &output.target)?;
-    let size = monitor_size(&context, &options.monitor)?;
+    let size = fixed_size(&context, &output.target)?;
     let screen = Screen::new(&context, output.target.clone(), size, options.present_mode)?;
-    let devices = Devices::open(size, options.grab)
-        .map_err(|e| GpuError::Window(format!("input devices cannot be read: {e}")))?;
+    // The keyboard is grabbed: otherwise the shell of the terminal would run what is typed.
+    let devices = match output.target {
+        Target::Unseen(_) => Devices::none(),
+        _ => Devices::open(size, true),
+    };
+    let devices = devices.map_err(|e| GpuError::Window(format!("input devices cannot be read: {e}")))?;
     // The distance of the monitor is unknown: text has the size for a desk.
     let mut console = make(&context, size, 1.0, devices.wake());
     console.set_screen(Some(screen));
     let (recovery, cursor, has_presented) = (Recovery::default(), CursorTimer::default(), false);
     let ends = options.time.map(|time| Instant::now() + time);
-    let monitor = options.monitor;
     let mut direct_loop =
-        DirectLoop { output, monitor, context, console, make, devices, size, recovery, cursor, has_presented, ends };
+        DirectLoop { output, context, console, make, devices, size, recovery, cursor, has_presented, ends };
     direct_loop.run()?;
     // Drop the devices first, so that the text console gets the keys again.
     let DirectLoop { console, context, .. } = direct_loop;
@@ -57,13 +58,12 @@ pub fn run(
 
 struct DirectLoop<'a> {
     output: Output<'a>,
-    monitor: MonitorChoice,
     devices: Devices,
     // The console is dropped before its context: it holds the screen.
     console: Console,
     make: Box<MakeConsole<'a>>,
     context: Arc<Context>,
-    /// Size of the monitor, pixels.
+    /// Size of the monitor or surface, pixels.
     size: [u32; 2],
     recovery: Recovery,
     cursor: CursorTimer,
@@ -120,9 +120,10 @@ impl DirectLoop<'_> {
                 Ok(NextUpdate::Wait(next.wake_at))
             }
             // Drivers list monitors that they cannot use.
-            Err((Lost::Screen, fault)) if !self.has_presented => {
-                Err(GpuError::Window(format!("{fault}; does a desktop hold the monitor?")))
-            }
+            Err((Lost::Screen, fault)) if !self.has_presented => match self.output.target {
+                Target::Monitor(_) => Err(GpuError::Window(format!("{fault}; does a desktop hold the monitor?"))),
+                _ => Err(fault),
+            },
             Err((lost, fault)) => {
                 tracing::warn!("{fault}; trying again");
                 if self.recovery.lost(lost, now) { Ok(NextUpdate::Wait(Some(now))) } else { Err(fault) }
@@ -132,8 +133,8 @@ impl DirectLoop<'_> {
 
     /// Restores what is lost. By then the monitor may be another one, or in another mode.
     fn restore(&mut self, lost: Lost) -> Result<(), (Lost, GpuError)> {
-        let monitor = &self.monitor;
-        let size = |context: &Context| monitor_size(context, monitor);
+        let target = self.output.target.clone();
+        let size = |context: &Context| fixed_size(context, &target);
         let size = self.output.restore(&mut self.console, &mut self.context, &size, lost)?;
         self.resize(size);
         Ok(())

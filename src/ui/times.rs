@@ -42,6 +42,8 @@ pub(super) struct Times {
     pub(super) pictures: RecentTimes,
     /// Times from an input to the picture that shows its effect.
     pub(super) input_latency: RecentTimes,
+    /// Times from the arrival of the last frame of a picture to its presentation.
+    pub(super) frame_latency: RecentTimes,
     /// Times from the presentation of a picture to its first pixel on the monitor. Empty if the device cannot measure them.
     pub(super) scan_out: RecentTimes,
     /// Frames received a second, over the last complete second; `volumes` and `shown` are volumes shown and pictures drawn a second.

@@ -1,4 +1,4 @@
-//! A missing monitor. Only names that no monitor has: a machine with a monitor would show something on it.
+//! A missing monitor, and a surface that nobody sees. Only names that no monitor has: a machine with a monitor would show something on it.
 
 use crate::common::program::*;
 use std::process::Command;
@@ -24,9 +24,39 @@ fn options_of_a_monitor_are_refused_elsewhere() {
         (&["--direct", "--full-screen"], "--full-screen"),
         (&["--direct", "--refresh", "0"], "--refresh 0"),
         (&["--direct", "--refresh", "nan"], "--refresh NaN"),
+        (&["--unseen", "--direct"], "--direct"),
+        (&["--unseen", "--kiosk"], "--kiosk"),
     ] {
         let all = [&["view", "--source", "phantom"], arguments].concat();
         let (code, _, err) = run(&all);
         assert!(code == Some(2) && err.contains(named) && !err.contains("panicked"), "{all:?}: {code:?} {err}");
     }
+}
+
+/// Prevents a presentation that only a window or a monitor can test: it runs with validation, and says how late pictures are.
+#[test]
+fn pictures_of_a_live_source_are_presented_on_a_surface_that_nobody_sees() {
+    let view = ["view", "--unseen", "--size", "500x400", "--no-panels", "--validate", "--mode", "mip"];
+    // How long the first volume takes depends on the machine.
+    for time in ["2s", "5s", "10s", "20s", "40s"] {
+        let mut command = Command::new(PROGRAM);
+        command.args(view).args(["--set", "slices.pixels=64", "--for", time]);
+        let (code, said, err) = finish(command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY"));
+        if code == Some(1) {
+            // Drivers before Mesa 23.1 have no such surface.
+            assert_eq!(err, "echolume: no window: no Vulkan driver has VK_EXT_headless_surface\n");
+            return;
+        }
+        assert_eq!(code, Some(0), "{said}{err}");
+        let Some((_, times)) = said.split_once("last frame to presentation ") else { continue };
+        let number = |name: &str| {
+            let rest = times.split_once(name).expect(&said).1;
+            rest.split([' ', ',', '\n']).next().and_then(|ms| ms.parse::<f64>().ok()).expect(&said)
+        };
+        assert!(0.0 < number("p50 ") && number("p50 ") <= number("p99 "), "{said}");
+        let shown = said.split(", ").find_map(|part| part.strip_suffix(" shown on the window")).expect(&said);
+        assert!(shown.parse::<u32>().is_ok_and(|shown| shown > 0), "{said}");
+        return;
+    }
+    panic!("no picture within 40 s");
 }

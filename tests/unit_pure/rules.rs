@@ -99,6 +99,7 @@ fn every_text_of_the_window_is_in_its_table() {
         // The last line on the terminal, and why a report of errors is refused there.
         "{:.1} s: {} volumes",
         "ms: picture {}, input to picture",
+        ", last frame to presentation",
         ", presentation to monitor",
         "error report: ",
         "{fault}; is there a desktop?",

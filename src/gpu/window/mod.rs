@@ -1,4 +1,4 @@
-//! Presentation. `target` is a window or a monitor, and `swapchain` the images of its surface. `screen` copies the picture into
+//! Presentation. `target` is a window, a monitor or a surface that nobody sees, and `swapchain` the images of its surface. `screen` copies the picture into
 //! `composition`, draws the panels over it, and copies the result into an image of the swapchain. `panel_textures` keeps the textures of
 //! the panels, and `flat_image` is the type of image of both. `present_wait` measures when a picture becomes visible. A build without the
 //! feature `view` has only a target that cannot exist.
@@ -21,7 +21,7 @@ mod swapchain;
 pub(super) mod target;
 
 #[cfg(feature = "view")]
-pub use screen::{Panels, PresentOutcome, Screen, monitor_size};
+pub use screen::{Panels, PresentOutcome, Screen, fixed_size};
 #[cfg(feature = "view")]
 pub use swapchain::PresentMode;
 #[cfg(feature = "view")]

@@ -4,7 +4,7 @@
 use super::composition::{self, Composition};
 use super::panel_textures::{PanelTextures, failed};
 use super::swapchain::{PresentMode, Swapchain};
-use super::target::{MonitorChoice, Target, choose_monitor};
+use super::target::{Target, choose_monitor};
 use crate::barriers::{Access, PipelineStage};
 use crate::context::Context;
 use crate::device_queues::DeviceQueues;
@@ -490,11 +490,16 @@ impl Drop for Screen {
     }
 }
 
-/// Resolution of the monitor mode that `choice` selects, pixels.
+/// Size of a target without a window, pixels: that of the chosen monitor mode, or of the surface that nobody sees.
 ///
 /// # Errors
-/// There is no such monitor or mode, or the context was not opened for a monitor.
-pub fn monitor_size(context: &Context, choice: &MonitorChoice) -> Result<[u32; 2], GpuError> {
+/// There is no such monitor or mode, or the context was not opened for this target.
+pub fn fixed_size(context: &Context, target: &Target) -> Result<[u32; 2], GpuError> {
+    let choice = match target {
+        Target::Monitor(choice) => choice,
+        Target::Unseen(size) => return Ok(*size),
+        Target::Window(_) => return Err(GpuError::Window("the size of a window is its own".into())),
+    };
     let displays = context.presentation.as_ref().and_then(|p| p.displays.as_ref());
     let displays = displays.ok_or_else(|| GpuError::Window("the device was not opened for a monitor".into()))?;
     let region = choose_monitor(displays, context.candidate.handle, choice)?.mode.parameters.visible_region;

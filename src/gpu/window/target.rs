@@ -1,4 +1,5 @@
-//! The target of presentation: a window, or a monitor without a compositor (VK_KHR_display).
+//! The target of presentation: a window, a monitor without a compositor (VK_KHR_display), or a surface that nobody sees
+//! (VK_EXT_headless_surface).
 
 use crate::device_selection::Candidate;
 use crate::error::{ErrorContext, GpuError};
@@ -18,6 +19,8 @@ pub enum Target {
     Window(Arc<dyn WindowHandles>),
     /// A monitor without a compositor (VK_KHR_display).
     Monitor(MonitorChoice),
+    /// A surface of this size, pixels, that no monitor shows (VK_EXT_headless_surface).
+    Unseen([u32; 2]),
 }
 
 impl Target {
@@ -35,6 +38,7 @@ impl Target {
                 names.iter().map(|name| unsafe { CStr::from_ptr(*name) }).collect()
             }
             Target::Monitor(_) => vec![ash::khr::surface::NAME, ash::khr::display::NAME],
+            Target::Unseen(_) => vec![ash::khr::surface::NAME, ash::ext::headless_surface::NAME],
         };
         // SAFETY: only reads the list of extensions.
         let there = unsafe { entry.enumerate_instance_extension_properties(None) }.unwrap_or_default();
@@ -62,6 +66,12 @@ impl Target {
         let window = match self {
             Target::Window(window) => window,
             Target::Monitor(wanted) => return monitor_surface(entry, instance, device, wanted),
+            Target::Unseen(_) => {
+                let surfaces = ash::ext::headless_surface::Instance::new(entry, instance);
+                // SAFETY: the instance was created with this extension, because the target asks for it.
+                let surface = unsafe { surfaces.create_headless_surface(&Default::default(), None) };
+                return surface.context(|| "create a surface without a screen".into());
+            }
         };
         let display = window.display_handle().map_err(|e| GpuError::Window(e.to_string()))?;
         let handle = window.window_handle().map_err(|e| GpuError::Window(e.to_string()))?;

@@ -7,11 +7,11 @@ use crate::scene::Settings;
 #[derive(Clone, PartialEq)]
 pub(super) struct Asked {
     /// The settings at full quality.
-    pub full: Settings,
+    pub(super) full: Settings,
     /// Settings of lower quality that temporarily replace `full`.
-    pub lowered: Option<Settings>,
+    pub(super) lowered: Option<Settings>,
     /// The next picture is the first one, for which a 16th of the rays is cast.
-    pub is_coarse: bool,
+    pub(super) is_coarse: bool,
 }
 
 impl Asked {
@@ -20,7 +20,7 @@ impl Asked {
     }
 
     /// The settings that the next picture is drawn with.
-    pub fn drawn(&self) -> Settings {
+    pub(super) fn drawn(&self) -> Settings {
         let mut drawn = self.now().clone();
         if self.is_coarse && !drawn.mode.is_flat() {
             (drawn.ray.subsampling, drawn.ray.rays) = (4, 1);
@@ -29,13 +29,13 @@ impl Asked {
     }
 
     /// Other settings, derived from a recording, for a picture of the same size.
-    pub fn with_look(&self, settings: Settings) -> Asked {
+    pub(super) fn with_look(&self, settings: Settings) -> Asked {
         let picture = self.now().picture.clone();
         Asked { full: Settings { picture, ..settings }, lowered: None, is_coarse: self.is_coarse }
     }
 
     /// Returns to the settings on display, because the device refused these: another geometry or device does not try them again.
-    pub fn go_back_to(&mut self, shown: &Settings) {
+    pub(super) fn go_back_to(&mut self, shown: &Settings) {
         let ray = if self.is_coarse { self.now().ray.clone() } else { shown.ray.clone() };
         (self.full, self.lowered) = (Settings { ray, ..shown.clone() }, None);
     }

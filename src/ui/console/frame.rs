@@ -157,6 +157,7 @@ impl Console {
             self.quality.picture_took(picture.work, picture.took);
             self.measured.picture_took(picture.took);
         }
+        self.measured.picture_finished(picture.latency, Instant::now());
         self.comparison.iter_mut().for_each(Comparison::picture_changed);
         self.start.picture_finished(picture.is_coarse);
         self.faults.picture_finished();
@@ -280,6 +281,9 @@ impl Console {
                 self.presentation.presented(content, is_drawing, self.panels.has_pending_input());
                 if !has_drawn {
                     self.start.presented();
+                }
+                if !is_drawing {
+                    self.measured.presented(Instant::now());
                 }
                 if !is_drawing && let Some(input) = self.activity.answered_by(self.stream.last_begun()) {
                     self.measured.input_waited(input.elapsed());

@@ -10,6 +10,8 @@ use std::time::{Duration, Instant};
 /// Collects the times that the viewer measures, and determines when statistics are due.
 pub(super) struct Measured {
     times: Times,
+    /// When the last frame arrived that the finished picture shows, until that is presented.
+    arrived: Option<Instant>,
     /// When statistics were last collected.
     taken: Instant,
     interval: Duration,
@@ -19,7 +21,7 @@ pub(super) struct Measured {
 impl Measured {
     /// `interval`: that of the statistics. Metrics are written at their own interval; None: there are none.
     pub(super) fn new(interval: Duration, metrics: Option<LiveMetrics>, now: Instant) -> Measured {
-        Measured { times: Times::default(), taken: now, interval, metrics }
+        Measured { times: Times::default(), arrived: None, taken: now, interval, metrics }
     }
 
     pub(super) fn times(&self) -> &Times {
@@ -29,6 +31,18 @@ impl Measured {
     /// Adds the time from the start of a picture to its completion.
     pub(super) fn picture_took(&mut self, time: Duration) {
         self.times.pictures.add(time);
+    }
+
+    /// Notes that a picture is finished whose last new frame arrived `latency` ago; 0: it shows no new frame.
+    pub(super) fn picture_finished(&mut self, latency: Duration, now: Instant) {
+        self.arrived = (!latency.is_zero()).then(|| now.checked_sub(latency)).flatten();
+    }
+
+    /// Adds the time from the arrival of the last frame to the presentation of the picture, once for each picture.
+    pub(super) fn presented(&mut self, now: Instant) {
+        if let Some(arrived) = self.arrived.take() {
+            self.times.frame_latency.add(now.saturating_duration_since(arrived));
+        }
     }
 
     /// Adds the time from an input to the picture that shows its effect.
@@ -100,10 +114,19 @@ impl Measured {
         let ms = |value: Option<f64>| value.map_or("-".into(), |ms| format!("{ms:.1}"));
         let percentiles =
             |times: &RecentTimes| format!("p50 {} p95 {}", ms(times.percentile(0.5)), ms(times.percentile(0.95)));
-        let Times { pictures, input_latency, scan_out, .. } = &self.times;
+        let Times { pictures, input_latency, frame_latency, scan_out, .. } = &self.times;
+        let frames = frame_latency.newest().map(|_| {
+            let p99 = ms(frame_latency.percentile(0.99));
+            format!(", last frame to presentation {} p99 {p99}", percentiles(frame_latency))
+        });
+        let frames = frames.unwrap_or_default();
         let monitor = scan_out.newest().map(|_| format!(", presentation to monitor {}", percentiles(scan_out)));
         let monitor = monitor.unwrap_or_default();
-        format!("ms: picture {}, input to picture {}{monitor}", percentiles(pictures), percentiles(input_latency))
+        format!(
+            "ms: picture {}, input to picture {}{frames}{monitor}",
+            percentiles(pictures),
+            percentiles(input_latency)
+        )
     }
 }
 
@@ -124,8 +147,14 @@ mod tests {
         assert_eq!(measured.due(true).collect::<Vec<_>>(), [at(2000)]);
         assert_eq!(measured.due(false).count(), 0);
         measured.reached_monitor(Duration::from_millis(8));
-        let line =
-            "ms: picture p50 12.0 p95 12.0, input to picture p50 - p95 -, presentation to monitor p50 8.0 p95 8.0";
+        // A picture that shows no new frame is not measured, and one that does is measured once.
+        measured.picture_finished(Duration::ZERO, at(5));
+        measured.presented(at(6));
+        measured.picture_finished(Duration::from_millis(20), at(30));
+        measured.presented(at(35));
+        measured.presented(at(90));
+        let line = "ms: picture p50 12.0 p95 12.0, input to picture p50 - p95 -, last frame to presentation p50 25.0 p95 25.0 p99 25.0, \
+                    presentation to monitor p50 8.0 p95 8.0";
         assert_eq!(measured.line(), line);
         let one = Statistics { time: Duration::from_secs(1), frames: 1, ..Statistics::default() };
         assert!(measured.add(&one, None, String::new) && !measured.add(&Statistics::default(), None, String::new));

@@ -58,14 +58,23 @@ impl Devices {
     /// # Errors
     /// The thread cannot be started. Missing or unreadable devices are no error: they may appear later.
     pub fn open(size: [u32; 2], grab: bool) -> io::Result<Devices> {
+        let mut devices = Devices::none()?;
+        devices.resize(size);
+        let (shared, sender) = (devices.shared.clone(), devices.sender.clone());
+        let thread = std::thread::Builder::new().name("input".into());
+        devices.thread = Some(thread.spawn(move || run_thread(&shared, grab, &sender))?);
+        Ok(devices)
+    }
+
+    /// Reads no device: [`Devices::wait`] returns for its time and for [`Devices::wake`] alone.
+    ///
+    /// # Errors
+    /// The system has no descriptor left.
+    pub fn none() -> io::Result<Devices> {
         let (sender, receiver) = sync_channel(MAX_QUEUED);
         let wake_event = eventfd(0, EventfdFlags::CLOEXEC | EventfdFlags::NONBLOCK)?;
-        let shared = Arc::new(Shared { size: Mutex::new(size), ends: AtomicBool::new(false), wake_event });
-        let (thread_shared, thread_sender) = (shared.clone(), sender.clone());
-        let thread = std::thread::Builder::new()
-            .name("input".into())
-            .spawn(move || run_thread(&thread_shared, grab, &thread_sender))?;
-        Ok(Devices { receiver: Some(receiver), sender, wake_pending: Arc::default(), shared, thread: Some(thread) })
+        let shared = Arc::new(Shared { size: Mutex::new([0; 2]), ends: AtomicBool::new(false), wake_event });
+        Ok(Devices { receiver: Some(receiver), sender, wake_pending: Arc::default(), shared, thread: None })
     }
 
     /// A function that makes [`Devices::wait`] return.
