@@ -149,6 +149,8 @@ pub struct Counts {
     pub dispatches: AtomicU64,
     /// Number of waits for an idle device.
     pub waits_idle: AtomicU64,
+    /// Bytes of frames that the host copied into staging memory, from which the device takes them.
+    pub staged: AtomicU64,
 }
 
 /// Loads Vulkan and lists the devices, for `echolume devices`, also those that lack a required feature.

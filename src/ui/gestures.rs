@@ -83,6 +83,10 @@ impl Gestures {
             Input::Button { button, pressed } => self.button(button, pressed, viewport, tool, modifiers),
             Input::Scroll(notches) => self.scroll(notches, viewport, tool, modifiers),
             Input::Touch { finger, phase, at } => self.touch(finger, phase, at, viewport, tool),
+            Input::PointerLeft => {
+                self.pointer = self.pointer.filter(|_| self.presses().next().is_some());
+                Vec::new()
+            }
             Input::FocusLost => {
                 // The tile that is shown alone does not depend on what is pressed.
                 let given_up = self.presses().flat_map(given_up).collect();

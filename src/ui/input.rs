@@ -25,7 +25,9 @@ pub enum Input {
         phase: Phase,
         at: [f64; 2],
     },
-    /// The pointer left the window, or the window lost the focus: nothing counts as held any more.
+    /// The pointer left the window. Keys stay held, and a drag goes on: the window still gets the moves and the release of its button.
+    PointerLeft,
+    /// The window lost the focus: nothing counts as held any more.
     FocusLost,
 }
 

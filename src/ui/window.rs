@@ -293,7 +293,8 @@ fn input(event: &WindowEvent) -> Option<Input> {
     let pressed = |state: &ElementState| *state == ElementState::Pressed;
     Some(match event {
         WindowEvent::CursorMoved { position, .. } => Input::Moved([position.x, position.y]),
-        WindowEvent::CursorLeft { .. } | WindowEvent::Focused(false) => Input::FocusLost,
+        WindowEvent::CursorLeft { .. } => Input::PointerLeft,
+        WindowEvent::Focused(false) => Input::FocusLost,
         WindowEvent::MouseInput { state, button, .. } => {
             let button = match button {
                 MouseButton::Left => Button::Left,

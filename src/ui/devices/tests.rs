@@ -364,6 +364,8 @@ impl Held {
                 assert!(is_right, "{finger} {phase:?}");
             }
             // Fingers are cancelled one by one.
+            // Devices know of no window.
+            Input::PointerLeft => unreachable!("{input:?}"),
             Input::FocusLost => *self = Held { fingers: std::mem::take(&mut self.fingers), ..Held::default() },
         }
     }

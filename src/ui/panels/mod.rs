@@ -332,6 +332,8 @@ struct EguiInput {
     events: Vec<Event>,
     pointer: Pos2,
     modifiers: EguiModifiers,
+    /// The button that was pressed or released last is down.
+    is_pressed: bool,
     /// The finger that acts as the pointer.
     finger: Option<u64>,
 }
@@ -355,8 +357,11 @@ impl EguiInput {
                 self.modifiers = EguiModifiers { alt, ctrl: control, shift, mac_cmd: false, command: control };
             }
             Input::Touch { finger, phase, at: place } => self.touch(finger, phase, at(place)),
+            // A control that is being dragged follows the pointer on.
+            Input::PointerLeft if self.is_pressed => {}
+            Input::PointerLeft => self.events.push(Event::PointerGone),
             Input::FocusLost => {
-                self.finger = None;
+                (self.finger, self.is_pressed) = (None, false);
                 self.events.push(Event::PointerGone);
             }
         }
@@ -381,6 +386,7 @@ impl EguiInput {
             Button::Right => PointerButton::Secondary,
             Button::Middle => PointerButton::Middle,
         };
+        self.is_pressed = pressed;
         self.events.push(Event::PointerButton { pos: self.pointer, button, pressed, modifiers: self.modifiers });
     }
 

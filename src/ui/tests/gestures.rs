@@ -1,7 +1,7 @@
 //! Known answers for gestures of a mouse and of fingers.
 
 use super::*;
-use crate::command::Viewpoint;
+use crate::command::{HeldKeys, Viewpoint};
 use crate::gestures::DEGREES_PER_HEIGHT;
 use crate::input::Phase;
 use crate::picking::Picker;
@@ -253,6 +253,31 @@ fn a_press_outside_of_the_picture_and_a_lost_focus_drag_nothing() {
     ] {
         assert!(window.gestures.input(&input, &on, Tool::Rotate, Modifiers::default()).is_empty(), "on a panel");
     }
+}
+
+/// Prevents a drag that ends at the border of the window, and keys that count as released there.
+#[test]
+fn a_drag_goes_on_outside_of_the_window_and_keys_stay_held() {
+    let dragged = |leaves: bool| {
+        let mut window = TestWindow::new("");
+        window.input(Input::Moved(window.at([50.0, 50.0])));
+        window.input(Input::Button { button: Button::Left, pressed: true });
+        window.input(Input::Moved(window.at([200.0, 90.0])));
+        if leaves {
+            window.input(Input::PointerLeft);
+        }
+        window.input(Input::Moved(window.at([-300.0, 90.0])));
+        window.input(Input::Button { button: Button::Left, pressed: false });
+        window.controls.settings().clone()
+    };
+    assert_eq!(dragged(true), dragged(false));
+    assert!(dragged(true) != *TestWindow::new("").controls.settings(), "the drag turns the view");
+    let mut keys = HeldKeys::default();
+    let shift = Modifiers { shift: true, ..Modifiers::default() };
+    assert!(keys.input(&Input::Modifiers(shift)).is_none() && keys.input(&Input::PointerLeft).is_none());
+    assert_eq!(keys.modifiers(), shift);
+    keys.input(&Input::FocusLost);
+    assert_eq!(keys.modifiers(), Modifiers::default());
 }
 
 /// A touch at a position on the picture.

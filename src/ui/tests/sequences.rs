@@ -80,6 +80,7 @@ fn input() -> impl Strategy<Value = Input> {
         3 => (key, any::<bool>()).prop_map(|(key, pressed)| Input::Key { key, pressed }),
         1 => modifiers.prop_map(Input::Modifiers),
         8 => (0u64..4, phase, place()).prop_map(|(finger, phase, at)| Input::Touch { finger, phase, at }),
+        1 => Just(Input::PointerLeft),
         1 => Just(Input::FocusLost),
     ]
 }
