@@ -19,6 +19,7 @@ mod light_lattice;
 pub mod load;
 pub mod look;
 pub mod marks;
+mod needs;
 mod number;
 pub mod picker;
 pub mod planes;
@@ -28,6 +29,7 @@ pub mod self_attenuation;
 pub mod settings;
 mod sizes;
 mod slice_index;
+mod smoothing;
 pub mod start_curve;
 mod still;
 #[cfg(test)]
@@ -36,6 +38,7 @@ pub mod transfer;
 mod turntable;
 pub mod unveil;
 pub mod variants;
+mod views;
 pub mod visible_bounds;
 
 pub use bricks::{Bricks, Reach, Side, TILE};
@@ -48,11 +51,13 @@ pub use marks::VolumeAxis;
 pub use number::{Group, Number, Slider, start_depths};
 pub use region::{depth_offset, insonified_box};
 pub use settings::*;
+pub(crate) use smoothing::gaussian_radius;
 pub use still::{DistantLight, StillLights};
+pub use views::View;
 pub use visible_bounds::{Rectangle, Shared, VisibleBounds};
 
 use crate::probe::StoredType;
-use crate::probe::{Array, Geometry, Probe};
+use crate::probe::{Geometry, Probe};
 use glam::DVec3;
 use region::{framed_low, is_still, slice_grid, visible_box};
 use sizes::{Pitches, ResolvedSize, Resolver};
@@ -100,17 +105,6 @@ impl SliceGrid {
     pub fn place(&self, column: f64, row: f64) -> (f64, f64) {
         (self.origin[0] + column * self.pitch[0], self.origin[1] + row * self.pitch[1])
     }
-}
-
-/// The box and grey window that a pass of stage 2 renders with. They depend on the mode, because each mode has its own start depth: rays that start
-/// at the probe would meet the uterine wall first.
-#[derive(Clone, Copy, Debug)]
-pub struct View {
-    pub window: [f64; 2],
-    /// Lower corner of the box, at the start depth where that is deeper than the region's near face, mm in space.
-    pub low: DVec3,
-    /// Upper corner of the box, mm in space.
-    pub high: DVec3,
 }
 
 /// The ring of samples that the surface detector compares at a place: two halves, each as long as an edge (`surface.edge`).
@@ -469,119 +463,9 @@ impl Scene {
         self.ray_size().map(|n| n / self.settings.ray.rays)
     }
 
-    /// True if only pixels at edges have several rays (`ray.adaptive`). It needs a mode in which a pixel follows from the colours along its rays
-    /// alone.
-    pub fn adapts_rays(&self) -> bool {
-        let ray = &self.settings.ray;
-        let is_alone = self.settings.mode == Mode::Volume && !self.lights_volume();
-        ray.adaptive && ray.rays > 1 && is_alone && self.still().is_none() && !self.has_caps()
-    }
-
-    /// The tolerance of `ray.tolerance`, levels of 8 bits, by which the steps of each pixel are chosen. None if it is 0, or if the scene is not
-    /// volume rendering, lights first hits, or is a still.
-    pub fn tolerance(&self) -> Option<f64> {
-        let is_alone = self.settings.mode == Mode::Volume && !self.lights_volume() && self.still().is_none();
-        Some(self.settings.ray.tolerance).filter(|levels| *levels > 0.0 && is_alone)
-    }
-
-    /// True if pixels at edges of a surface, or of a cut face, mix the near and the far side by the share of the pixel that each covers. With several
-    /// rays a pixel it is false: the mean of the rays does this.
-    pub fn antialiases(&self) -> bool {
-        let ray = &self.settings.ray;
-        self.settings.post.antialias
-            && (self.has_distance() || self.has_caps())
-            && ray.rays == 1
-            && ray.subsampling == 1
-    }
-
-    /// True if stages 2 and 3 render into a slot other than the picture, which is then assembled from it: several rays make a pixel, one ray makes
-    /// several pixels, edges are antialiased, or planes or a second rendering are beside it.
-    pub fn assembles(&self) -> bool {
-        let ray = &self.settings.ray;
-        let is_beside =
-            ray.rays > 1 || ray.subsampling > 1 || self.settings.layout != Layout::Single || self.antialiases();
-        is_beside && !self.is_flat()
-    }
-
-    /// True if assembling the picture also converts it to 8 bits, because no other pass of stage 4 reads it.
-    pub(crate) fn tones_assembled(&self) -> bool {
-        self.assembles() && self.only_tones()
-    }
-
-    /// True if nothing is done to a picture but toning.
-    fn only_tones(&self) -> bool {
-        let post = &self.settings.post;
-        let filtered = post.sigma.is_some() || post.enhanced_sigma.is_some() || post.perona_malik.is_some();
-        !filtered && !post.floats
-    }
-
     /// Number of entries of the table of the transfer function.
     pub fn transfer_entries(&self) -> usize {
         transfer::entries(&self.settings.volume).unwrap_or(transfer::ENTRIES)
-    }
-
-    /// True if the scene runs a surface detector.
-    pub fn detects_surface(&self) -> bool {
-        matches!(self.settings.mode, Mode::Surface | Mode::Mixed)
-    }
-
-    /// True if the surface of each ray is chosen among several candidates, by what neighbouring rays found.
-    pub(crate) fn chooses_surface(&self) -> bool {
-        self.detects_surface() && self.settings.surface.detector == Detector::Consistent
-    }
-
-    /// True if stage 3 lights a distance map: of a surface, or of the first hits of volume rendering.
-    pub fn has_distance(&self) -> bool {
-        self.detects_surface() || self.lights_volume()
-    }
-
-    /// True if volume rendering lights the first hit of each ray like a surface (`volume.shading`).
-    pub fn lights_volume(&self) -> bool {
-        self.settings.mode == Mode::Volume && self.settings.volume.shading == Shading::FirstHit
-    }
-
-    /// True if the steps along a ray grow with the distance from the array's apex (`ray.spread`).
-    pub fn spreads(&self) -> bool {
-        let curved = self.probe().is_some_and(|p| matches!(p.array, Array::Curved { .. }));
-        curved && self.settings.ray.spread > 0.0
-    }
-
-    /// The box and grey window of the surface detector.
-    pub fn surface_view(&self) -> View {
-        self.view(self.settings.surface.window, self.settings.surface.start_depth)
-    }
-
-    /// The box and grey window of volume rendering.
-    pub fn volume_view(&self) -> View {
-        self.view(self.settings.volume.window, self.settings.volume.start_depth)
-    }
-
-    /// The box and grey window of projections.
-    pub(crate) fn projection_view(&self) -> View {
-        self.view(self.settings.projection.window, self.settings.projection.start_depth)
-    }
-
-    /// Y coordinate in space, mm, at which rendering starts unless the start surface or start curve is deeper. In mode mixed it is the deeper of the
-    /// start depths of both layers; planes and mode cube start at the region's near face.
-    pub fn start_depth(&self) -> f64 {
-        let (surface, volume, projection) = (self.surface_view(), self.volume_view(), self.projection_view());
-        match self.settings.mode {
-            Mode::Surface => surface.low.y,
-            Mode::Volume => volume.low.y,
-            Mode::Mixed => surface.low.y.max(volume.low.y),
-            Mode::Mip | Mode::MinIp | Mode::Mean => projection.low.y,
-            _ => self.low.y,
-        }
-    }
-
-    /// The whole region with this grey window, without a start depth.
-    pub(crate) fn whole_view(&self, window: [f64; 2]) -> View {
-        self.view(window, None)
-    }
-
-    fn view(&self, window: [f64; 2], start: Option<f64>) -> View {
-        let start = start.map_or(self.low.y, |s| s + depth_offset(&self.geometry));
-        View { window, low: self.low.with_y(self.low.y.max(start)), high: self.high }
     }
 
     /// Clip planes (n, w) in space: n is a unit vector, and points p with dot(n, p) > w are removed; mm.
@@ -603,186 +487,6 @@ impl Scene {
         self.step / self.reference_length()
     }
 
-    /// True if samples are composited through the transfer function.
-    pub fn composites(&self) -> bool {
-        matches!(self.settings.mode, Mode::Volume | Mode::Mixed) || self.colours_surface() || self.is_pair()
-    }
-
-    /// True if volume rendering gives the surface its colour (`surface.colour`).
-    pub(crate) fn colours_surface(&self) -> bool {
-        self.settings.mode == Mode::Surface && self.settings.surface.colour != SurfaceColour::Constant
-    }
-
-    /// True if layout pair shows volume rendering and the surface side by side.
-    pub fn is_pair(&self) -> bool {
-        self.settings.layout == Layout::Pair
-    }
-
-    /// Whether one pass finds the surface and composites the whole ray (thesis 4.4.2): `Ok` with the reason, or `Err` with the reason why not.
-    pub(crate) fn marches_once(&self) -> Result<&'static str, &'static str> {
-        let settings = &self.settings;
-        let is_whole = settings.surface.colour == SurfaceColour::Rendered || self.is_pair();
-        if settings.mode != Mode::Surface {
-            return Err("no surface is found and no whole ray composited in this mode");
-        }
-        if !is_whole {
-            return Err("no whole ray is composited");
-        }
-        if self.chooses_surface() {
-            return Err("two passes: the surface is chosen among neighbouring rays");
-        }
-        if settings.ray.sliding == 0 && !self.is_pair() {
-            // Measured: docs/experiments/one-march.md.
-            return Err("two passes: where samples are cheap (no ray.sliding) they are no slower than one march");
-        }
-        if matches!(settings.volume.compositing, Compositing::PreIntegrated | Compositing::Exponential) {
-            return Err(
-                "two passes: this compositing takes samples at the ends of steps, the detector in their middles",
-            );
-        }
-        if self.spreads() {
-            return Err("two passes: steps that grow have no sample of the detector in their middles");
-        }
-        if self.surface_view().low != self.volume_view().low {
-            return Err("two passes: rays of the volume and of the surface start at different depths");
-        }
-        Ok("one march finds the surface and composites the whole ray")
-    }
-
-    /// True if the mode is a projection: the largest, smallest or mean sample of each ray.
-    pub(crate) fn projects(&self) -> bool {
-        matches!(self.settings.mode, Mode::Mip | Mode::MinIp | Mode::Mean)
-    }
-
-    /// True if the picture has planes: a mode of planes, or a layout with planes beside the rendering.
-    pub fn cuts_planes(&self) -> bool {
-        self.is_flat() || self.settings.layout.has_planes()
-    }
-
-    /// True if the mode cuts planes and casts no rays.
-    pub fn is_flat(&self) -> bool {
-        self.settings.mode.is_flat()
-    }
-
-    /// Standard deviations of the 3D Gaussian: along columns and rows in slice pixels, across slices in slices. The last is less than the setting
-    /// where interpolation between slices smooths more than linear interpolation does.
-    pub fn smoothing(&self) -> [f64; 3] {
-        let [lateral, depth, elevation] = self.deviations(self.slice_filters.smooth.unwrap_or_default());
-        if self.blurs() {
-            return [binomial_deviation(3), binomial_deviation(3), elevation];
-        }
-        [lateral, depth, elevation]
-    }
-
-    /// Standard deviations of the 3D Gaussian of the section volume: slice pixels, slice pixels and slices.
-    pub(crate) fn section_smoothing(&self) -> [f64; 3] {
-        self.deviations(self.section_smooth.unwrap_or_default())
-    }
-
-    fn deviations(&self, smooth: Smooth) -> [f64; 3] {
-        if let Some(taps) = smooth.kernel {
-            return [binomial_deviation(taps); 3];
-        }
-        let elevation = self.left_to_smooth(smooth.elevation);
-        [smooth.lateral / self.grid.pitch[0], smooth.depth / self.grid.pitch[1], elevation]
-    }
-
-    /// The deviation of the Gaussian across slices, slices, that together with the interpolation between them has the variance of this
-    /// deviation and linear interpolation. The weights of two texels at a share t have the variance t (1 - t), 1/6 on average; those of
-    /// the cubic B-spline 1/3 everywhere.
-    fn left_to_smooth(&self, deviation: f64) -> f64 {
-        match self.settings.ray.elevation {
-            Elevation::Linear => deviation,
-            Elevation::Bspline | Elevation::BsplineSharp => {
-                (deviation * deviation - (1.0 / 3.0 - 1.0 / 6.0)).max(0.0).sqrt()
-            }
-        }
-    }
-
-    /// True if samples between slices are interpolated by the cubic B-spline, which reads four slices.
-    pub fn takes_bspline(&self) -> bool {
-        self.settings.ray.elevation != Elevation::Linear
-    }
-
-    /// True if slices are sharpened across elevation, for `ray.elevation = "bspline-sharp"`.
-    pub(crate) fn sharpens(&self) -> bool {
-        self.settings.ray.elevation == Elevation::BsplineSharp
-    }
-
-    /// True if a pass filters across slices.
-    pub fn filters_across_slices(&self) -> bool {
-        self.smoothing_radius()[2] > 0
-    }
-
-    /// Number of taps of the 3D Gaussian on each side of the middle, along columns, rows and slices.
-    pub fn smoothing_radius(&self) -> [u32; 3] {
-        if let Some(taps) = self.slice_filters.smooth.and_then(|s| s.kernel) {
-            return [taps / 2; 3];
-        }
-        let [lateral, depth, elevation] = self.smoothing().map(gaussian_radius);
-        let elevation = if self.sharpens() { 1 } else { elevation };
-        if self.blurs() { [1, 1, elevation] } else { [lateral, depth, elevation] }
-    }
-
-    /// Number of taps of the 3D Gaussian of the section volume on each side of the middle, along columns, rows and slices.
-    pub(crate) fn section_smoothing_radius(&self) -> [u32; 3] {
-        if let Some(taps) = self.section_smooth.and_then(|s| s.kernel) {
-            return [taps / 2; 3];
-        }
-        let [lateral, depth, elevation] = self.section_smoothing().map(gaussian_radius);
-        [lateral, depth, if self.sharpens() { 1 } else { elevation }]
-    }
-
-    /// Number of frames on either side of a slice that can change it in the volume that rays go through: all of them where floating parts are dropped
-    /// or the start surface is searched.
-    pub(crate) fn reach_to_frames(&self) -> u32 {
-        if self.drops_floating() || self.unveils() { self.slices() } else { self.smoothing_radius()[2] }
-    }
-
-    /// Number of neighbouring slices on either side that a filtered slice depends on; of the two volumes, the one with more.
-    pub fn reach_across_slices(&self) -> u32 {
-        let sections = if self.has_sections() { self.section_smoothing_radius()[2] } else { 0 };
-        self.smoothing_radius()[2].max(sections)
-    }
-
-    /// True if slices get the slight blur against wood grain: it is set, and no smoothing blurs them in their plane.
-    fn blurs(&self) -> bool {
-        let smooth = self.slice_filters.smooth.unwrap_or_default();
-        let blur = self.settings.slices.blur.is_on(self.is_flat());
-        blur && smooth.kernel.is_none() && smooth.lateral == 0.0 && smooth.depth == 0.0
-    }
-
-    /// The estimator of the centre in an enhanced sigma filter: as set, otherwise Perona-Malik for planes and the median for all other modes (thesis
-    /// 5.7).
-    pub fn centre(&self, enhanced: EnhancedSigma) -> Estimator {
-        let usual = if self.is_flat() { Estimator::PeronaMalik } else { Estimator::Median };
-        enhanced.centre.unwrap_or(usual)
-    }
-
-    /// Number of samples behind the surface that skin shading averages; 0 if it needs none.
-    pub(crate) fn samples_behind(&self) -> u32 {
-        match self.settings.light.skin {
-            Some(skin) if skin.translucency > 0.0 => ((skin.depth / self.ring.step).ceil() as u32).clamp(1, 256),
-            _ => 0,
-        }
-    }
-
-    /// Distance between the samples behind the surface that skin shading averages, mm. Together the steps span the skin's depth.
-    pub(crate) fn step_behind(&self) -> f64 {
-        self.settings.light.skin.map_or(0.0, |skin| skin.depth) / f64::from(self.samples_behind().max(1))
-    }
-
-    /// True if the light on a surface depends on the echo at or behind it: by `light.texture`, or the translucency of skin.
-    pub fn lights_by_echo(&self) -> bool {
-        let is_translucent = self.skin().is_some_and(|s| s.translucency > 0.0);
-        self.detects_surface() && (self.settings.light.texture > 0.0 || is_translucent)
-    }
-
-    /// Skin shading, if it has an effect: wrap or translucency is above 0. Otherwise None.
-    pub fn skin(&self) -> Option<Skin> {
-        self.settings.light.skin.filter(|s| s.wrap > 0.0 || s.translucency > 0.0)
-    }
-
     /// Largest difference, mm, of the distances of neighbouring rays on one surface; a larger one is a gap between two surfaces.
     pub fn cliff(&self) -> f64 {
         self.settings.light.cliff * f64::from(self.settings.ray.subsampling)
@@ -792,35 +496,4 @@ impl Scene {
     pub fn light_place(&self) -> Option<DVec3> {
         self.settings.light.position.map(|p| self.rays.target + self.rays.out_of_camera(p))
     }
-
-    /// Reach of the slice filters, pixels.
-    fn filter_reach(&self) -> f64 {
-        let [lateral, depth, _] = self.smoothing_radius().map(f64::from);
-        let median = if self.settings.slices.median { 1.0 } else { 0.0 };
-        let slices = &self.slice_filters;
-        let sigma = slices.sigma.map_or(0.0, |s| f64::from(s.repeat * (s.window / 2)));
-        let enhanced = slices.enhanced_sigma.map_or(0.0, |e| f64::from(e.largest / 2));
-        let estimator = match slices.estimator {
-            Some(Estimator::NagaoMatsuyama) => 2.0,
-            Some(_) => 1.0,
-            None => 0.0,
-        };
-        let diffusion = slices.perona_malik.map_or(0.0, |p| p.reach());
-        // The reach of a chain of square windows extends to their corners.
-        let gaussian = lateral.hypot(depth);
-        let [lateral, depth, _] = self.section_smoothing_radius().map(f64::from);
-        let sections = if self.has_sections() { lateral.hypot(depth) } else { 0.0 };
-        let slices = std::f64::consts::SQRT_2 * (median + estimator + sigma + enhanced) + diffusion + gaussian;
-        slices.max(sections)
-    }
-}
-
-/// Standard deviation of the binomial kernel of `taps` taps.
-fn binomial_deviation(taps: u32) -> f64 {
-    f64::from(taps - 1).sqrt() / 2.0
-}
-
-/// Number of taps on one side of a Gaussian of `deviation` pixels or slices. It is cut off at three standard deviations, which hold 99.7 %.
-pub(crate) fn gaussian_radius(deviation: f64) -> u32 {
-    if deviation > 0.0 { ((3.0 * deviation).ceil() as u32).max(1) } else { 0 }
 }
