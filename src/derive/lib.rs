@@ -148,10 +148,9 @@ fn reading(input: &DeriveInput) -> Result<TokenStream> {
     let body = match &input.data {
         Data::Struct(data) => {
             let fields = named(&data.fields, &container)?;
-            let what = format!("struct {}", input.ident);
             match container.missing {
-                Missing::Default => table_over_default(&fields, &what, container.denies_unknown),
-                _ => table(&fields, &what, container.denies_unknown, &quote!(Self)),
+                Missing::Default => table_over_default(&fields, container.denies_unknown),
+                _ => table(&fields, container.denies_unknown, &quote!(Self)),
             }
         }
         Data::Enum(data) => reading_of_enum(input, data, &container)?,
@@ -171,7 +170,7 @@ fn reading(input: &DeriveInput) -> Result<TokenStream> {
 }
 
 /// Reads a table over the values of `Default`.
-fn table_over_default(fields: &[Named], what: &str, denies_unknown: bool) -> TokenStream {
+fn table_over_default(fields: &[Named], denies_unknown: bool) -> TokenStream {
     let slots = fields.iter().filter(|field| !field.arguments.skip).map(|Named { ident, arguments, key, .. }| {
         let slot = match &arguments.with {
             None => quote!(&mut value.#ident),
@@ -181,13 +180,13 @@ fn table_over_default(fields: &[Named], what: &str, denies_unknown: bool) -> Tok
     });
     quote! {
         let mut value = <Self as ::core::default::Default>::default();
-        ::echolume_base::tree::read_table(node, #what, #denies_unknown, &mut [#(#slots),*])?;
+        ::echolume_base::tree::read_table(node, #denies_unknown, &mut [#(#slots),*])?;
         ::core::result::Result::Ok(value)
     }
 }
 
 /// Reads a table of which keys are needed. `made`: the struct or variant that is made of it.
-fn table(fields: &[Named], what: &str, denies_unknown: bool, made: &TokenStream) -> TokenStream {
+fn table(fields: &[Named], denies_unknown: bool, made: &TokenStream) -> TokenStream {
     let is_read = |field: &&Named| !field.arguments.skip && !field.arguments.skip_reading;
     let held = |ident: &Ident| format_ident!("held_{ident}");
     let read: Vec<_> = fields.iter().filter(is_read).collect();
@@ -221,7 +220,7 @@ fn table(fields: &[Named], what: &str, denies_unknown: bool, made: &TokenStream)
     quote! {
         #(#places)*
         let span = node.span();
-        ::echolume_base::tree::read_table(node, #what, #denies_unknown, &mut [#(#slots),*])?;
+        ::echolume_base::tree::read_table(node, #denies_unknown, &mut [#(#slots),*])?;
         ::core::result::Result::Ok(#made { #(#values),* })
     }
 }
@@ -258,11 +257,12 @@ fn reading_of_enum(input: &DeriveInput, data: &DataEnum, container: &Arguments) 
     for (index, (variant, arguments, name)) in all.iter().enumerate() {
         let mut spelled: Vec<&String> = arguments.aliases.iter().chain([name]).collect();
         spelled.sort();
+        spelled.dedup();
         names.extend(spelled.into_iter().map(|spelled| quote!((#spelled, #index))));
         let ident = &variant.ident;
         let body = match &variant.fields {
             Fields::Unit if container.tag.is_some() => quote! {
-                ::echolume_base::tree::read_table(held.table(), "", false, &mut []).map(|()| Self::#ident)
+                ::echolume_base::tree::read_table(held.table(), false, &mut []).map(|()| Self::#ident)
             },
             Fields::Unit => quote!(held.unit().map(|()| Self::#ident)),
             Fields::Unnamed(fields) if fields.unnamed.len() == 1 => quote! {
@@ -280,8 +280,7 @@ fn reading_of_enum(input: &DeriveInput, data: &DataEnum, container: &Arguments) 
             Fields::Named(fields) => {
                 // The rules of a container are for the names of variants.
                 let fields = named(&fields.named, &Arguments::of(&[])?)?;
-                let what = format!("struct variant {}::{ident}", input.ident);
-                let body = table(&fields, &what, container.denies_unknown, &quote!(Self::#ident));
+                let body = table(&fields, container.denies_unknown, &quote!(Self::#ident));
                 let node =
                     if container.tag.is_some() { quote!(held.table()) } else { quote!(held.needed("struct variant")?) };
                 quote!(let node = #node; #body)

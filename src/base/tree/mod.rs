@@ -248,8 +248,8 @@ impl Node {
             Content::Float(value) => Unexpected::Float(*value),
             Content::Text(text) => Unexpected::Str(text),
             Content::Date => Unexpected::Other("date"),
-            Content::List(_) => Unexpected::Seq,
-            Content::Table(_) => Unexpected::Map,
+            Content::List(_) => Unexpected::Other("list"),
+            Content::Table(_) => Unexpected::Other("table"),
             Content::Fault(message) => Unexpected::Other(message),
         }
     }
@@ -454,17 +454,12 @@ impl<T> Slot for ReadBy<'_, T> {
     }
 }
 
-/// Reads the values of a table into the places of their keys. Places of keys that the table lacks stay as they are. `what` names the type.
+/// Reads the values of a table into the places of their keys. Places of keys that the table lacks stay as they are.
 ///
 /// # Errors
 /// `node` is no table, a value does not fit its place, a key is there twice, or there is an unknown key and `denies_unknown` is true.
-pub fn read_table(
-    node: Node,
-    what: &str,
-    denies_unknown: bool,
-    slots: &mut [(&str, &mut dyn Slot)],
-) -> Result<(), NodeError> {
-    let Content::Table(table) = node.content else { return Err(node.invalid(what)) };
+pub fn read_table(node: Node, denies_unknown: bool, slots: &mut [(&str, &mut dyn Slot)]) -> Result<(), NodeError> {
+    let Content::Table(table) = node.content else { return Err(node.invalid("a table")) };
     let mut are_filled = vec![false; slots.len()];
     for (name, value) in table {
         let Content::Text(key) = &name.content else { return Err(name.invalid("a key")) };

@@ -57,8 +57,13 @@ fn in_words(message: &str) -> String {
         "u8" | "u16" | "u32" | "u64" | "usize" | "i32" | "i64" => "a whole number",
         "a boolean" => "true or false",
         "a string" | "path string" => "a text",
+        "a map" => "a table",
+        "a sequence" => "a list",
+        "an array of length 2" => "a list of 2",
+        name if name.starts_with("struct ") && name != "struct variant" => "a table",
         other => other,
     };
+    let before = before.replace("type: map", "type: table").replace("type: sequence", "type: list");
     format!("{before}expected {words}")
 }
 
@@ -186,7 +191,7 @@ fn what_is_too_large_or_a_date_is_refused_in_words() {
         ("count = 99999999999999999999", "integer number overflowed"),
         ("number = 1979-05-27", "invalid type: date, expected a number"),
         // The crate `toml` ignores the third number.
-        ("pair = [1, 2, 3]", "invalid length 3, expected an array of length 2"),
+        ("pair = [1, 2, 3]", "invalid length 3, expected a list of 2"),
     ] {
         assert_eq!(from_toml::<All>(text).expect_err("it is refused").message(), said);
     }

@@ -119,7 +119,7 @@ impl<T: ToNode> ToNode for Option<T> {
 
 impl<T: FromNode> FromNode for Vec<T> {
     fn from_node(node: Node) -> Result<Vec<T>, NodeError> {
-        let list = node.list("a sequence")?;
+        let list = node.list("a list")?;
         let mut values = Vec::with_capacity(list.len());
         for (n, value) in list.into_iter().enumerate() {
             values.push(T::from_node(value).map_err(|e| e.within(&format!("[{n}]")))?);
@@ -136,7 +136,7 @@ impl<T: ToNode> ToNode for Vec<T> {
 
 impl<T: FromNode, const N: usize> FromNode for [T; N] {
     fn from_node(node: Node) -> Result<[T; N], NodeError> {
-        let expected = format!("an array of length {N}");
+        let expected = format!("a list of {N}");
         let span = node.span.clone();
         let list = Node { span: node.span.clone(), content: Content::List(node.array(N, &expected)?) };
         Vec::from_node(list)?.try_into().map_err(|_| NodeError::new(format!("expected {expected}"), &span))
@@ -152,7 +152,7 @@ impl<T: ToNode, const N: usize> ToNode for [T; N] {
 impl<A: FromNode, B: FromNode> FromNode for (A, B) {
     fn from_node(node: Node) -> Result<(A, B), NodeError> {
         let span = node.span.clone();
-        let mut both = Elements(node.array(2, "a list of two")?.into_iter(), span);
+        let mut both = Elements(node.array(2, "a list of 2")?.into_iter(), span);
         Ok((A::from_node(both.next_element()?)?, B::from_node(both.next_element()?)?))
     }
 }
@@ -177,7 +177,7 @@ impl<T: ToNode> ToNode for Box<T> {
 
 impl<T: FromNode> FromNode for BTreeMap<String, T> {
     fn from_node(node: Node) -> Result<BTreeMap<String, T>, NodeError> {
-        let Content::Table(table) = node.content else { return Err(node.invalid("a map")) };
+        let Content::Table(table) = node.content else { return Err(node.invalid("a table")) };
         let mut values = BTreeMap::new();
         for (key, value) in table {
             let key = String::from_node(key)?;
@@ -212,7 +212,7 @@ impl FromNode for Table {
         let span = node.span.clone();
         match node.into_toml()? {
             Value::Table(table) => Ok(table),
-            _ => Err(NodeError::new("expected a map", &span)),
+            _ => Err(NodeError::new("expected a table", &span)),
         }
     }
 }
@@ -228,7 +228,7 @@ impl FromNode for serde_json::Map<String, serde_json::Value> {
     fn from_node(node: Node) -> Result<serde_json::Map<String, serde_json::Value>, NodeError> {
         match serde_json::to_value(&node) {
             Ok(serde_json::Value::Object(table)) => Ok(table),
-            Ok(_) => Err(node.invalid("a map")),
+            Ok(_) => Err(node.invalid("a table")),
             Err(e) => Err(node.fault(e.to_string())),
         }
     }
