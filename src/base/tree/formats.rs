@@ -3,6 +3,7 @@
 use super::{Content, FromNode, Node, NodeError, ToNode};
 use serde::ser::{Error as _, SerializeMap, SerializeSeq};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+use std::collections::HashSet;
 use std::fmt;
 use toml::de::{DeTable, DeValue};
 use toml::{Table, Value};
@@ -176,9 +177,12 @@ impl<'de> de::Visitor<'de> for Visitor {
     }
 
     fn visit_map<A: de::MapAccess<'de>>(self, mut access: A) -> Result<Content, A::Error> {
-        let mut table = Vec::new();
-        while let Some(entry) = access.next_entry()? {
-            table.push(entry);
+        let (mut table, mut keys) = (Vec::new(), HashSet::new());
+        while let Some((key, value)) = access.next_entry::<String, Node>()? {
+            table.push((key.to_node(), value));
+            if let Some(twice) = keys.replace(key) {
+                return Err(de::Error::custom(format!("duplicate field `{twice}`")));
+            }
         }
         Ok(Content::Table(table))
     }

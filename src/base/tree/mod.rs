@@ -457,24 +457,18 @@ impl<T> Slot for ReadBy<'_, T> {
 /// Reads the values of a table into the places of their keys. Places of keys that the table lacks stay as they are.
 ///
 /// # Errors
-/// `node` is no table, a value does not fit its place, a key is there twice, or there is an unknown key and `denies_unknown` is true.
+/// `node` is no table, a value does not fit its place, or there is an unknown key and `denies_unknown` is true.
 pub fn read_table(node: Node, denies_unknown: bool, slots: &mut [(&str, &mut dyn Slot)]) -> Result<(), NodeError> {
     let Content::Table(table) = node.content else { return Err(node.invalid("a table")) };
-    let mut are_filled = vec![false; slots.len()];
     for (name, value) in table {
         let Content::Text(key) = &name.content else { return Err(name.invalid("a key")) };
-        let Some(at) = slots.iter().position(|(known, _)| known == key) else {
-            if denies_unknown {
-                let known = one_of(slots.iter().map(|(name, _)| *name));
-                let message = format!("unknown field `{key}`, {known}");
-                return Err(NodeError { fault: Fault::UnknownKey, ..name.fault(message) });
-            }
-            continue;
-        };
-        if std::mem::replace(&mut are_filled[at], true) {
-            return Err(name.fault(format!("duplicate field `{key}`")));
+        if let Some((_, slot)) = slots.iter_mut().find(|(known, _)| known == key) {
+            slot.fill(value).map_err(|e| e.within(key))?;
+        } else if denies_unknown {
+            let known = one_of(slots.iter().map(|(name, _)| *name));
+            let message = format!("unknown field `{key}`, {known}");
+            return Err(NodeError { fault: Fault::UnknownKey, ..name.fault(message) });
         }
-        slots[at].1.fill(value).map_err(|e| e.within(key))?;
     }
     Ok(())
 }

@@ -178,7 +178,8 @@ fn a_fault_in_json_is_named_by_its_keys() {
     for (text, said) in [
         (r#"{"list": [{"at": 1}, {"at": "x"}]}"#, r#"list[1].at: invalid type: string "x", expected a number"#),
         (r#"{"number": null}"#, "number: invalid type: null, expected a number"),
-        (r#"{"number": 1, "number": 2}"#, "duplicate field `number`"),
+        (r#"{"number": 1, "number": 2}"#, "duplicate field `number` at line 1 column 26"),
+        (r#"{"named": {"a": 1, "a": 2}}"#, "duplicate field `a` at line 1 column 26"),
         (r#"{"number": "#, "EOF while parsing a value at line 1 column 11"),
     ] {
         assert_eq!(from_json::<All>(text.as_bytes()).expect_err(text).to_string(), said);

@@ -119,13 +119,16 @@ impl<T: ToNode> ToNode for Option<T> {
 
 impl<T: FromNode> FromNode for Vec<T> {
     fn from_node(node: Node) -> Result<Vec<T>, NodeError> {
-        let list = node.list("a list")?;
-        let mut values = Vec::with_capacity(list.len());
-        for (n, value) in list.into_iter().enumerate() {
-            values.push(T::from_node(value).map_err(|e| e.within(&format!("[{n}]")))?);
-        }
-        Ok(values)
+        each(node.list("a list")?)
     }
+}
+
+fn each<T: FromNode>(list: Vec<Node>) -> Result<Vec<T>, NodeError> {
+    let mut values = Vec::with_capacity(list.len());
+    for (n, value) in list.into_iter().enumerate() {
+        values.push(T::from_node(value).map_err(|e| e.within(&format!("[{n}]")))?);
+    }
+    Ok(values)
 }
 
 impl<T: ToNode> ToNode for Vec<T> {
@@ -138,8 +141,7 @@ impl<T: FromNode, const N: usize> FromNode for [T; N] {
     fn from_node(node: Node) -> Result<[T; N], NodeError> {
         let expected = format!("a list of {N}");
         let span = node.span.clone();
-        let list = Node { span: node.span.clone(), content: Content::List(node.array(N, &expected)?) };
-        Vec::from_node(list)?.try_into().map_err(|_| NodeError::new(format!("expected {expected}"), &span))
+        each(node.array(N, &expected)?)?.try_into().map_err(|_| NodeError::new(format!("expected {expected}"), &span))
     }
 }
 
