@@ -14,17 +14,10 @@ use crate::queues::QueueRole;
 use crate::resources::SlotResources;
 use crate::scene::Scene;
 use crate::timing::TimeStamps;
-use rayon::prelude::*;
-use std::borrow::Cow;
 use std::mem::MaybeUninit;
 use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-
-/// From so many bytes on several threads copy frames into staging memory: one thread copies them in some 130 us, and to wake others takes tens of us.
-const PARALLEL_BYTES: usize = 1 << 20;
-/// Number of these threads. One copies 6 to 9 GB/s on a server, and a bus of PCIe 5 carries some 50.
-const COPIERS: usize = 4;
 
 /// An entry of the ring: one upload in flight.
 struct InFlight {
@@ -182,29 +175,18 @@ impl Ring {
         !self.batch.as_ref().is_some_and(grows)
     }
 
-    /// Appends a frame, which becomes `slice` of volume image `image`, to the batch. Call [`Ring::wait`] before the first frame of a batch, and
-    /// [`Ring::stage`] with the frame's bytes before anything else is done with the ring.
-    pub fn add(&mut self, image: u32, slice: u32) {
+    /// Appends a frame, which becomes `slice` of volume image `image`, to the batch in the staging buffer. Call [`Ring::wait`] before the
+    /// first frame of a batch.
+    pub fn write(&mut self, queues: &mut DeviceQueues, image: u32, slice: u32, bytes: &[u8]) {
+        let Staging { bytes: length, write, .. } = self.staging;
+        let at = self.batch.as_ref().map_or(0, |batch| batch.count as usize) * length;
+        let space = self.entries[self.at].staging.space();
+        queues.host("stage", |_| write(bytes, &mut space[at..at + length]));
+        self.context.counts.staged.fetch_add(length as u64, Ordering::Relaxed);
         match &mut self.batch {
             Some(batch) => batch.add(slice),
             None => self.batch = Some(SliceBatch { image, first: slice, count: 1, is_descending: false }),
         }
-    }
-
-    /// Copies the frames that were added last into the staging buffer, in their order; many bytes by several threads.
-    pub fn stage(&mut self, queues: &mut DeviceQueues, frames: &[Cow<[u8]>]) {
-        let Staging { bytes: length, write, .. } = self.staging;
-        let first = self.batch.as_ref().map_or(0, |batch| batch.count as usize).saturating_sub(frames.len());
-        let space = &mut self.entries[self.at].staging.space()[first * length..][..frames.len() * length];
-        self.context.counts.staged.fetch_add(space.len() as u64, Ordering::Relaxed);
-        queues.host("stage", |_| {
-            if space.len() < PARALLEL_BYTES {
-                space.chunks_mut(length.max(1)).zip(frames).for_each(|(space, bytes)| write(bytes, space));
-            } else {
-                let parts = space.par_chunks_mut(length.max(1)).zip(frames);
-                parts.with_min_len(frames.len().div_ceil(COPIERS)).for_each(|(space, bytes)| write(bytes, space));
-            }
-        });
     }
 
     /// True if the next frame can be written without waiting for the device.

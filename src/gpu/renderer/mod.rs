@@ -27,7 +27,6 @@ use crate::queues::oracle::SubmissionLog;
 use crate::scene::{Scene, VisibleBounds};
 use drawing::Drawing;
 use ingest::{Ring, frame_bytes};
-use std::borrow::Cow;
 use std::collections::HashSet;
 use std::sync::Arc;
 use std::time::Duration;
@@ -248,7 +247,9 @@ impl Renderer {
     /// # Errors
     /// Those of [`Renderer::frame`] and [`Renderer::show`].
     pub fn volume<'a>(&mut self, frames: impl IntoIterator<Item = &'a Frame>) -> Result<(), GpuError> {
-        self.frames(frames.into_iter().map(|frame| (frame.slice as u32, frame.bytes.as_slice())), 0)?;
+        for frame in frames {
+            self.frame(frame.slice as u32, &frame.bytes, 0)?;
+        }
         self.show(0)
     }
 
@@ -262,51 +263,21 @@ impl Renderer {
     /// # Errors
     /// The frame has the wrong size, the slice or image does not exist, the device fails, or the last change of the scene failed.
     pub fn frame(&mut self, slice: u32, bytes: &[u8], image: u32) -> Result<(), GpuError> {
-        self.frames([(slice, bytes)], image)
-    }
-
-    /// Sends frames as [`Renderer::frame`] does, of each its slice and its bytes. Frames of one batch are copied together, large ones by several
-    /// threads.
-    ///
-    /// # Errors
-    /// Those of [`Renderer::frame`], for the first frame that has one. The frames before it are sent.
-    pub fn frames<'a>(
-        &mut self,
-        frames: impl IntoIterator<Item = (u32, &'a [u8])>,
-        image: u32,
-    ) -> Result<(), GpuError> {
         self.check(image)?;
-        self.volumes.set_filtered(self.program.scene.visible_bounds);
-        // Those of the batch whose bytes are not copied yet.
-        let mut added = Vec::new();
-        let sent = frames.into_iter().try_for_each(|(slice, bytes)| self.add(&mut added, slice, bytes, image));
-        self.ring.stage(&mut self.queues, &added);
-        let is_complete = !added.is_empty() && self.ring.is_complete(self.program.scene.visible_frames());
-        sent.and_then(|()| if is_complete { self.flush() } else { Ok(()) })
-    }
-
-    /// Adds a frame to the batch, after the batch was submitted if the frame does not continue it.
-    fn add<'a>(
-        &mut self,
-        added: &mut Vec<Cow<'a, [u8]>>,
-        slice: u32,
-        bytes: &'a [u8],
-        image: u32,
-    ) -> Result<(), GpuError> {
         self.check_frame(slice as usize, bytes)?;
+        self.volumes.set_filtered(self.program.scene.visible_bounds);
         if !self.program.scene.visible_frames().contains(&slice) {
             self.skipped += 1;
             return Ok(());
         }
         if !self.ring.continues(image, slice) {
-            self.ring.stage(&mut self.queues, &std::mem::take(added));
             self.flush()?;
             self.ring.wait(&mut self.queues, self.drawing.is_in_flight())?;
         }
-        added.push(self.context.faults.changed_frame(&self.program.scene, bytes));
-        self.ring.add(image, slice);
+        let bytes = self.context.faults.changed_frame(&self.program.scene, bytes);
+        self.ring.write(&mut self.queues, image, slice, &bytes);
         self.volumes.replaced(image, slice);
-        Ok(())
+        if self.ring.is_complete(self.program.scene.visible_frames()) { self.flush() } else { Ok(()) }
     }
 
     /// Checks that a slice exists and that a frame has the right size.

@@ -361,10 +361,10 @@ impl Session {
     pub(crate) fn continue_replay(&mut self) -> Result<(), GpuError> {
         let Some(replay) = self.phase.replay_mut() else { return Ok(()) };
         let (frames, image) = (&replay.volume.frames, replay.image);
-        let next = &frames[replay.sent.min(frames.len())..];
-        let next = &next[..next.len().min(REPLAY_FRAMES)];
-        self.renderer.frames(next.iter().map(|frame| (frame.slice as u32, frame.bytes.as_slice())), image)?;
-        replay.sent += next.len();
+        for frame in frames.iter().skip(replay.sent).take(REPLAY_FRAMES) {
+            self.renderer.frame(frame.slice as u32, &frame.bytes, image)?;
+            replay.sent += 1;
+        }
         if replay.sent >= frames.len() {
             let backward = frames.iter().map(|frame| frame.backward).collect();
             self.pool.put(image, replay.volume.volume, backward);
