@@ -177,7 +177,7 @@ pub use low_level::source::{Header, Recording, Source, open};
 pub mod low_level {
     #[cfg(feature = "verify")]
     pub use crate::batch;
-    pub use echolume_base::{baselines, files, metrics, picture, text, tree};
+    pub use echolume_base::{baselines, files, metrics, picture, statistics, text, tree};
     pub use echolume_core::{
         barriers, dump, error_map, exact_ray, mesh, passes, plan, queues, reference, scene, spirv, stated_error,
     };
@@ -197,6 +197,6 @@ use echolume_base::digest;
 #[cfg(feature = "verify")]
 use echolume_base::html_page;
 use echolume_base::memory;
-use echolume_base::statistics;
+use echolume_base::sync;
 use echolume_base::terminal;
 use low_level::*;

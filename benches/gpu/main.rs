@@ -24,6 +24,7 @@ use echolume::low_level::passes::slots::Initializer;
 use echolume::low_level::passes::{DispatchArgs, Pass, Slot, Texels, device_limits};
 use echolume::low_level::scene::Scene;
 use echolume::low_level::source::Frame;
+use echolume::low_level::statistics::mix;
 use scenes::{FULL, SCENES, SMALL, check_that_none_is_forgotten};
 use std::cell::LazyCell;
 use std::process::ExitCode;
@@ -161,10 +162,7 @@ fn noise(scene: &Scene, pass: &Pass) -> Vec<(Slot, Texels)> {
     let mut state = 0u64;
     let mut next = || {
         state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = state;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+        (mix(state) >> 11) as f64 / (1u64 << 53) as f64
     };
     let mut filled = |slot: Slot| {
         let mut texels = Texels::untouched(slot.array_size(scene), slot.format(scene).channels());

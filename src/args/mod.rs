@@ -3,6 +3,7 @@
 mod input;
 mod labels;
 mod motor;
+mod number;
 mod picture_file;
 mod picture_series;
 mod recording;
@@ -20,6 +21,7 @@ pub use input::{
 #[cfg(feature = "lab")]
 pub use input::{Opened, open_device, open_device_for_statistics, write_report};
 pub use motor::{SerialArgs, motor_failure, motor_table};
+pub use number::check_number;
 pub use picture_file::PictureFile;
 pub use picture_series::{PictureSeries, SeriesTarget};
 pub use recording::{GeometryArgs, open_recording, recording_help};

@@ -1,5 +1,6 @@
 //! Arguments of commands that drive the motor of a probe: the serial line, and a motor that sweeps the array while frames arrive.
 
+use super::number::check_number;
 use crate::probe::ProbeFile;
 use crate::probe::motor::{
     BackgroundSweep, Drive, Fault, MotorError, MotorTable, Parity, PortSettings, StopBits, Sweep,
@@ -52,10 +53,7 @@ pub struct PlannedSweep<'a> {
 impl MotorArgs {
     /// Checks the values that can be checked without opening the port.
     pub fn check(&self) -> Result<(), Failure> {
-        match (0.0..=10_000.0).contains(&self.delay) {
-            true => Ok(()),
-            false => Err(input(format!("--delay {}: must be 0 to 10000 ms", self.delay))),
-        }
+        check_number("--delay", self.delay, |ms| (0.0..=10_000.0).contains(&ms), "must be 0 to 10000 ms")
     }
 
     /// The requested sweep; None without `--motor`. `probe`: path of the probe file. `recording`: path of the recording that is played, whose probe

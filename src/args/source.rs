@@ -3,6 +3,7 @@
 #[cfg(feature = "view")]
 use super::labels::show_labels;
 use super::motor::{MotorArgs, PlannedSweep};
+use super::number::check_number;
 use super::recording::{GeometryArgs, open_recording, say_probe_file};
 use crate::gpu::TimeStamps;
 use crate::kiosk::config::Config;
@@ -273,14 +274,13 @@ impl SourceArgs {
     }
 
     fn playback(&self, rate: Option<f64>) -> Result<Playback, Failure> {
-        match rate {
-            _ if self.real_time => Ok(Playback::Recorded),
-            Some(rate) if !(rate > 0.0 && rate <= 1e6) => {
-                Err(input(format!("--rate {rate}: must be above 0, at most 1e6 volumes a second")))
-            }
-            Some(rate) => Ok(Playback::Volumes(rate)),
-            None => Ok(Playback::Fast),
-        }
+        let is_allowed = |rate: f64| self.real_time || rate > 0.0 && rate <= 1e6;
+        check_number("--rate", rate, is_allowed, "must be above 0, at most 1e6 volumes a second")?;
+        Ok(match rate {
+            _ if self.real_time => Playback::Recorded,
+            Some(rate) => Playback::Volumes(rate),
+            None => Playback::Fast,
+        })
     }
 
     /// The phantom: its volumes in a loop, or with a motor the frames that the moving array acquires.
@@ -317,20 +317,17 @@ impl SourceArgs {
 
     /// What is said of the volume that pictures with poses are compounded into.
     fn freehand(&self) -> Result<FreehandArguments, Failure> {
-        let length = |flag: &str, given: Option<f64>, least: f64| match given {
-            Some(mm) if !(least..=1000.0).contains(&mm) => {
-                Err(input(format!("{flag} {mm}: must lie in {least}..=1000 mm")))
-            }
-            given => Ok(given),
-        };
-        let spacing = length("--spacing", self.spacing, 0.01)?;
-        let max_hole = length("--hole", self.hole, 0.0)?;
-        let extent = length("--extent", self.extent, 0.0)?;
+        let lengths = [("--spacing", self.spacing, 0.01), ("--hole", self.hole, 0.0), ("--extent", self.extent, 0.0)];
+        for (flag, given, least) in lengths {
+            let rule = format!("must lie in {least}..=1000 mm");
+            check_number(flag, given, |mm| (least..=1000.0).contains(&mm), &rule)?;
+        }
         let max_voxels = self.freehand_size.map(|bytes| match memory::check(bytes) {
             Ok(()) => Ok((bytes / VOXEL_BYTES).max(1) as usize),
             Err(why) => Err(input(format!("--freehand-size: {why}"))),
         });
-        Ok(FreehandArguments { clip: self.clip()?, spacing, max_hole, extent, max_voxels: max_voxels.transpose()? })
+        let (clip, max_voxels) = (self.clip()?, max_voxels.transpose()?);
+        Ok(FreehandArguments { clip, spacing: self.spacing, max_hole: self.hole, extent: self.extent, max_voxels })
     }
 
     fn clip(&self) -> Result<Option<[usize; 4]>, Failure> {

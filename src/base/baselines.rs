@@ -77,14 +77,6 @@ pub trait Stored: ToNode + FromNode {
     }
 }
 
-/// Reads the field `format` of a JSON text. Callers read it first, to tell a file of another version from a file of another kind.
-///
-/// # Errors
-/// The text is not JSON, or is not a table with a field `format`.
-pub fn stated_format(text: &str) -> Result<String, NodeError> {
-    format_of(&mut Node::parse_json(text.as_bytes())?)
-}
-
 fn format_of(node: &mut Node) -> Result<String, NodeError> {
     let format = node.at("format").ok_or_else(|| NodeError::missing("format", &None))?;
     String::from_node(format.clone())

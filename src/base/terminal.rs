@@ -1,6 +1,7 @@
 //! Output of a command: lines on standard output, and the line on standard error that ends a failed command.
 
 use crate::progress_lines;
+use crate::text::without_control_characters;
 use indicatif::ProgressBar;
 use std::io::{ErrorKind, IsTerminal, Write};
 use std::sync::Mutex;
@@ -146,15 +147,6 @@ pub fn is_closed() -> bool {
 /// such error ([`is_closed`]).
 pub fn take_write_error() -> Option<std::io::Error> {
     WRITE_ERROR.lock().unwrap_or_else(|e| e.into_inner()).take()
-}
-
-/// Escapes control characters other than line ends. Text from files must not control the terminal.
-fn without_control_characters(text: &str) -> String {
-    let mut lines = String::with_capacity(text.len());
-    for c in text.chars() {
-        if c.is_control() && c != '\n' { lines.extend(c.escape_default()) } else { lines.push(c) }
-    }
-    lines
 }
 
 /// `message` as one line of at most [`MAX_MESSAGE`] characters.

@@ -11,11 +11,16 @@ const MAX_ESCAPED: usize = 600;
 /// Returns the message on one line: line breaks become spaces, other control characters become escapes. A message may quote a key of a
 /// file, which can hold any character.
 pub fn printable(message: &str) -> String {
-    let mut line = String::new();
-    for c in message.lines().collect::<Vec<_>>().join(" ").chars() {
-        if c.is_control() { line.extend(c.escape_default()) } else { line.push(c) }
+    without_control_characters(&message.lines().collect::<Vec<_>>().join(" "))
+}
+
+/// Escapes control characters other than line ends. Text from files must not control the terminal.
+pub(crate) fn without_control_characters(text: &str) -> String {
+    let mut lines = String::with_capacity(text.len());
+    for c in text.chars() {
+        if c.is_control() && c != '\n' { lines.extend(c.escape_default()) } else { lines.push(c) }
     }
-    line
+    lines
 }
 
 /// The text on one line, cut at 400 characters: line breaks become spaces, other control characters become escapes.

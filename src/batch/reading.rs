@@ -6,9 +6,8 @@ use super::unit::{Key, Kind, Work};
 use crate::args::{check_volume, frames_of, recorded};
 use crate::digest::digest_of;
 use crate::files::escaped;
-use crate::probe::{Geometry, Grid, World};
 use crate::scene::Scene;
-use crate::source::convert::{Target, Volume, lattice, no_echo};
+use crate::source::convert::{Target, Volume};
 use crate::source::{self, Frame, Source};
 use crate::terminal::{Failure, input};
 use serde_json::{Map, Value, json};
@@ -170,20 +169,11 @@ fn check_all(task: &Task, source: &mut dyn Source) -> Result<bool, Failure> {
 fn convertible(task: &Task, source: &mut dyn Source) -> Result<Contents, Failure> {
     let work = &*task.work;
     let name = task.input.display();
-    let geometry = source.geometry(work.volume);
-    let grid: Grid = match (&geometry, work.spacing) {
-        (Geometry::Cartesian(grid), None) => *grid,
-        (Geometry::Sweep(probe), None) => lattice(&geometry, probe.sample_pitch)
-            .map_err(|e| input(format!("{name}: the sample spacing {e}; give --spacing")))?,
-        (_, Some(spacing)) => lattice(&geometry, spacing).map_err(|e| input(format!("{name}: --spacing {e}")))?,
-    };
-    let mut target = Target::new(grid, source.sample_type());
-    if let (Some(world), Geometry::Cartesian(own)) = (source.world_of(work.volume), &geometry) {
-        target.world = World::on(&world, own, &grid);
-    }
-    target.outside = work.outside.unwrap_or_else(|| no_echo(source));
+    let target = Target::of(source, work.volume, work.spacing);
+    let mut target = target.map_err(|why| input(format!("{name}: {why}")))?;
+    target.outside = work.outside.unwrap_or(target.outside);
     target.check(Path::new(&work.output)).map_err(input)?;
-    let mut volume = Volume::new(geometry, source.stored_type());
+    let mut volume = Volume::new(source.geometry(work.volume), source.stored_type());
     frames(work, source)?.into_iter().for_each(|frame| volume.take(frame));
     Ok(Contents::Volume { volume: Box::new(volume), target: Box::new(target) })
 }

@@ -81,7 +81,7 @@ pub fn html(records: &[Record], torn: usize, folder: &Path) -> String {
             ul class="counts" {
                 li { strong { (units - failures) } " done" }
                 li { strong { (failures) } " failed" }
-                li { strong { (tries(records)) } " tries" }
+                li { strong { (records.len()) } " tries" }
                 @if let Some((first, last)) = dates(records) {
                     li { "on " strong { (first) } @if last != first { " to " strong { (last) } } }
                 }
@@ -104,10 +104,6 @@ pub fn html(records: &[Record], torn: usize, folder: &Path) -> String {
 fn dates(records: &[Record]) -> Option<(String, String)> {
     let days = || records.iter().filter_map(|record| record.date.split('T').next()).filter(|day| !day.is_empty());
     days().min().zip(days().max()).map(|(first, last)| (escaped(first), escaped(last)))
-}
-
-fn tries(records: &[Record]) -> usize {
-    records.len()
 }
 
 fn failed(merged: &Merged) -> Markup {

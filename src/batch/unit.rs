@@ -8,9 +8,9 @@ use crate::scene::load::Layers;
 use crate::source::segmentation;
 use crate::source::volume_file::VolumeFile;
 use crate::terminal::{Failure, input};
+use crate::tree::Name;
 use clap::{Parser, Subcommand};
 use sha2::{Digest, Sha256};
-use std::fmt;
 use std::path::{Path, PathBuf};
 use toml::Table;
 
@@ -19,8 +19,9 @@ const SCHEME: &str = "echolume-batch-1";
 /// Hexadecimal digits of a key: 128 bits.
 const KEY_LENGTH: usize = 32;
 
-/// What can be done with a recording in a batch.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// What can be done with a recording in a batch; its name is that of the subcommand.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Name)]
+#[tree(rename_all = "lowercase")]
 pub enum Kind {
     Render,
     Convert,
@@ -29,16 +30,6 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// Name of the subcommand for work of this kind.
-    pub fn word(self) -> &'static str {
-        match self {
-            Kind::Render => "render",
-            Kind::Convert => "convert",
-            Kind::Measure => "measure",
-            Kind::Verify => "verify",
-        }
-    }
-
     /// File name of the output if the manifest names none.
     fn output(self) -> &'static str {
         match self {
@@ -52,12 +43,6 @@ impl Kind {
     /// True if the work needs a Vulkan device.
     pub fn needs_device(self) -> bool {
         matches!(self, Kind::Render | Kind::Verify)
-    }
-}
-
-impl fmt::Display for Kind {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str(self.word())
     }
 }
 
@@ -133,7 +118,7 @@ pub fn text(unit: &Unit) -> String {
     match (&unit.scene, &unit.command) {
         (Some(scene), _) => format!("scene {}", serde_json::to_string(scene).unwrap_or_default()),
         (None, Some(command)) => command.join(" "),
-        (None, None) => Kind::Render.word().into(),
+        (None, None) => Kind::Render.name().into(),
     }
 }
 
@@ -157,7 +142,9 @@ impl Work {
         work.output = match unit.outputs.as_slice() {
             [] => work.kind.output().into(),
             [one] => one.clone(),
-            several => return Err(input(format!("outputs: {} makes one file, not {}", work.kind, several.len()))),
+            several => {
+                return Err(input(format!("outputs: {} makes one file, not {}", work.kind.name(), several.len())));
+            }
         };
         work.check_output()?;
         // What is given counts, even where it is the default: the rest follows from the recording.
@@ -217,7 +204,7 @@ impl Work {
             Kind::Convert => VolumeFile::of(name).map(drop).map_err(|e| input(format!("outputs: {e}"))),
             Kind::Render if !ends("png") => Err(input("outputs: render makes a .png")),
             Kind::Measure | Kind::Verify if !ends("json") => {
-                Err(input(format!("outputs: {} makes a .json", self.kind)))
+                Err(input(format!("outputs: {} makes a .json", self.kind.name())))
             }
             _ => Ok(()),
         }
@@ -232,7 +219,7 @@ impl Work {
         let axis = format!("{:?}", self.geometry.depth_axis);
         let mut hash = Sha256::new();
         let version = env!("CARGO_PKG_VERSION");
-        let parts = [SCHEME, version, self.kind.word(), &self.text, &settings, &presets, &numbers, &axis, &self.output];
+        let parts = [SCHEME, version, self.kind.name(), &self.text, &settings, &presets, &numbers, &axis, &self.output];
         for part in parts {
             hash.update((part.len() as u64).to_le_bytes());
             hash.update(part);

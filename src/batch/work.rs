@@ -73,6 +73,7 @@ enum Fault {
 }
 
 /// The results of a unit before they are written.
+#[derive(Default)]
 struct Made {
     bytes: Option<Vec<u8>>,
     /// An output that was written already.
@@ -83,7 +84,7 @@ struct Made {
 
 impl Made {
     fn of(bytes: Vec<u8>) -> Made {
-        Made { bytes: Some(bytes), written: None, figures: Map::new(), agreement: None }
+        Made { bytes: Some(bytes), ..Made::default() }
     }
 }
 
@@ -311,7 +312,7 @@ impl Worker<'_> {
                     ("spacing_mm".to_string(), json!(target.grid.spacing)),
                 ]);
                 let written = Some(OutputFile { file: name.clone(), bytes, sha256 });
-                Made { bytes: None, written, figures, agreement: None }
+                Made { written, figures, ..Made::default() }
             }
             Contents::Figures(figures) => {
                 let text = stated("echolume-figures-1", &figures)?;
@@ -331,8 +332,7 @@ impl Worker<'_> {
     fn compared(&self, file: &Path, earlier: &Record, picture: &Picture) -> Result<Made, Fault> {
         let kept = Picture::load(file).map_err(Fault::Failed)?;
         let agreement = Agreement::of(&kept, earlier.drawer.as_ref(), picture, self.drawer().as_ref());
-        let mut made =
-            Made { bytes: None, written: earlier.outputs.first().cloned(), figures: Map::new(), agreement: None };
+        let mut made = Made { written: earlier.outputs.first().cloned(), ..Made::default() };
         if !agreement.agrees {
             let place = self.job.folder.join("differences");
             let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();

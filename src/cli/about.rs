@@ -1,5 +1,6 @@
 //! `echolume completions` and `echolume man`: completion scripts for shells, and manual pages.
 
+use crate::args::make_folder;
 use crate::files;
 use crate::terminal::{self, Failure, failed, say};
 use clap::Command;
@@ -47,8 +48,7 @@ impl ManPages {
             terminal::write(&page(&program)?);
             return Ok(());
         };
-        let cannot = |e| failed(format!("{}: cannot be written: {e}", folder.display()));
-        std::fs::create_dir_all(folder).map_err(cannot)?;
+        make_folder(folder)?;
         let count = write(&program, folder)?;
         say!("man pages: {}, {count} of them", folder.display());
         Ok(())

@@ -1,6 +1,6 @@
 //! `echolume batch`: renders, converts, measures or verifies many recordings.
 
-use crate::args::write_report;
+use crate::args::{check_number, write_report};
 use crate::batch::make::{self, Found};
 use crate::batch::painter::DeviceOptions;
 use crate::batch::report::{self, Merged};
@@ -129,9 +129,7 @@ impl Batch {
     }
 
     fn work(&self, manifest: &Path, folder: &Path) -> Result<(), Failure> {
-        if !(0.0..=1.0).contains(&self.recheck) {
-            return Err(input(format!("--recheck {}: must lie in 0..=1", self.recheck)));
-        }
+        check_number("--recheck", self.recheck, |share| (0.0..=1.0).contains(&share), "must lie in 0..=1")?;
         let grace = humantime::parse_duration(&self.grace)
             .map_err(|_| input(format!("--grace {}: must be a time such as 20s or 2m", self.grace)))?;
         let variable = |name: &str| std::env::var(name).ok();

@@ -1,6 +1,6 @@
 //! `echolume report bounds`: proven bounds of a picture.
 
-use crate::args::{InputArgs, make_folder};
+use crate::args::{InputArgs, check_number, make_folder};
 use crate::bounds::{Effort, PictureBounds, Proof, fault, picture, proven};
 use crate::dump::npy;
 use crate::gpu::{Renderer, RendererOptions};
@@ -14,7 +14,7 @@ use crate::statistics::quantile_of;
 use crate::terminal::{Failure, failed, input, say};
 use serde_json::json;
 use std::fmt::{self, Display};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 #[derive(clap::Args)]
 #[command(
@@ -91,9 +91,7 @@ fn summary(widths: &[f64], limit: f64) -> [f64; 3] {
 
 impl BoundsReport {
     pub fn run(&self) -> Result<(), Failure> {
-        if !(1e-6..=1.0).contains(&self.width) {
-            return Err(input(format!("--width {}: must lie in 1e-6..=1", self.width)));
-        }
+        check_number("--width", self.width, |width| (1e-6..=1.0).contains(&width), "must lie in 1e-6..=1")?;
         let (mut source, drawn) = self.input.open()?;
         let tolerance = drawn.tolerance();
         // The integral has no steps.
@@ -170,7 +168,7 @@ impl BoundsReport {
         };
         colours(&grey).save(&self.output.join("width.png")).map_err(failed)?;
         for (name, map) in [("low.npy", &bounds.low), ("high.npy", &bounds.high)] {
-            write(&self.output, name, &npy(&[height, width, 4], &map.values, true))?;
+            replace(&self.output.join(name), &npy(&[height, width, 4], &map.values, true)).map_err(failed)?;
         }
         let hit = bounds.widths_of_hits();
         let [median, p95, within] = summary(&hit, self.width);
@@ -189,12 +187,8 @@ impl BoundsReport {
             "parts": bounds.parts,
             "white_of_width_png": widest,
         });
-        write(&self.output, "bounds.json", format!("{about:#}\n").as_bytes())
+        replace(&self.output.join("bounds.json"), format!("{about:#}\n").as_bytes()).map_err(failed)
     }
-}
-
-fn write(folder: &Path, name: &str, bytes: &[u8]) -> Result<(), Failure> {
-    replace(&folder.join(name), bytes).map_err(failed)
 }
 
 fn colours(map: &Texels) -> Picture {

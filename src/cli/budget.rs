@@ -1,9 +1,9 @@
 //! `--budget` of `echolume render`: settings from an error report.
 
-use super::error_report::read_report;
 use crate::args::parse_nanoseconds;
-use crate::error_report::Measure;
+use crate::baselines::Stored;
 use crate::error_report::choose::{Bound, choose};
+use crate::error_report::{Measure, Report};
 use crate::passes::PassTime;
 use crate::scene::Scene;
 use crate::terminal::{Failure, failed, input, say};
@@ -20,7 +20,7 @@ pub(super) fn chosen(
     scene: impl FnOnce() -> Result<Scene, Failure>,
 ) -> Result<Vec<String>, Failure> {
     let time = parse_nanoseconds("--budget", budget)?;
-    let report = read_report(file)?;
+    let report = Report::load(file).map_err(input)?;
     let scene = scene()?;
     let (there, here) = (report.sizes.volume, scene.volume_size());
     if there != here {

@@ -1,8 +1,8 @@
 //! `echolume render --compare`: volumes beside each other in one picture, drawn with the same settings on one device.
 
-use super::drawing::{DrawFault, draw_despite_losses};
+use super::drawing::{DrawFault, Job, draw_despite_losses};
 use super::recordings::read_volume;
-use crate::args::{InputArgs, PictureFile, check_outputs, check_volume, recorded};
+use crate::args::{PictureFile, check_messages, check_outputs, check_volume, recorded};
 use crate::compare::{self, Difference, MAX_TILES, tile_name};
 use crate::gpu::{Context, Renderer, RendererOptions};
 use crate::marked::{self, Demo};
@@ -84,15 +84,6 @@ impl FromStr for Motion {
             false => Ok(Motion::Given(text.parse().map_err(|why| format!("must be find, or {why}"))?)),
         }
     }
-}
-
-/// The arguments of `render` that a comparison needs.
-pub struct Job<'a> {
-    pub input: &'a InputArgs,
-    pub output: &'a Path,
-    pub options: RendererOptions,
-    pub validate: bool,
-    pub own_shaders: bool,
 }
 
 /// A volume that is drawn, and its scene.
@@ -179,10 +170,7 @@ impl CompareArgs {
         };
         let composed = composed.map_err(failed)?;
         output.write(|format| composed.encoded(format))?;
-        match context.messages().first() {
-            None => Ok(()),
-            Some(first) => Err(failed(format!("validation: {first}"))),
-        }
+        check_messages(&context)
     }
 
     /// A compared recording, moved onto the first one if that was asked for.

@@ -1,10 +1,22 @@
 //! Shared code of the commands that draw pictures of a recording: sending frames, and repeating after a loss of the device.
 
-use crate::args::{frames_of, gpu_failure};
+use crate::args::{InputArgs, frames_of, gpu_failure};
 use crate::gpu::{Context, GpuError, Losses, Renderer, RendererOptions};
 use crate::source::{Frame, Source};
 use crate::terminal::{Failure, failed};
+use std::path::Path;
 use std::sync::Arc;
+
+/// The arguments of `render` for several pictures: how they are drawn, and where they are written.
+pub struct Job<'a> {
+    pub input: &'a InputArgs,
+    pub output: &'a Path,
+    pub options: RendererOptions,
+    pub validate: bool,
+    pub timings: bool,
+    /// True if the shaders come from a folder of the user. A shader that does not compile is then an error of the input.
+    pub own_shaders: bool,
+}
 
 /// Why a picture could not be drawn.
 pub enum DrawFault {

@@ -1,10 +1,10 @@
 //! `echolume report error`: error against run time.
 
-use crate::args::{InputArgs, Opened, make_folder, parse_nanoseconds};
+use crate::args::{InputArgs, Opened, check_number, make_folder, parse_nanoseconds};
+use crate::baselines::Stored;
 use crate::error_report::choose::Bound;
 use crate::error_report::plot::Figure;
 use crate::error_report::{self, Measure, choose, dials, errors_and_times, export, plot};
-use crate::files::read_text;
 use crate::picture::replace;
 use crate::scene::Scene;
 use crate::terminal::{Failure, failed, input, progress_bar, say};
@@ -12,9 +12,6 @@ use std::path::{Path, PathBuf};
 
 /// Runs of a choice before it is printed: the 95th percentile is the second longest.
 const VERIFYING_RUNS: u32 = 20;
-
-/// Maximum size of a report file, bytes.
-const MAX_REPORT: u64 = 64 << 20;
 
 #[derive(clap::Args)]
 #[command(
@@ -64,13 +61,11 @@ impl ErrorReport {
             other => return Err(input(format!("--measure {other}: must be rmse, levels, mm or degrees"))),
         };
         let time = self.under_time.as_deref().map(|time| parse_nanoseconds("--under-time", time)).transpose()?;
-        if let Some(error) = self.under_error.filter(|e| !(*e > 0.0 && e.is_finite())) {
-            return Err(input(format!("--under-error {error}: must be a number above 0")));
-        }
+        check_number("--under-error", self.under_error, |e| e > 0.0 && e.is_finite(), "must be a number above 0")?;
         let bounds: Vec<Bound> = self.under_error.map(Bound::Error).into_iter().chain(time.map(Bound::Time)).collect();
         match &self.from {
             Some(file) => {
-                let report = read_report(file)?;
+                let report = error_report::Report::load(file).map_err(input)?;
                 self.print(&report, measure)?;
                 for bound in bounds {
                     let choice = choose::choose(&report, measure, bound, &[]).map_err(failed)?;
@@ -189,7 +184,7 @@ impl ErrorReport {
 
 fn write(report: &error_report::Report, measure: Measure, folder: &Path) -> Result<(), Failure> {
     make_folder(folder)?;
-    replace(&folder.join("error.json"), report.to_json().map_err(failed)?.as_bytes()).map_err(failed)?;
+    replace(&folder.join("error.json"), report.to_json().map_err(failed)?.trim_end().as_bytes()).map_err(failed)?;
     replace(&folder.join("error.csv"), export::csv(report).as_bytes()).map_err(failed)?;
     let mut written = vec!["error.json".to_string(), "error.csv".into()];
     for (figure, name) in [(Figure::Errors, "error"), (Figure::Looks, "looks")] {
@@ -205,11 +200,4 @@ fn write(report: &error_report::Report, measure: Measure, folder: &Path) -> Resu
     }
     say!("written: {} in {}", written.join(", "), folder.display());
     Ok(())
-}
-
-/// Reads an error report that was stored as JSON.
-pub(crate) fn read_report(file: &Path) -> Result<error_report::Report, Failure> {
-    let fault = |e: &dyn std::fmt::Display| input(format!("{}: {e}", file.display()));
-    let text = read_text(file, MAX_REPORT, "report").map_err(|e| fault(&e))?;
-    error_report::Report::from_json(&text).map_err(|e| fault(&e))
 }

@@ -1,6 +1,6 @@
 //! `echolume report filters`: compares the 2D filters.
 
-use crate::args::{Output, check_outputs, open_device, open_recording, write_report};
+use crate::args::{Output, check_outputs, make_folder, open_device, open_recording, write_report};
 use crate::filter_report::candidate_runs::{MeasureError, MeasureOptions, Middle, count, phantom, recording};
 use crate::filter_report::candidates::candidates;
 use crate::filter_report::{Area, Areas, Report, contact_sheet, export};
@@ -73,8 +73,7 @@ impl FilterReport {
             Some(folder) => names.iter().map(|name| folder.join(format!("{name}.png"))).collect(),
         };
         if let Some(folder) = &self.pictures {
-            std::fs::create_dir_all(folder)
-                .map_err(|e| failed(format!("--pictures {}: cannot be written: {e}", folder.display())))?;
+            make_folder(folder)?;
         }
         let mut targets: Vec<Output> = vec![("--markdown", self.markdown.as_deref()), ("--csv", self.csv.as_deref())];
         targets.extend(sheets.iter().map(|file| ("--pictures", Some(file.as_path()))));

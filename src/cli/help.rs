@@ -7,98 +7,26 @@ use crate::source::phantom::Body;
 use clap::builder::PossibleValuesParser;
 use clap::{Arg, Command};
 
-/// Flags by their group. Flags that are not here are `Options`.
-const GROUPS: [(&str, &[&str]); 6] = [
+/// Flags by their group, with spaces between them. Flags that are not here are `Options`.
+const GROUPS: [(&str, &str); 6] = [
     (
         "Input",
-        &[
-            "source",
-            "from",
-            "probe",
-            "depth_axis",
-            "voxel_spacing",
-            "plus_config",
-            "calibration",
-            "reference",
-            "volume",
-            "real_time",
-            "rounds",
-            "tool",
-            "device_name",
-            "no_checksum",
-            "clip",
-            "hole",
-            "extent",
-            "freehand_size",
-            "config",
-        ],
+        "source from probe depth_axis voxel_spacing plus_config calibration reference volume real_time rounds \
+         tool device_name no_checksum clip hole extent freehand_size config",
     ),
-    (
-        "Look",
-        &[
-            "mode",
-            "layout",
-            "transfer",
-            "scene",
-            "preset",
-            "size",
-            "camera",
-            "roi",
-            "set",
-            "still",
-            "tolerance",
-            "budget",
-            "report",
-        ],
-    ),
+    ("Look", "mode layout transfer scene preset size camera roi set still tolerance budget report"),
     (
         "Output",
-        &[
-            "output",
-            "out",
-            "null",
-            "record",
-            "serve",
-            "serve_spacing",
-            "prometheus",
-            "save_to",
-            "turntable",
-            "volumes",
-            "mesh",
-            "dump",
-            "raw",
-            "error_map",
-            "error_tolerance",
-            "time",
-            "cine",
-            "cine_memory",
-        ],
+        "output out null record serve serve_spacing prometheus save_to turntable volumes mesh dump raw error_map \
+         error_tolerance time cine cine_memory",
     ),
     (
         "Device",
-        &[
-            "device",
-            "device_timeout",
-            "update",
-            "images",
-            "queues",
-            "max_memory",
-            "full_screen",
-            "monitor",
-            "direct",
-            "refresh",
-            "present",
-            "kiosk",
-            "no_ui",
-            "no_panels",
-            "scale",
-        ],
+        "device device_timeout update images queues max_memory full_screen monitor direct refresh present kiosk \
+         no_ui no_panels scale",
     ),
-    (
-        "Motor",
-        &["motor", "angle", "sweeps", "homed", "delay", "stamps", "baud", "parity", "stop_bits", "timeout", "port"],
-    ),
-    ("Debugging", &["verbose", "log_file", "explain", "timings", "validate", "glsl"]),
+    ("Motor", "motor angle sweeps homed delay stamps baud parity stop_bits timeout port"),
+    ("Debugging", "verbose log_file explain timings validate glsl"),
 ];
 
 /// Commands whose flags are in groups, with what a group holds of them alone. The others have few flags.
@@ -110,74 +38,20 @@ const GROUPED: [(&str, &[(&str, &str)]); 4] = [
 ];
 
 /// The flags of `-h`, of commands with many.
-const USUAL: [(&str, &[&str]); 10] = [
-    (
-        "render",
-        &[
-            "mode",
-            "transfer",
-            "preset",
-            "size",
-            "camera",
-            "roi",
-            "set",
-            "device",
-            "probe",
-            "volume",
-            "output",
-            "turntable",
-            "volumes",
-            "explain",
-        ],
-    ),
+const USUAL: [(&str, &str); 10] = [
+    ("render", "mode transfer preset size camera roi set device probe volume output turntable volumes explain"),
     (
         "stream",
-        &[
-            "source",
-            "probe",
-            "rate",
-            "real_time",
-            "rounds",
-            "mode",
-            "preset",
-            "size",
-            "set",
-            "device",
-            "out",
-            "null",
-            "record",
-            "serve",
-            "volumes",
-            "time",
-            "motor",
-        ],
+        "source probe rate real_time rounds mode preset size set device out null record serve volumes time motor",
     ),
-    (
-        "view",
-        &[
-            "source",
-            "probe",
-            "rate",
-            "real_time",
-            "mode",
-            "preset",
-            "set",
-            "device",
-            "kiosk",
-            "config",
-            "full_screen",
-            "budget",
-            "record",
-            "save_to",
-        ],
-    ),
-    ("convert", &["spacing", "volume", "probe", "outside", "mask", "sequence", "secondary_capture"]),
-    ("mesh", &["threshold", "spacing", "smooth", "simplify", "fast", "base", "open", "volume", "probe"]),
-    ("segment", &["output", "threshold", "dark", "seed", "smooth", "box", "least", "csv", "stl", "volume", "probe"]),
-    ("phantom", &["output", "body", "volumes", "seed", "sampling", "frames", "lines", "truth"]),
-    ("worksheet", &["output", "from", "scene", "set", "size", "device"]),
-    ("verify", &["device", "full", "only", "list", "baseline", "json", "junit", "html", "self_test", "against"]),
-    ("profile", &["mode", "preset", "set", "size", "device", "runs", "json", "compare", "against", "html"]),
+    ("view", "source probe rate real_time mode preset set device kiosk config full_screen budget record save_to"),
+    ("convert", "spacing volume probe outside mask sequence secondary_capture"),
+    ("mesh", "threshold spacing smooth simplify fast base open volume probe"),
+    ("segment", "output threshold dark seed smooth box least csv stl volume probe"),
+    ("phantom", "output body volumes seed sampling frames lines truth"),
+    ("worksheet", "output from scene set size device"),
+    ("verify", "device full only list baseline json junit html self_test against"),
+    ("profile", "mode preset set size device runs json compare against html"),
 ];
 
 /// What `-h` says of flags whose first sentence is too long for a line.
@@ -215,7 +89,7 @@ pub fn grouped(program: Command) -> Command {
 
 fn in_group(arg: Arg, own: &[(&str, &'static str)]) -> Arg {
     let name = arg.get_id().to_string();
-    let of_all = GROUPS.iter().find(|(_, names)| names.contains(&&*name)).map(|(group, _)| *group);
+    let of_all = GROUPS.iter().find(|(_, names)| names.split(' ').any(|flag| flag == name)).map(|(group, _)| *group);
     match own.iter().find(|(id, _)| *id == name).map(|(_, group)| *group).or(of_all) {
         Some(group) => arg.help_heading(group),
         None => arg,
@@ -235,7 +109,7 @@ fn short_command(command: Command, above: &str) -> Command {
     let whole = format!("{above}{name}");
     let more = format!("All flags, with examples: echolume {whole} --help");
     command.after_help(more).mut_subcommands(|below| short_command(below, &format!("{whole} "))).mut_args(|arg| {
-        let is_usual = usual.is_none_or(|usual| usual.contains(&arg.get_id().as_str()));
+        let is_usual = usual.is_none_or(|usual| usual.split(' ').any(|flag| flag == arg.get_id().as_str()));
         let is_shown = arg.is_positional() || is_usual && !arg.is_global_set();
         short_line(arg).hide(!is_shown)
     })

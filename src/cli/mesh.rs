@@ -1,7 +1,7 @@
 //! `echolume mesh`: the surface of a recording as triangles.
 
-use super::recordings::{OUTPUT, read_with_threshold, share_of, target_grid};
-use crate::args::{GeometryArgs, check_outputs, open_recording, recording_help};
+use super::recordings::{OUTPUT, read_with_threshold, share_of};
+use crate::args::{GeometryArgs, check_number, check_outputs, open_recording, recording_help};
 use crate::mesh::Mesh;
 use crate::mesh::base::Base;
 use crate::mesh::files::{Colours, MeshFile};
@@ -11,7 +11,7 @@ use crate::mesh::{quadrics, simplify};
 use crate::probe::{Geometry, Grid, World};
 use crate::scene::default_look::smoothing;
 use crate::scene::{Input, depth_offset};
-use crate::source::convert::Volume;
+use crate::source::convert::{Volume, target_grid};
 use crate::terminal::{self, Failure, failed, input, say};
 use indicatif::ProgressBar;
 use std::path::{Path, PathBuf};
@@ -92,18 +92,12 @@ impl MakeMesh {
         let format = MeshFile::of(self.output()).map_err(input)?;
         let colour = COLOURS.iter().find(|(name, _)| self.colour.eq_ignore_ascii_case(name));
         let (_, colour) = colour.ok_or_else(|| input(format!("--colour {}: must be grey or skin", self.colour)))?;
-        if let Some(share) = self.threshold.filter(|share| !(0.0..=1.0).contains(share)) {
-            return Err(input(format!("--threshold {share}: must lie in 0..=1")));
-        }
-        if let Some(mm) = self.simplify.filter(|mm| !(mm.is_finite() && *mm > 0.0)) {
-            return Err(input(format!("--simplify {mm}: must be a length above 0 mm")));
-        }
-        if let Some(mm) = self.base.filter(|mm| !(*mm > 0.0 && *mm <= MAX_BASE)) {
-            return Err(input(format!("--base {mm}: must be a length above 0 and up to {MAX_BASE} mm")));
-        }
-        if let Some(mm) = self.start.filter(|mm| !mm.is_finite()) {
-            return Err(input(format!("--start {mm}: must be a depth, mm")));
-        }
+        check_number("--threshold", self.threshold, |share| (0.0..=1.0).contains(&share), "must lie in 0..=1")?;
+        let is_length = |mm: f64| mm.is_finite() && mm > 0.0;
+        check_number("--simplify", self.simplify, is_length, "must be a length above 0 mm")?;
+        let base = format!("must be a length above 0 and up to {MAX_BASE} mm");
+        check_number("--base", self.base, |mm| mm > 0.0 && mm <= MAX_BASE, &base)?;
+        check_number("--start", self.start, f64::is_finite, "must be a depth, mm")?;
         let mut recording = open_recording(&self.input, self.geometry.options())?;
         let read = recording.files();
         let read = read.iter().chain(&self.geometry.probe).map(PathBuf::as_path);
@@ -111,14 +105,11 @@ impl MakeMesh {
         let samples = Input { stored: recording.stored_type(), range: recording.range() };
         let (shift, world) = (recording.sample_type().shift(), recording.world_of(self.volume));
         let (geometry, volume, found) = read_with_threshold(&mut *recording, &self.input, self.volume, samples)?;
-        let grid = target_grid(&geometry, self.spacing)?;
+        let grid = target_grid(&geometry, self.spacing).map_err(input)?;
         let share = share_of(self.threshold, found.as_ref(), &self.input)?;
         let [low, high] = samples.range;
         let threshold = low + share * (high - low);
-        let world = match (&geometry, world) {
-            (Geometry::Cartesian(own), Some(world)) => world.on(own, &grid),
-            _ => World::of(&grid),
-        };
+        let world = World::resampled(world, &geometry, &grid);
         let deviation = self.deviation(&geometry, &grid.spacing)?;
         let start = self.start.or(self.base.and(found.as_ref()).and_then(|levels| levels.start));
         // Depths are stated below the probe's face.

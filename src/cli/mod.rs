@@ -117,15 +117,16 @@ left_out!(view, View, "view");
 
 use crate::files::signals::hangups;
 use crate::files::{self, Lock};
-use crate::kiosk::log_rotation::{self, LateLog, RotatingLog};
+use crate::kiosk::log_rotation::{DEFAULT_FILE_BYTES, DEFAULT_FILES, LateLog, RotatingLog};
 use crate::memory;
 use crate::source::standard_input;
+use crate::sync::locked;
 use crate::terminal::{self, Failure, failed, input};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use tracing_subscriber::filter::filter_fn;
 use tracing_subscriber::layer::SubscriberExt;
@@ -221,11 +222,11 @@ pub fn run() -> ExitCode {
     // A description needs one frame at a time.
     let all = matches!(arguments.command, Command::Info(_)).then_some(u64::MAX);
     arguments.max_memory.or(all).into_iter().for_each(memory::set_limit);
-    if !arguments.command.is_private() {
+    let (configured, is_private, is_endless) = arguments.command.of_view();
+    if !is_private {
         files::follow_umask();
     }
-    let log = arguments.command.log();
-    let log = start_log(arguments.verbose, arguments.log_file.as_deref(), log, &arguments.command);
+    let log = start_log(&arguments, configured, is_endless);
     // To the end no other process writes to the log.
     let (lock, log) = log.map_or_else(|failure| (LogLock::default(), Err(failure)), |lock| (lock, Ok(())));
     let log = log.and_then(|()| check_environment());
@@ -257,7 +258,7 @@ pub fn run() -> ExitCode {
         None => Ok(()),
     });
     // The log itself stays open: the process ends before it is dropped.
-    *lock.lock().unwrap_or_else(PoisonError::into_inner) = None;
+    *locked(&lock) = None;
     let Err(failure) = done else { return ExitCode::SUCCESS };
     let code = failure.exit_code();
     terminal::remark(&failure.message());
@@ -282,30 +283,13 @@ fn parsed() -> Result<Arguments, clap::Error> {
 }
 
 impl Command {
-    /// The log that the command's configuration asks for: its path, the size limit of one file in bytes, and the number of files.
-    fn log(&self) -> Option<(PathBuf, u64, u32)> {
+    /// What the configuration of the viewer asks for: its log; false if it lets the umask say who may read files; and true if the command runs until
+    /// it is stopped.
+    fn of_view(&self) -> (Option<LogPlace>, bool, bool) {
         match self {
             #[cfg(feature = "view")]
-            Command::View(view) => view.log(),
-            _ => None,
-        }
-    }
-
-    /// False where the command's configuration lets the umask say who may read files.
-    fn is_private(&self) -> bool {
-        match self {
-            #[cfg(feature = "view")]
-            Command::View(view) => view.is_private(),
-            _ => true,
-        }
-    }
-
-    /// True if SIGHUP opens the log again instead of ending the program: it runs until it is stopped.
-    fn reopens_log(&self) -> bool {
-        match self {
-            #[cfg(feature = "view")]
-            Command::View(view) => view.is_kiosk(),
-            _ => false,
+            Command::View(view) => (view.log(), view.is_private(), view.is_kiosk()),
+            _ => (None, true, false),
         }
     }
 }
@@ -320,25 +304,25 @@ fn check_environment() -> Result<(), Failure> {
     }
 }
 
+/// Where a log is written: its path, the size limit of one file in bytes, and the number of files.
+type LogPlace = (PathBuf, u64, u32);
+
 /// Time between two tries to open the log of a kiosk.
 const LOG_PAUSE: Duration = Duration::from_secs(5);
 
 /// The lock of the log, as soon as it can be locked.
 type LogLock = Arc<Mutex<Option<Lock>>>;
 
-/// Opens a log that no other process writes to. A kiosk that cannot logs to standard error until it can: it still shows pictures.
-fn open_log(
-    (path, bytes, files): (PathBuf, u64, u32),
-    command: &Command,
-    lock: &LogLock,
-) -> Result<Box<dyn Write + Send>, String> {
-    if !command.reopens_log() {
+/// Opens a log that no other process writes to. A command that is endless, a kiosk, opens it again at SIGHUP instead of ending. A kiosk that cannot
+/// open its log logs to standard error until it can: it still shows pictures.
+fn open_log((path, bytes, files): LogPlace, is_endless: bool, lock: &LogLock) -> Result<Box<dyn Write + Send>, String> {
+    if !is_endless {
         return Ok(Box::new(RotatingLog::open(&path, bytes, files)?));
     }
     let reopens = hangups().map_err(|e| format!("SIGHUP cannot be caught: {e}"))?;
     let lock = lock.clone();
     let open = move || {
-        let mut lock = lock.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut lock = locked(&lock);
         if !lock.as_ref().is_some_and(Lock::is_held) {
             *lock = Some(Lock::take(&path)?);
         }
@@ -351,41 +335,30 @@ fn open_log(
     Ok(Box::new(log))
 }
 
-/// Starts logging, and locks the log. A command that reports validation messages itself logs them only with `-v`.
-fn start_log(
-    verbose: u8,
-    file: Option<&Path>,
-    configured: Option<(PathBuf, u64, u32)>,
-    command: &Command,
-) -> Result<LogLock, Failure> {
-    let reports_validation = matches!(command, Command::Verify(_));
-    let path = file.or(configured.as_ref().map(|(path, ..)| path.as_path()));
-    let lock = path.map(Lock::take).transpose().map_err(|fault| failed(format!("log {fault}")))?;
-    let lock = Arc::new(Mutex::new(lock));
+/// Starts logging, and locks the log. A command that reports validation messages itself logs them only with `-v`. `configured`: the log that the
+/// command's configuration asks for, which `--log-file` overrides.
+fn start_log(arguments: &Arguments, configured: Option<LogPlace>, is_endless: bool) -> Result<LogLock, Failure> {
+    let (verbose, reports_validation) = (arguments.verbose, matches!(arguments.command, Command::Verify(_)));
+    let asked = arguments.log_file.clone().map(|path| (path, DEFAULT_FILE_BYTES, DEFAULT_FILES));
+    let (is_asked, place) = (asked.is_some(), asked.or(configured));
+    let lock = place.as_ref().map(|(path, ..)| Lock::take(path)).transpose();
+    let lock = Arc::new(Mutex::new(lock.map_err(|fault| failed(format!("log {fault}")))?));
+    let file = match place.map(|place| open_log(place, is_endless, &lock)).transpose() {
+        Err(fault) if is_asked => return Err(input(format!("--log-file {fault}"))),
+        // A kiosk without a log still shows pictures.
+        Err(fault) => {
+            let _ = writeln!(std::io::stderr(), "echolume: log: {fault}; logging to standard error");
+            None
+        }
+        Ok(file) => file,
+    };
     let level = match verbose {
-        0 => tracing::Level::WARN,
-        1 => tracing::Level::INFO,
+        // A service logs its actions.
+        0 if is_asked || file.is_none() => tracing::Level::WARN,
+        0 | 1 => tracing::Level::INFO,
         _ => tracing::Level::DEBUG,
     };
     let log = tracing_subscriber::fmt().with_max_level(level).with_target(false);
-    // A kiosk without a log still shows pictures.
-    let configured = configured.filter(|_| file.is_none()).and_then(|place| {
-        let opened = open_log(place, command, &lock);
-        opened
-            .inspect_err(|fault| drop(writeln!(std::io::stderr(), "echolume: log: {fault}; logging to standard error")))
-            .ok()
-    });
-    if let Some(file) = configured {
-        // A service logs its actions.
-        let level = level.max(tracing::Level::INFO);
-        tracing_subscriber::fmt()
-            .with_max_level(level)
-            .with_target(false)
-            .with_ansi(false)
-            .with_writer(Mutex::new(file))
-            .init();
-        return Ok(lock);
-    }
     match file {
         None => {
             let shown = filter_fn(move |event| !reports_validation || verbose > 0 || event.target() != "validation");
@@ -396,11 +369,7 @@ fn start_log(
                 .with(shown)
                 .init();
         }
-        Some(path) => {
-            let place = (path.into(), log_rotation::DEFAULT_FILE_BYTES, log_rotation::DEFAULT_FILES);
-            let file = open_log(place, command, &lock).map_err(|fault| input(format!("--log-file {fault}")))?;
-            log.with_ansi(false).with_writer(Mutex::new(file)).init();
-        }
+        Some(file) => log.with_ansi(false).with_writer(Mutex::new(file)).init(),
     }
     Ok(lock)
 }

@@ -1,17 +1,18 @@
 //! The message about a picture in which nothing is visible: it has a single colour, or shows the ground alone. Each possible cause is
 //! tested on the data that the rays meet, in the order of the stages of a picture.
 
-use crate::passes::Texels;
+use crate::gpu::{GpuError, Renderer};
 use crate::passes::light_volume::bare_ground;
 use crate::passes::postprocess::toned;
 use crate::passes::raycast::survey::{self, Survey, survey};
+use crate::passes::{Slot, Texels};
 use crate::picture::Picture;
 use crate::scene::{Layout, Mode, Scene, transfer};
 use crate::source::StoredType;
+use crate::source::describe::number;
 
 /// What fills a picture in which nothing is visible.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Nothing {
+enum Nothing {
     /// A single colour: red, green, blue.
     Colour([u8; 3]),
     /// The ground behind the volume (`light.volume.ground`).
@@ -20,7 +21,7 @@ pub enum Nothing {
 
 /// What fills the picture if nothing is visible in it: all pixels have one colour, or show the ground. None otherwise, and for a picture of one
 /// pixel.
-pub fn of(scene: &Scene, picture: &Picture) -> Option<Nothing> {
+fn of(scene: &Scene, picture: &Picture) -> Option<Nothing> {
     let mut pixels = picture.rgba.chunks_exact(4).map(|p| [p[0], p[1], p[2]]);
     let first = pixels.next().filter(|_| picture.rgba.len() > 4)?;
     if pixels.all(|p| p == first) {
@@ -44,19 +45,23 @@ fn is_ground(scene: &Scene, picture: &Picture) -> bool {
     })
 }
 
-/// The warning about a picture in which nothing is visible. `file`: name of the picture; `why`: the cause ([`cause`]); None: the scene has no volume.
-pub fn line(file: &str, nothing: Nothing, why: Option<&str>) -> String {
+/// The warning about a picture of the renderer in which nothing is visible, with the cause; None for any other picture. `shift`: stored sample minus
+/// the value in the file; `name`: of the picture. An error if the volume cannot be read from the device.
+pub fn warning(renderer: &mut Renderer, picture: &Picture, shift: f64, name: &str) -> Result<Option<String>, GpuError> {
+    let Some(nothing) = of(renderer.scene(), picture) else { return Ok(None) };
+    let volume = renderer.read(Slot::Volume)?;
+    let why = volume.map_or("the scene has no volume".into(), |volume| cause(renderer.scene(), &volume, shift));
     let shown = match nothing {
         Nothing::Ground => "the ground alone (light.volume.ground)".into(),
         Nothing::Colour([0, 0, 0]) => "wholly black".into(),
         Nothing::Colour([255, 255, 255]) => "wholly white".into(),
         Nothing::Colour([r, g, b]) => format!("wholly of one colour (red {r}, green {g}, blue {b})"),
     };
-    format!("{file}: is {shown}: {}", why.unwrap_or("the scene has no volume"))
+    Ok(Some(format!("{name}: is {shown}: {why}")))
 }
 
 /// The reason in words why nothing is visible. `volume`: texels of the scene's volume; `shift`: stored sample minus the value in the file.
-pub fn cause(scene: &Scene, volume: &Texels, shift: f64) -> String {
+fn cause(scene: &Scene, volume: &Texels, shift: f64) -> String {
     let seen = survey(scene, volume);
     if seen.met == 0 {
         return nothing_met(scene, volume);
@@ -99,18 +104,6 @@ pub fn cause(scene: &Scene, volume: &Texels, shift: f64) -> String {
         }
         Mode::Surface | Mode::Mixed if seen.edge <= scene.settings.surface.threshold => no_edge(scene, &seen, &found),
         _ => toned_away(scene).unwrap_or_else(|| format!("{found}; no single setting explains it")),
-    }
-}
-
-/// At most six digits.
-fn number(value: f64) -> String {
-    match value.abs() {
-        0.0 => "0".into(),
-        size if (1e-3..1e6).contains(&size) => {
-            let text = format!("{value:.4}");
-            text.trim_end_matches('0').trim_end_matches('.').into()
-        }
-        _ => format!("{value:.4e}"),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::against::{self, Other};
 use super::pipelines::Request;
-use crate::args::{InputArgs, Output, ShaderArgs, check_outputs, write_report};
+use crate::args::{InputArgs, Output, ShaderArgs, check_number, check_outputs, write_report};
 use crate::baselines::{Stored, Threshold};
 use crate::files::replace_shared;
 use crate::profile as model;
@@ -114,9 +114,7 @@ impl Profile {
             ("--trace", self.trace.as_deref()),
         ];
         self.input.check_outputs(&targets, &*source)?;
-        if !self.turn.is_finite() {
-            return Err(input(format!("--turn {}: must be a finite angle in degrees", self.turn)));
-        }
+        check_number("--turn", self.turn, f64::is_finite, "must be a finite angle in degrees")?;
         let shaders = self.shaders.open()?;
         let context = self.input.open_device(false)?;
         // All repeats use the same volume.

@@ -1,12 +1,12 @@
 //! `echolume convert`, `echolume info` and `echolume phantom`: convert, describe and make recordings.
 
-use crate::args::{GeometryArgs, Output, check_outputs, open_recording, recording_help};
+use crate::args::{GeometryArgs, Output, check_outputs, check_volume, open_recording, recording_help};
 use crate::files::signals::Writing;
 use crate::probe::{Geometry, Grid, Rigid, World};
 use crate::scene::default_look::block_edge;
 use crate::scene::{EchoHistogram, EchoLevels, Input, insonified_box};
 use crate::segment::files;
-use crate::source::convert::{Target, Volume, lattice, no_echo};
+use crate::source::convert::{Target, Volume};
 use crate::source::phantom::{Body, Label, Phantom, PhantomOptions, PointSpread, Sampling, Speckle, distance_path};
 use crate::source::recorder::{Header, Writer};
 use crate::source::segmentation;
@@ -28,18 +28,10 @@ pub(super) fn read_volume(
     number: usize,
     mut each: impl FnMut(&Geometry, &Frame),
 ) -> Result<(Geometry, Volume, usize), Failure> {
-    check_number(recording, file, number)?;
+    check_volume(recording, "--volume", number, file.display())?;
     let geometry = recording.geometry(number);
     let (volume, there) = Volume::read(recording, number, |frame| each(&geometry, frame)).map_err(input)?;
     Ok((geometry, volume, there))
-}
-
-fn check_number(recording: &dyn Source, file: &Path, number: usize) -> Result<(), Failure> {
-    let there = recording.volumes();
-    match number < there {
-        true => Ok(()),
-        false => Err(input(format!("{}: --volume {number}: there are {there}, numbered from 0", file.display()))),
-    }
 }
 
 /// Reads the volume with the index `number`. Returns its geometry, its samples, and the levels of the echoes, among them the threshold between the
@@ -67,19 +59,6 @@ pub(super) fn read_with_threshold(
 pub(super) fn share_of(asked: Option<f64>, found: Option<&EchoLevels>, file: &Path) -> Result<f64, Failure> {
     let none = || input(format!("{}: the echoes have no two classes; give --threshold", file.display()));
     asked.or(found.map(|levels| levels.threshold)).ok_or_else(none)
-}
-
-/// The grid of a converted volume: with the requested voxel spacing, mm, otherwise that of a Cartesian volume itself, or for a sweep one with the
-/// distance of its samples. An error if the spacing is not allowed or gives too many voxels.
-pub(super) fn target_grid(geometry: &Geometry, spacing: Option<f64>) -> Result<Grid, Failure> {
-    match (geometry, spacing) {
-        // Every voxel stays what and where it is.
-        (Geometry::Cartesian(grid), None) => Ok(*grid),
-        (Geometry::Sweep(probe), None) => {
-            lattice(geometry, probe.sample_pitch).map_err(|e| input(format!("the sample spacing {e}; give --spacing")))
-        }
-        (_, Some(spacing)) => lattice(geometry, spacing).map_err(|e| input(format!("--spacing {e}"))),
-    }
 }
 
 #[derive(clap::Args)]
@@ -172,7 +151,7 @@ impl Convert {
         VolumeFile::of(self.output()).map_err(input)?;
         let mut recording = open_recording(&self.input, self.geometry.options())?;
         let number = self.volume.unwrap_or(0);
-        check_number(&*recording, &self.input, number)?;
+        check_volume(&*recording, "--volume", number, self.input.display())?;
         let target = self.target(&*recording, number)?;
         let grid = target.grid;
         if self.secondary_capture && target.world != World::of(&grid) {
@@ -222,7 +201,7 @@ impl Convert {
         }
         let mut recording = open_recording(&self.input, self.geometry.options())?;
         let numbers = self.volume.map_or(0..recording.volumes(), |number| number..number.saturating_add(1));
-        check_number(&*recording, &self.input, numbers.start)?;
+        check_volume(&*recording, "--volume", numbers.start, self.input.display())?;
         VolumeSequence::check(&self.target(&*recording, numbers.start)?, self.output()).map_err(input)?;
         self.check_outputs(&[(OUTPUT, Some(self.output())), ("--mask", self.mask.as_deref())], &*recording)?;
         let sequence = VolumeSequence::of(&mut *recording, numbers, &self.input).map_err(input)?;
@@ -248,16 +227,12 @@ impl Convert {
 
     /// The lattice of a volume, and what is written on it.
     fn target(&self, recording: &dyn Source, number: usize) -> Result<Target, Failure> {
-        let geometry = recording.geometry(number);
-        let grid = target_grid(&geometry, self.spacing)?;
-        let mut target = Target::new(grid, recording.sample_type());
-        if let (Some(world), Geometry::Cartesian(own)) = (recording.world_of(number), &geometry) {
-            target.world = world.on(own, &grid);
+        let mut target = Target::of(recording, number, self.spacing).map_err(input)?;
+        if self.secondary_capture {
+            target = target.captured(recording.range());
         }
-        // A capture has bytes, of which 0 is black.
-        let usual = if self.secondary_capture { 0.0 } else { no_echo(recording) };
-        target.outside = self.outside.unwrap_or(usual);
-        Ok(if self.secondary_capture { target.captured(recording.range()) } else { target })
+        target.outside = self.outside.unwrap_or(target.outside);
+        Ok(target)
     }
 
     fn write_mask(&self, volume: &Volume, target: &Target) -> Result<(), Failure> {

@@ -1,16 +1,18 @@
 //! `echolume render`: renders a recording to a picture.
 
 use super::budget;
-use super::compare::{self, CompareArgs};
-use super::drawing::{DrawFault, draw_despite_losses, send_volume};
+use super::compare::CompareArgs;
+use super::drawing::{DrawFault, Job, draw_despite_losses, send_volume};
 use super::mesh_sheet;
 use super::one_colour;
-use super::series::{Job, SeriesArgs};
+use super::series::SeriesArgs;
 use super::still::{self, StillArgs};
-use crate::args::{InputArgs, Output, PictureFile, ShaderArgs, check_messages, check_outputs, make_folder};
+use crate::args::{
+    InputArgs, Output, PictureFile, ShaderArgs, check_messages, check_number, check_outputs, make_folder,
+};
 use crate::dump;
 use crate::error_map;
-use crate::files;
+use crate::files::replace;
 use crate::gpu::{Context, Renderer, RendererOptions, TimeStamps};
 use crate::marked;
 use crate::mesh::files::MeshFile;
@@ -99,7 +101,14 @@ pub struct Render {
 
 impl Render {
     pub fn run(&self) -> Result<(), Failure> {
-        let options = self.options()?;
+        let job = Job {
+            input: &self.input,
+            output: &self.output,
+            options: self.options()?,
+            validate: self.validate,
+            timings: self.timings,
+            own_shaders: self.shaders.are_given(),
+        };
         self.series.check()?;
         let alone = [
             ("--dump", self.dump.is_some()),
@@ -119,26 +128,13 @@ impl Render {
             if let Some((flag, _)) = alone.or(series.iter().find(|(_, is_given)| *is_given)) {
                 return Err(input(format!("{flag}: is for one volume; leave --compare out")));
             }
-            return self.compare.run(&compare::Job {
-                input: &self.input,
-                output: &self.output,
-                options,
-                validate: self.validate,
-                own_shaders: self.shaders.are_given(),
-            });
+            return self.compare.run(&job);
         }
         if self.series.is_given() && !self.explain {
             if let Some((flag, _)) = alone {
                 return Err(input(format!("{flag}: is for one picture; leave --turntable and --volumes out")));
             }
-            return self.series.run(&Job {
-                input: &self.input,
-                output: &self.output,
-                options,
-                validate: self.validate,
-                timings: self.timings,
-                own_shaders: self.shaders.are_given(),
-            });
+            return self.series.run(&job);
         }
         let output = PictureFile::new("-o", &self.output)?;
         let targets: [Output; 3] =
@@ -172,13 +168,13 @@ impl Render {
             make_folder(folder)?;
         }
         let mut context = self.input.open_device(self.validate)?;
-        let mut options = options;
+        let mut options = job.options;
         let scene = self.with_samples(&context, scene, &options)?;
         let reopen = || self.input.open_device(self.validate);
         let Drawn { mut renderer, picture, kept } = draw_despite_losses(
             &mut context,
             &mut options,
-            self.shaders.are_given(),
+            job.own_shaders,
             reopen,
             || 0,
             |context, options, is_again| {
@@ -213,12 +209,9 @@ impl Render {
         if let Some(budget) = &self.budget {
             budget::judge(budget, &measured)?;
         }
-        if let Some(colour) = one_colour::of(renderer.scene(), &picture) {
-            let shift = source.sample_type().shift();
-            let volume = renderer.read(Slot::Volume).map_err(failed)?;
-            let why = volume.map(|volume| one_colour::cause(renderer.scene(), &volume, shift));
-            remark(&one_colour::line(&output.name(), colour, why.as_deref()));
-        }
+        let shift = source.sample_type().shift();
+        let warning = one_colour::warning(&mut renderer, &picture, shift, &output.name()).map_err(failed)?;
+        warning.iter().for_each(|line| remark(line));
         if self.timings {
             say!("{}", pass_time_table(&measured, renderer.scene()).trim_end());
         }
@@ -355,14 +348,10 @@ impl Render {
 
     /// With --error-map the scene at half its step.
     fn finer(&self, scene: &Scene) -> Result<Option<Scene>, Failure> {
-        match self.error_tolerance {
-            Some(tolerance) if !(0.0..=1.0).contains(&tolerance) => {
-                return Err(input(format!("--error-tolerance {tolerance}: must lie in 0..=1")));
-            }
-            Some(_) if scene.tolerance().is_some() => {
-                return Err(input("--error-tolerance: the map of a picture with ray.tolerance hatches that tolerance"));
-            }
-            _ => {}
+        let tolerance = self.error_tolerance;
+        check_number("--error-tolerance", tolerance, |share| (0.0..=1.0).contains(&share), "must lie in 0..=1")?;
+        if tolerance.is_some() && scene.tolerance().is_some() {
+            return Err(input("--error-tolerance: the map of a picture with ray.tolerance hatches that tolerance"));
         }
         // A picture with a tolerance states its error itself.
         if self.error_map.is_none() || scene.tolerance().is_some() {
@@ -385,13 +374,13 @@ impl Render {
             drawn.save(&file).map_err(failed)?;
             if self.raw {
                 let (array, about) = dump::array(slot, texels.as_ref(), renderer.scene());
-                write(folder, &format!("{}.npy", slot.name()), &array)?;
-                write(folder, &format!("{}.json", slot.name()), format!("{about:#}\n").as_bytes())?;
+                replace(&file.with_extension("npy"), &array).map_err(failed)?;
+                replace(&file.with_extension("json"), format!("{about:#}\n").as_bytes()).map_err(failed)?;
             }
         }
         if self.raw {
             let about = dump::scene_description(renderer.scene());
-            write(folder, "scene.json", format!("{about:#}\n").as_bytes())?;
+            replace(&folder.join("scene.json"), format!("{about:#}\n").as_bytes()).map_err(failed)?;
         }
         say!("slots: {}", folder.display());
         Ok(())
@@ -420,9 +409,4 @@ fn in_floats(
     renderer.volume(frames).map_err(failed)?;
     renderer.picture().map_err(failed)?;
     renderer.read(Slot::Picture).map_err(failed)?.ok_or_else(|| failed("--error-map: the plan has no picture"))
-}
-
-fn write(folder: &Path, name: &str, bytes: &[u8]) -> Result<(), Failure> {
-    let file = folder.join(name);
-    files::replace(&file, bytes).map_err(|e| failed(format!("{}: {e}", file.display())))
 }

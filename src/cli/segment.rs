@@ -1,13 +1,14 @@
 //! `echolume segment`: finds the bodies of a recording, labels them, and measures their volumes.
 
-use super::recordings::{OUTPUT, read_volume, target_grid};
-use crate::args::{GeometryArgs, check_outputs, open_recording, recording_help};
+use super::recordings::{OUTPUT, read_volume};
+use crate::args::{GeometryArgs, check_number, check_outputs, open_recording, recording_help};
 use crate::files::replace;
 use crate::mesh::files::{Colours, MeshFile};
 use crate::probe::{Geometry, Grid, World};
 use crate::scene::depth_offset;
 use crate::segment::bodies::{Body, Found, OPENING, SMOOTHING, Search, find};
 use crate::segment::{Field, Scale, cropped, files, usual_grid};
+use crate::source::convert::target_grid;
 use crate::source::segmentation;
 use crate::terminal::{Failure, failed, input, progress_bar, remark, say};
 use glam::DVec3;
@@ -89,9 +90,7 @@ impl Segment {
         let mesh_file = mesh_file.transpose().map_err(input)?;
         let (share, opening) = (self.share()?, self.opening.unwrap_or(if self.seed.is_some() { OPENING } else { 0.0 }));
         for (flag, value) in [("--opening", opening), ("--least", self.least), ("--smooth", self.smooth)] {
-            if !(value.is_finite() && value >= 0.0) {
-                return Err(input(format!("{flag} {value}: must be 0 or more")));
-            }
+            check_number(flag, value, |value| value.is_finite() && value >= 0.0, "must be 0 or more")?;
         }
         let mut recording = open_recording(&self.input, self.geometry.options())?;
         let read = recording.files();
@@ -103,14 +102,9 @@ impl Segment {
         let grid = self.grid(&geometry)?;
         let most = Search::most(&grid);
         for (flag, value) in [("--smooth", self.smooth), ("--opening", opening)] {
-            if value > most {
-                return Err(input(format!("{flag} {value}: at most {most} mm, 32 voxels")));
-            }
+            check_number(flag, value, |mm| mm <= most, &format!("at most {most} mm, 32 voxels"))?;
         }
-        let world = match (&geometry, world) {
-            (Geometry::Cartesian(own), Some(world)) => world.on(own, &grid),
-            _ => World::of(&grid),
-        };
+        let world = World::resampled(world, &geometry, &grid);
         let scale = self.scale()?.unwrap_or_else(|| Scale::by_speckle(&volume, range));
         let face = DVec3::Y * depth_offset(&geometry);
         let bar = progress_bar(grid.size[2] as u64).with_message("slices");
@@ -162,10 +156,8 @@ impl Segment {
 
     /// The lattice: that of the volume, or of the spacing, within the box.
     fn grid(&self, geometry: &Geometry) -> Result<Grid, Failure> {
-        let mut grid = match self.spacing {
-            None => usual_grid(geometry).map_err(input)?,
-            spacing => target_grid(geometry, spacing)?,
-        };
+        let grid = if self.spacing.is_none() { usual_grid(geometry) } else { target_grid(geometry, self.spacing) };
+        let mut grid = grid.map_err(input)?;
         let Some(text) = &self.within else { return Ok(grid) };
         let fault = |why: &str| input(format!("--box {text}: {why}"));
         let face = [0.0, depth_offset(geometry), 0.0];

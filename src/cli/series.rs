@@ -1,12 +1,11 @@
 //! `echolume render --turntable` and `--volumes`: several pictures of one recording, drawn on one device.
 
-use super::drawing::{DrawFault, draw_despite_losses, send_volume};
+use super::drawing::{DrawFault, Job, draw_despite_losses, send_volume};
 use super::one_colour;
-use crate::args::{InputArgs, PictureSeries, SeriesTarget, check_messages, check_volume};
+use crate::args::{PictureSeries, SeriesTarget, check_messages, check_volume};
 use crate::files::signals::Writing;
 use crate::gpu::{Context, Renderer, RendererOptions};
 use crate::marked::{self, Demo};
-use crate::passes::Slot;
 use crate::passes::times::pass_time_table;
 use crate::picture::film::encoder;
 use crate::plan::Rerun;
@@ -17,7 +16,6 @@ use crate::terminal::{Failure, failed, input, progress_bar, remark, say};
 use indicatif::ProgressBar;
 use std::cell::Cell;
 use std::collections::BTreeSet;
-use std::path::Path;
 use std::str::FromStr;
 use std::sync::Arc;
 
@@ -69,17 +67,6 @@ impl FromStr for Volumes {
 fn rate(text: &str) -> Result<f64, String> {
     let number = text.trim().parse::<f64>().ok().filter(|rate| (0.1..=240.0).contains(rate));
     number.ok_or_else(|| "must lie in 0.1..=240 pictures a second".into())
-}
-
-/// How the pictures of a series are drawn, and where they are written.
-pub struct Job<'a> {
-    pub input: &'a InputArgs,
-    pub output: &'a Path,
-    pub options: RendererOptions,
-    pub validate: bool,
-    pub timings: bool,
-    /// True if the shaders come from a folder of the user. A shader that does not compile is then an error of the input.
-    pub own_shaders: bool,
 }
 
 /// What differs from picture to picture.
@@ -302,13 +289,9 @@ impl Series<'_> {
             let shown = marked::as_set(&picture, renderer.scene(), of, renderer.unveiled(), self.demo)
                 .map_err(|e| DrawFault::Source(failed(e)))?;
             // Before the picture is written: a device that is lost here draws it again.
-            let why = match one_colour::of(renderer.scene(), &picture).filter(|_| n == 0) {
-                Some(colour) => {
-                    let volume = renderer.read(Slot::Volume)?;
-                    let why = volume.map(|v| one_colour::cause(renderer.scene(), &v, source.sample_type().shift()));
-                    Some(one_colour::line("the first picture", colour, why.as_deref()))
-                }
-                None => None,
+            let warning = match n {
+                0 => one_colour::warning(&mut renderer, &picture, source.sample_type().shift(), "the first picture")?,
+                _ => None,
             };
             self.written.write(self.views.number(n), &shown).map_err(DrawFault::Source)?;
             let start = renderer.unveiled().map(|start| start.outcome);
@@ -317,7 +300,7 @@ impl Series<'_> {
                 remark(&format!("picture {}: unveil: {outcome}", n + 1));
             }
             was_found = is_found;
-            why.iter().for_each(|line| remark(line));
+            warning.iter().for_each(|line| remark(line));
             self.bar.inc(1);
         }
         let times = renderer.take_times()?;

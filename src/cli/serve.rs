@@ -1,5 +1,6 @@
 //! `echolume stream --serve`: an OpenIGTLink server, and the messages about its clients.
 
+use crate::args::check_number;
 use crate::source::igtl::{self, Publisher, PublisherStatistics, SCHEME, ServerOptions, with_port};
 use crate::terminal::{Failure, failed, input, remark, say};
 use std::io::ErrorKind;
@@ -34,10 +35,9 @@ impl ServeArgs {
         if igtl::port(place).is_none() {
             return Err(input(format!("--serve {given}: its port must lie in 0..=65535")));
         }
-        if let Some(mm) = self.serve_spacing.filter(|mm| !(0.01..=1000.0).contains(mm)) {
-            return Err(input(format!("--serve-spacing {mm}: must lie in 0.01..=1000 mm")));
-        }
-        let publisher = Publisher::bind(&with_port(place), self.serve_spacing, ServerOptions::default());
+        let spacing = self.serve_spacing;
+        check_number("--serve-spacing", spacing, |mm| (0.01..=1000.0).contains(&mm), "must lie in 0.01..=1000 mm")?;
+        let publisher = Publisher::bind(&with_port(place), spacing, ServerOptions::default());
         let publisher = publisher.map_err(|error| {
             let why = match error.kind() {
                 ErrorKind::AddrInUse => "the port is in use; give another one, or 0 for any".to_string(),

@@ -1,7 +1,7 @@
 //! `echolume stic`: one slow sweep over a beating heart becomes volumes of one cycle.
 
 use super::recordings::OUTPUT;
-use crate::args::{GeometryArgs, check_outputs, frames_of, open_recording};
+use crate::args::{GeometryArgs, check_outputs, check_volume, frames_of, open_recording};
 use crate::files::signals::Writing;
 use crate::files::{quoted, read_text};
 use crate::probe::Geometry;
@@ -107,10 +107,7 @@ impl Stic {
     /// The frames of the sweep in order of acquisition, and what moves in them.
     fn read(&self, recording: &mut dyn Source) -> Result<(Vec<Frame>, Motion), Failure> {
         let file = self.recording.display();
-        if self.volume >= recording.volumes() {
-            let there = recording.volumes();
-            return Err(input(format!("{file}: --volume {}: there are {there}, numbered from 0", self.volume)));
-        }
+        check_volume(recording, "--volume", self.volume, &file)?;
         let header = recording.header();
         let bytes = header.frame_bytes().unwrap_or(0).saturating_mul(recording.frames_per_volume() as u64);
         if bytes > MOST_BYTES {

@@ -11,7 +11,6 @@ use crate::live::metrics::{LiveMetrics, SourceStatus};
 use crate::live::{Feed, FinishedPicture, Statistics, Step, Stream as Live, StreamError, StreamOptions, Update};
 use crate::machine::resident_bytes;
 use crate::marked::{self, Demo};
-use crate::passes::Slot;
 use crate::passes::unveil::Unveiled;
 use crate::picture;
 use crate::scene::Scene;
@@ -267,11 +266,9 @@ impl Stream {
 /// Says why a picture is wholly one colour, if it is. True if something was said.
 fn explain_one_colour(stream: &mut Live, shown: &FinishedPicture, file: &Path) -> Result<bool, Failure> {
     let (Some(picture), Some(renderer)) = (shown.picture.as_ref(), stream.renderer()) else { return Ok(false) };
-    let Some(colour) = one_colour::of(renderer.scene(), picture) else { return Ok(false) };
-    let volume = renderer.read(Slot::Volume).map_err(failed)?;
-    let why = volume.map(|volume| one_colour::cause(renderer.scene(), &volume, 0.0));
-    remark(&one_colour::line(&file.display().to_string(), colour, why.as_deref()));
-    Ok(true)
+    let warning = one_colour::warning(renderer, picture, 0.0, &file.display().to_string()).map_err(failed)?;
+    warning.iter().for_each(|line| remark(line));
+    Ok(warning.is_some())
 }
 
 /// Checks that a recording to be written (`file`) has the ending .frames, can be written, and replaces neither an existing file nor the recording

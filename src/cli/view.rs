@@ -1,10 +1,10 @@
 //! `echolume view`: shows live frames in a window.
 
 use super::view_config::{ConsoleConfig, First, WindowConfig, rungs};
-use super::view_open::{OpenedInWindow, Shown, check_later, locked};
+use super::view_open::{OpenedInWindow, Shown, check_later};
 use crate::args::{
-    SceneArgs, SourceArgs, StreamArgs, check_messages, check_outputs, device_failure, first_steps, parse_nanoseconds,
-    presets_file, recent_list,
+    SceneArgs, SourceArgs, StreamArgs, check_messages, check_number, check_outputs, device_failure, first_steps,
+    parse_nanoseconds, presets_file, recent_list,
 };
 use crate::files::Lock;
 use crate::gpu::shader_reload::ShaderFolder;
@@ -13,6 +13,7 @@ use crate::gpu::{Context, Wake};
 use crate::kiosk::config::{self, Config};
 use crate::live::StreamOptions;
 use crate::live::cine::CineLimits;
+use crate::sync::locked;
 use crate::terminal::{Failure, failed, input, say};
 use crate::ui::console::{Console, ConsoleOptions, OpenFile, Opened, OpeningOptions, StartupFault};
 use crate::ui::recordings::{MAX_OPEN, Recordings};
@@ -262,7 +263,7 @@ impl View {
 
     /// Begins the list of open recordings with what the program is started with. `source`: of the first console.
     fn list(&self, source: Option<&SourceArgs>) {
-        let mut recordings = self.opened.recordings.lock().unwrap_or_else(|e| e.into_inner());
+        let mut recordings = locked(&self.opened.recordings);
         if let Some(source) = source.filter(|_| recordings.is_empty()) {
             *recordings = Recordings::of(source.kind(), self.files.first().map_or(source.path(), PathBuf::as_path));
             self.files.iter().skip(1).for_each(|file| _ = recordings.add(file));
@@ -361,9 +362,7 @@ impl View {
 
     /// The monitor and its mode. Flags override the configuration.
     fn monitor_request(&self, configured: Option<MonitorChoice>) -> Result<MonitorChoice, Failure> {
-        if let Some(hz) = self.refresh.filter(|hz| !(1.0..=1000.0).contains(hz)) {
-            return Err(input(format!("--refresh {hz}: must lie in 1..=1000")));
-        }
+        check_number("--refresh", self.refresh, |hz| (1.0..=1000.0).contains(&hz), "must lie in 1..=1000")?;
         let configured = configured.unwrap_or_default();
         let size = match self.scene.has_size() {
             true => Some(self.scene.layers(false, &[])?.finish().map_err(input)?.picture.size),

@@ -1,10 +1,11 @@
 //! The configuration of a view: device, window and console, from flags or from a configuration file.
 
-use super::error_report::read_report;
 use crate::args::{SceneArgs, SourceArgs, pipeline_folder};
-use crate::gpu::window::{MonitorChoice, PresentMode, Target};
+use crate::baselines::Stored;
+use crate::error_report::Report;
+use crate::gpu::window::{MonitorChoice, Target};
 use crate::gpu::{Context, ContextOptions, GpuError, Wake};
-use crate::kiosk::config::{Config, Present};
+use crate::kiosk::config::Config;
 use crate::live::StreamOptions;
 use crate::live::cine::CineLimits;
 use crate::source::live::Live;
@@ -40,21 +41,8 @@ impl WindowConfig {
     /// The default: the best device, and a window of [`DEFAULT_SIZE`].
     pub fn usual() -> WindowConfig {
         let device = ContextOptions { pipeline_cache: pipeline_folder(), ..ContextOptions::default() };
-        let (monitor, present_mode, time) = (None, PresentMode::Fifo, None);
-        let direct = None;
-        WindowConfig {
-            device,
-            direct,
-            unseen: false,
-            shape: WindowOptions {
-                size: DEFAULT_SIZE,
-                full_screen: false,
-                monitor,
-                present_mode,
-                stays_open: false,
-                time,
-            },
-        }
+        let shape = WindowOptions { size: DEFAULT_SIZE, ..WindowOptions::default() };
+        WindowConfig { device, shape, direct: None, unseen: false }
     }
 
     /// Opens the window and runs the console (the viewer's user interface) that `make` creates, until the user leaves it or the time in `shape` is
@@ -85,15 +73,9 @@ impl WindowConfig {
         place.shape.size = display.size;
         place.shape.full_screen = display.full_screen;
         place.shape.monitor = display.monitor.clone();
-        place.shape.present_mode = match display.present {
-            Present::Fifo => PresentMode::Fifo,
-            Present::Mailbox => PresentMode::Mailbox,
-        };
-        place.direct = config.display.direct.then(|| MonitorChoice {
-            monitor: config.display.monitor.clone(),
-            size: None,
-            refresh: None,
-        });
+        place.shape.present_mode = display.present;
+        let choice = MonitorChoice { monitor: display.monitor.clone(), ..MonitorChoice::default() };
+        place.direct = display.direct.then_some(choice);
         if let Some(device) = &config.device {
             let Ok(device) = device.parse();
             place.device.device = device;
@@ -211,7 +193,8 @@ pub fn rungs(report: Option<&Path>) -> Result<Vec<Rung>, Failure> {
     match report {
         None => Ok(built_in_ladder()),
         Some(file) => {
-            measured_ladder(&read_report(file)?).map_err(|e| failed(format!("--report {}: {e}", file.display())))
+            let report = Report::load(file).map_err(input)?;
+            measured_ladder(&report).map_err(|e| failed(format!("--report {}: {e}", file.display())))
         }
     }
 }

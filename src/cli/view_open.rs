@@ -5,12 +5,13 @@ use crate::args::SourceArgs;
 use crate::files::InputError;
 use crate::scene::load::Layers;
 use crate::source::live::Live;
+use crate::sync::locked;
 use crate::terminal::{Failure, input};
 use crate::ui::console::Opened;
 use crate::ui::recordings::OpenRecordings;
 use crate::workspace::{self, Workspace};
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::{Arc, Mutex};
 
 /// A source that the viewer shows, and the settings of the workspace that named it, if there was one.
 #[derive(Clone)]
@@ -67,10 +68,6 @@ struct Current {
     shown: Mutex<Option<Shown>>,
     /// Its source, until the console takes it.
     source: Mutex<Option<Box<dyn Live>>>,
-}
-
-pub(super) fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(|e| e.into_inner())
 }
 
 impl OpenedInWindow {

@@ -48,23 +48,18 @@ const SETTINGS: [&str; 11] =
 /// Most bytes of the JSON of a report.
 const MAX_BYTES: u64 = 32 << 20;
 
-/// A form of the report.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Form {
-    Pdf,
-    Html,
-    Csv,
-    Json,
-}
-
 /// A picture with its marks, and the time stamp of its volume, s.
 type Drawn = (Rc<Picture>, Option<f64>);
 
 impl Worksheet {
     pub fn run(mut self) -> Result<(), Failure> {
-        let form = self.form()?;
+        let ending = self.output.extension().unwrap_or_default().to_ascii_lowercase();
+        let form = ending
+            .to_str()
+            .filter(|form| ["pdf", "html", "csv", "json"].contains(form))
+            .ok_or_else(|| input(format!("-o {}: must end in .pdf, .html, .csv or .json", self.output.display())))?;
         let (output, beside) = (self.output.clone(), self.output.with_extension("json"));
-        let outputs: [Output; 2] = [("-o", Some(&*output)), ("-o", Some(&*beside).filter(|_| form != Form::Json))];
+        let outputs: [Output; 2] = [("-o", Some(&*output)), ("-o", Some(&*beside).filter(|_| form != "json"))];
         check_outputs(&outputs, self.from.as_deref())?;
         let earlier = self.from.clone().map(|file| self.take(&file)).transpose()?;
         if self.input.is_standard() {
@@ -112,10 +107,10 @@ impl Worksheet {
         };
         let pictures: Vec<Rc<Picture>> = drawn.into_iter().map(|(picture, _)| picture).collect();
         let bytes = match form {
-            Form::Pdf => Some(pdf::write(&sheet, &scene.settings, &pictures).map_err(failed)?),
-            Form::Html => Some(html::write(&sheet, &scene.settings, &pictures).map_err(failed)?.into_bytes()),
-            Form::Csv => Some(sheet.csv(&scene.settings).into_bytes()),
-            Form::Json => None,
+            "pdf" => Some(pdf::write(&sheet, &scene.settings, &pictures).map_err(failed)?),
+            "html" => Some(html::write(&sheet, &scene.settings, &pictures).map_err(failed)?.into_bytes()),
+            "csv" => Some(sheet.csv(&scene.settings).into_bytes()),
+            _ => None,
         };
         replace(&beside, sheet.json().map_err(failed)?.as_bytes()).map_err(failed)?;
         if let Some(bytes) = bytes {
@@ -127,17 +122,6 @@ impl Worksheet {
             say!("{}", compared(&sheet, earlier, file));
         }
         Ok(())
-    }
-
-    fn form(&self) -> Result<Form, Failure> {
-        let ending = self.output.extension().unwrap_or_default().to_ascii_lowercase();
-        match ending.to_str() {
-            Some("pdf") => Ok(Form::Pdf),
-            Some("html") => Ok(Form::Html),
-            Some("csv") => Ok(Form::Csv),
-            Some("json") => Ok(Form::Json),
-            _ => Err(input(format!("-o {}: must end in .pdf, .html, .csv or .json", self.output.display()))),
-        }
     }
 
     /// Takes recording and settings from the JSON of a report.

@@ -10,27 +10,48 @@
 //! - of a field: `default`, `default = "function"`, `rename`, `skip`, `skip_deserializing`, `skip_serializing_if = "function"`, `with = "module"`
 //!   (with functions `from_node` and `to_node`);
 //! - of a variant: `rename`, `alias`.
+//!
+//! The derives `Defaults`, `Name` and `All` save what would repeat a declaration: an `impl Default` by fields, the names of variants, and a list of
+//! them.
 
 #![forbid(unsafe_code)]
 
 use proc_macro2::{Ident, TokenStream};
 use quote::{format_ident, quote};
-use syn::{
-    Attribute, Data, DataEnum, DeriveInput, Error, Field, Fields, LitStr, Path, Result, Variant, parse_macro_input,
-};
+use syn::{Attribute, Data, DataEnum, DeriveInput, Error, Field, Fields, LitStr, Path, Result, Variant};
 
 /// Derives `FromNode`.
 #[proc_macro_derive(FromNode, attributes(tree))]
 pub fn from_node(input: proc_macro::TokenStream) -> proc_macro::TokenStream {
-    let input = parse_macro_input!(input as DeriveInput);
-    reading(&input).unwrap_or_else(|e| e.to_compile_error()).into()
+    derived(input, reading)
 }
 
 /// Derives `ToNode`.
 #[proc_macro_derive(ToNode, attributes(tree))]
 pub fn to_node(input: proc_macro::TokenStream) -> proc_macro::TokenStream {
-    let input = parse_macro_input!(input as DeriveInput);
-    writing(&input).unwrap_or_else(|e| e.to_compile_error()).into()
+    derived(input, writing)
+}
+
+/// Derives `Default` of a struct: a field has the expression of its attribute `#[value(...)]`, without one the `Default` of its type.
+#[proc_macro_derive(Defaults, attributes(value))]
+pub fn defaults(input: proc_macro::TokenStream) -> proc_macro::TokenStream {
+    derived(input, defaulting)
+}
+
+/// Derives `fn name(self) -> &'static str` of an enum whose variants hold nothing: the variant's name in files, by `#[tree(rename_all, rename)]`.
+#[proc_macro_derive(Name, attributes(tree))]
+pub fn name(input: proc_macro::TokenStream) -> proc_macro::TokenStream {
+    derived(input, naming)
+}
+
+/// Derives `const ALL: [Self; N]` of an enum whose variants hold nothing: all variants, in the order of their declaration.
+#[proc_macro_derive(All)]
+pub fn all(input: proc_macro::TokenStream) -> proc_macro::TokenStream {
+    derived(input, listing)
+}
+
+fn derived(input: proc_macro::TokenStream, by: fn(&DeriveInput) -> Result<TokenStream>) -> proc_macro::TokenStream {
+    syn::parse(input).and_then(|input| by(&input)).unwrap_or_else(|e| e.to_compile_error()).into()
 }
 
 /// The value of a missing key.
@@ -380,4 +401,55 @@ fn writing_of_enum(data: &DataEnum, container: &Arguments) -> Result<TokenStream
         });
     }
     Ok(quote!(match self { #(#arms),* }))
+}
+
+fn defaulting(input: &DeriveInput) -> Result<TokenStream> {
+    let Data::Struct(data) = &input.data else { return Err(Error::new_spanned(&input.ident, "is no struct")) };
+    let value = |Field { ident, attrs, .. }: &Field| {
+        let value = match attrs.iter().find(|attribute| attribute.path().is_ident("value")) {
+            Some(attribute) => attribute.meta.require_list()?.tokens.clone(),
+            None => quote!(::core::default::Default::default()),
+        };
+        Ok(quote!(#ident: #value))
+    };
+    let values = data.fields.iter().map(value).collect::<Result<Vec<_>>>()?;
+    let (name, (generics, types, bounds)) = (&input.ident, input.generics.split_for_impl());
+    Ok(quote! {
+        #[automatically_derived]
+        impl #generics ::core::default::Default for #name #types #bounds {
+            fn default() -> Self {
+                Self { #(#values),* }
+            }
+        }
+    })
+}
+
+/// The variants of an enum, with their names.
+fn units(input: &DeriveInput) -> Result<(Vec<&Ident>, Vec<String>)> {
+    let Data::Enum(data) = &input.data else { return Err(Error::new_spanned(&input.ident, "is no enum")) };
+    let variants = variants(data, &Arguments::of(&input.attrs)?)?;
+    Ok(variants.into_iter().map(|(variant, _, name)| (&variant.ident, name)).unzip())
+}
+
+fn naming(input: &DeriveInput) -> Result<TokenStream> {
+    let ((idents, names), visibility, of) = (units(input)?, &input.vis, &input.ident);
+    Ok(quote! {
+        impl #of {
+            /// The name of the variant, as files and messages have it.
+            #visibility fn name(self) -> &'static str {
+                match self { #(Self::#idents => #names),* }
+            }
+        }
+    })
+}
+
+fn listing(input: &DeriveInput) -> Result<TokenStream> {
+    let ((idents, _), visibility, of) = (units(input)?, &input.vis, &input.ident);
+    let count = idents.len();
+    Ok(quote! {
+        impl #of {
+            /// All variants, in the order of their declaration.
+            #visibility const ALL: [Self; #count] = [#(Self::#idents),*];
+        }
+    })
 }

@@ -166,17 +166,14 @@ impl Buffer {
 
 impl Drop for Buffer {
     fn drop(&mut self) {
-        if self.context.is_given_up() {
-            return;
-        }
-        // SAFETY: whoever drops a buffer has waited for the device to be done with it; null handles are allowed.
-        unsafe {
-            for view in self.texels {
-                self.context.device.destroy_buffer_view(view, None);
+        self.context.destroy(|device| {
+            // SAFETY: whoever drops a buffer has waited for the device to be done with it; null handles are allowed.
+            unsafe {
+                self.texels.iter().for_each(|view| device.destroy_buffer_view(*view, None));
+                device.destroy_buffer(self.handle, None);
             }
-            self.context.device.destroy_buffer(self.handle, None);
-        }
-        free(&self.context, self.allocation.take());
+            free(&self.context, self.allocation.take());
+        });
     }
 }
 
@@ -212,7 +209,8 @@ fn pieces(shape: Shape, texel_bytes: usize, parts: Range<u32>, most: u64) -> Vec
 /// Staging buffers that hold the texels of some parts (slices or layers) of an image. There are several if one would be larger than the device
 /// allows.
 pub struct Upload {
-    pieces: Vec<(Piece, Buffer)>,
+    /// Each region of the image, with the buffer that holds its texels.
+    pub pieces: Vec<(Piece, Buffer)>,
 }
 
 impl Upload {
@@ -238,18 +236,14 @@ impl Upload {
         };
         cut.into_iter().map(filled).collect::<Result<_, _>>().map(|pieces| Upload { pieces })
     }
-
-    /// Each region of the image, with the buffer that holds its texels.
-    pub fn pieces(&self) -> impl Iterator<Item = (&Piece, &Buffer)> {
-        self.pieces.iter().map(|(piece, buffer)| (piece, buffer))
-    }
 }
 
 /// Buffers that receive the texels of an image, in memory that is fast to read. There are several if one would be larger than the device
 /// allows.
 pub struct Readback {
     context: Arc<Context>,
-    pieces: Vec<(Piece, Buffer)>,
+    /// Each region of the image, with the buffer for its texels.
+    pub pieces: Vec<(Piece, Buffer)>,
     /// The image that they are for, and the bytes of its texels.
     image: (Shape, usize),
 }
@@ -272,11 +266,6 @@ impl Readback {
     /// True if the buffers are for an image of this shape, with texels of as many bytes.
     pub fn is_for(&self, shape: Shape, texel_bytes: usize) -> bool {
         self.image == (shape, texel_bytes)
-    }
-
-    /// Each region of the image, with the buffer for its texels.
-    pub fn pieces(&self) -> impl Iterator<Item = (&Piece, &Buffer)> {
-        self.pieces.iter().map(|(piece, buffer)| (piece, buffer))
     }
 
     /// The texels of the image that the device wrote: row by row, and one slice or layer after the other, without gaps. The device must have finished

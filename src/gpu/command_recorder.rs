@@ -17,7 +17,7 @@ use crate::passes::slots::Shape;
 use crate::passes::{DispatchArgs, Part, Pass, Slot, interface_check};
 use crate::queues::oracle::Event;
 use crate::scene::Scene;
-use crate::spirv::Kind;
+use crate::spirv::{Binding, Kind};
 use ash::vk;
 use std::ops::Range;
 use std::sync::Arc;
@@ -279,12 +279,12 @@ impl CommandRecorder {
 
     /// Blocks until this recorder's last submission is done.
     pub fn wait(&self, queues: &DeviceQueues) -> Result<(), GpuError> {
-        queues.timelines.of(self.queue).wait(self.done_at)
+        queues.timelines.0[self.queue].wait(self.done_at)
     }
 
     /// True if this recorder's last submission is done.
     pub fn is_done(&self, queues: &DeviceQueues) -> Result<bool, GpuError> {
-        queues.timelines.of(self.queue).is_done(self.done_at)
+        queues.timelines.0[self.queue].is_done(self.done_at)
     }
 
     /// Submits the recording. The queue first waits for the other queues that it depends on.
@@ -298,11 +298,11 @@ impl CommandRecorder {
         unsafe { self.context.device.end_command_buffer(self.commands) }
             .context(|| format!("record '{}'", self.label))?;
         let waits = queues.tracker.waits(self.queue);
-        let waited = waits.iter().map(|wait| (queues.timelines.of(wait.queue).semaphore, wait.value)).collect();
+        let waited = waits.iter().map(|wait| (queues.timelines.0[wait.queue].semaphore, wait.value)).collect();
         let (queue, commands, label) = (self.queue, self.commands, self.label);
         let expected = std::mem::take(&mut self.expected);
         let work = Submission { queue, commands, waits: waited, label, expected };
-        self.done_at = queues.timelines.of_mut(queue).submit(work)?;
+        self.done_at = queues.timelines.0[queue].submit(work)?;
         queues.submitted(self.queue, &waits, self.done_at);
         Ok(())
     }
@@ -489,79 +489,58 @@ fn serialize(device: &ash::Device, commands: vk::CommandBuffer, queue: usize, qu
     queues.log.iter_mut().for_each(|log| log.event(queue, Event::Serialize));
 }
 
-/// The index of a binding's descriptor in the list of its kind.
-enum DescriptorInfo {
-    Image(usize),
-    Buffer(usize),
-    Texels(usize),
+/// What a binding refers to.
+enum Descriptor {
+    Image([vk::DescriptorImageInfo; 1]),
+    Buffer([vk::DescriptorBufferInfo; 1]),
+    Texels([vk::BufferView; 1]),
 }
 
 impl CommandRecorder {
     /// Binds the slots under the names that the shader gives them, and the parameters.
-    fn bind(&mut self, dispatch: &Dispatch, params_offset: u64, params_size: u64) -> Result<(), GpuError> {
+    fn bind<'a>(&mut self, dispatch: &Dispatch<'a>, params_offset: u64, params_size: u64) -> Result<(), GpuError> {
         let Dispatch { slots, pipeline, scene, pass, args } = *dispatch;
         let binds = [pass.reads(scene, args), pass.writes(scene, args)].concat();
-        let mut images = Vec::with_capacity(binds.len());
-        let mut buffers = Vec::with_capacity(binds.len());
-        let mut texels = Vec::with_capacity(binds.len());
-        // For each binding, the index of its descriptor.
-        let mut places = Vec::with_capacity(binds.len());
-        for binding in &pipeline.module.bindings {
+        let buffer = |buffer, offset, range| Descriptor::Buffer([vk::DescriptorBufferInfo { buffer, offset, range }]);
+        let described = |binding: &'a Binding| {
             let bound = binds.iter().find(|b| b.name == binding.name);
-            match (binding.kind, bound.map(|b| (b, slots.get(b.slot, args.image)))) {
-                (Kind::Params, _) => {
-                    places.push((binding, DescriptorInfo::Buffer(buffers.len())));
-                    buffers.push([vk::DescriptorBufferInfo {
-                        buffer: self.params.handle,
-                        offset: params_offset,
-                        range: params_size,
-                    }]);
+            let descriptor = match (binding.kind, bound.map(|b| (b, slots.get(b.slot, args.image)))) {
+                (Kind::Params, _) => buffer(self.params.handle, params_offset, params_size),
+                (Kind::Texels(components), Some((_, Resource::Buffer(table)))) => {
+                    Descriptor::Texels([table.texels(components)])
                 }
-                (Kind::Texels(components), Some((_, Resource::Buffer(buffer)))) => {
-                    places.push((binding, DescriptorInfo::Texels(texels.len())));
-                    texels.push([buffer.texels(components)]);
-                }
-                (_, Some((_, Resource::Buffer(buffer)))) => {
-                    places.push((binding, DescriptorInfo::Buffer(buffers.len())));
-                    buffers.push([vk::DescriptorBufferInfo {
-                        buffer: buffer.handle,
-                        offset: 0,
-                        range: vk::WHOLE_SIZE,
-                    }]);
-                }
+                (_, Some((_, Resource::Buffer(table)))) => buffer(table.handle, 0, vk::WHOLE_SIZE),
                 (_, Some((bind, Resource::Image(image)))) => {
-                    let view = match bind.part {
-                        Part::Layers => image.from_layer[args.layer as usize],
-                        _ => image.view,
+                    let image_view = match bind.part {
+                        Part::Layers => image.raw.views[1 + args.layer as usize],
+                        _ => image.raw.views[0],
                     };
-                    places.push((binding, DescriptorInfo::Image(images.len())));
-                    images.push([vk::DescriptorImageInfo {
-                        // Ignored by bindings that have none.
-                        sampler: pipeline.sampler,
-                        image_view: view,
-                        image_layout: vk::ImageLayout::GENERAL,
-                    }]);
+                    // Bindings that have no sampler ignore it.
+                    let (sampler, image_layout) = (pipeline.sampler, vk::ImageLayout::GENERAL);
+                    Descriptor::Image([vk::DescriptorImageInfo { sampler, image_view, image_layout }])
                 }
                 // Cannot happen: the interface of pass and shader was checked when the pipeline was made.
-                (_, None) => {}
-            }
-        }
+                (_, None) => return None,
+            };
+            Some((binding, descriptor))
+        };
+        let described: Vec<_> = pipeline.module.bindings.iter().filter_map(described).collect();
         // Push descriptors need no set.
         let set = match self.context.push_descriptor {
             Some(_) => vk::DescriptorSet::null(),
             None => self.sets.take(pipeline)?,
         };
-        let writes: Vec<_> = places
+        let writes: Vec<_> = described
             .iter()
-            .map(|(binding, listed)| {
+            .map(|(binding, descriptor)| {
                 let write = vk::WriteDescriptorSet::default()
                     .dst_set(set)
                     .dst_binding(binding.binding)
                     .descriptor_type(descriptor_type(binding.kind));
-                match *listed {
-                    DescriptorInfo::Image(at) => write.image_info(&images[at]),
-                    DescriptorInfo::Buffer(at) => write.buffer_info(&buffers[at]),
-                    DescriptorInfo::Texels(at) => write.texel_buffer_view(&texels[at]),
+                match descriptor {
+                    Descriptor::Image(image) => write.image_info(image),
+                    Descriptor::Buffer(buffer) => write.buffer_info(buffer),
+                    Descriptor::Texels(view) => write.texel_buffer_view(view),
                 }
             })
             .collect();
@@ -655,7 +634,7 @@ impl CommandRecorder {
     /// Copies the texels of an upload into the parts of an image that it was made for.
     pub fn upload(&mut self, queues: &mut DeviceQueues, from: &Upload, image: &Image, to: SlotParts) {
         self.barrier(queues, &[Access::of_slot(to.slot, to.copy, to.parts, true, PipelineStage::Copy)]);
-        for (piece, buffer) in from.pieces() {
+        for (piece, buffer) in &from.pieces {
             let region = region(image, piece.parts.clone(), piece.rows.clone(), BufferLayout::default());
             self.copy_to_image(buffer, image, vec![region]);
         }
@@ -668,7 +647,7 @@ impl CommandRecorder {
         let resource = barriers::Resource::Readback;
         let write = Access { resource, parts: 0..1, write: true, stage: PipelineStage::Copy };
         self.barrier(queues, &[read, write]);
-        for (piece, buffer) in to.pieces() {
+        for (piece, buffer) in &to.pieces {
             let region = region(image, piece.parts.clone(), piece.rows.clone(), BufferLayout::default());
             if self.context.faults.breaks(Command::CopyToBuffer) {
                 continue;
@@ -705,10 +684,7 @@ fn region(image: &Image, parts: Range<u32>, rows: Range<u32>, layout: BufferLayo
 
 impl Drop for CommandRecorder {
     fn drop(&mut self) {
-        if self.context.is_given_up() {
-            return;
-        }
         // SAFETY: the owner waited for the device before it drops its recorders. The pool frees its command buffer.
-        unsafe { self.context.device.destroy_command_pool(self.pool, None) };
+        self.context.destroy(|device| unsafe { device.destroy_command_pool(self.pool, None) });
     }
 }

@@ -13,6 +13,7 @@ use super::watchdog::{Deadline, Watchdog};
 use super::window::target::Target;
 use crate::queues::MAX_QUEUES;
 use crate::scene::WindowTexels;
+use crate::sync::locked;
 use ash::vk;
 use gpu_allocator::AllocationSizes;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
@@ -31,8 +32,8 @@ const MAX_UNUSED_PIPELINES: usize = 256;
 /// Size of a block of memory on a software device, bytes.
 const SOFTWARE_BLOCK: u64 = 8 << 20;
 
-/// Which device a [`Context`] opens, and with which options.
-#[derive(Clone, Debug)]
+/// Which device a [`Context`] opens, and with which options. The default: the best device, without validation and without stored pipelines.
+#[derive(Clone, Debug, Default)]
 pub struct ContextOptions {
     /// The device. The default is the best one.
     pub device: DeviceChoice,
@@ -54,24 +55,8 @@ pub struct ContextOptions {
     /// registers.
     pub specialize: Option<bool>,
     /// Largest number of compiled pipelines that are kept although no renderer's plan uses them, at least 1. A pipeline beyond that is compiled again
-    /// when it is needed again.
-    pub max_unused_pipelines: usize,
-}
-
-impl Default for ContextOptions {
-    /// The best device, without validation and without stored pipelines.
-    fn default() -> ContextOptions {
-        ContextOptions {
-            device: DeviceChoice::default(),
-            validation: false,
-            deadline: Deadline::default(),
-            stop: None,
-            pipeline_cache: None,
-            compile_statistics: false,
-            specialize: None,
-            max_unused_pipelines: MAX_UNUSED_PIPELINES,
-        }
-    }
+    /// when it is needed again. `None`: 256.
+    pub max_unused_pipelines: Option<usize>,
 }
 
 /// An open Vulkan device. Every object on the device holds an `Arc` of its context.
@@ -267,7 +252,7 @@ impl Context {
                 .then(|| ash::khr::pipeline_executable_properties::Device::new(instance, &device)),
             shared: Mutex::default(),
             specializes: options.specialize.unwrap_or(candidate.is_software()),
-            max_unused_pipelines: options.max_unused_pipelines,
+            max_unused_pipelines: options.max_unused_pipelines.unwrap_or(MAX_UNUSED_PIPELINES),
             pipeline_cache: PipelineCache::open(&device, &candidate.driver_identity, options.pipeline_cache.as_deref()),
             loss: LossReporting {
                 faults: candidate.device_fault.then(|| ash::ext::device_fault::Device::new(instance, &device)),
@@ -300,7 +285,7 @@ impl Context {
         });
         context.name(context.device.handle(), "device");
         for (queue, name) in context.queues.iter().zip(["queue", "ingest queue", "transfer queue"]) {
-            context.name(*queue.lock().unwrap_or_else(|e| e.into_inner()), name);
+            context.name(*locked(queue), name);
         }
         tracing::info!("device '{}', driver {}", context.candidate.name, context.candidate.driver.trim());
         Ok(context)
@@ -319,7 +304,7 @@ impl Context {
 
     /// Bytes of device memory that this context's buffers and images hold now.
     pub fn allocated(&self) -> u64 {
-        let allocator = self.allocator.lock().unwrap_or_else(|e| e.into_inner());
+        let allocator = locked(&self.allocator);
         allocator.as_ref().map_or(0, |allocator| allocator.generate_report().total_allocated_bytes)
     }
 
@@ -371,7 +356,7 @@ impl Context {
 
     /// Features of images of a format with optimal tiling.
     pub(crate) fn format_features(&self, format: vk::Format) -> vk::FormatFeatureFlags {
-        let mut known = self.formats.lock().unwrap_or_else(|e| e.into_inner());
+        let mut known = locked(&self.formats);
         // SAFETY: the handle belongs to this instance; the call only reads.
         let query = || unsafe { self.instance.get_physical_device_format_properties(self.candidate.handle, format) };
         *known.entry(format).or_insert_with(|| query().optimal_tiling_features)
@@ -389,7 +374,7 @@ impl Context {
 
     /// Fault injection: from now on the device appears to have these features for images of a format.
     pub(super) fn override_features(&mut self, format: vk::Format, features: vk::FormatFeatureFlags) {
-        self.formats.lock().unwrap_or_else(|e| e.into_inner()).insert(format, features);
+        locked(&self.formats).insert(format, features);
     }
 
     /// Names an object in captures and validation messages.
@@ -446,7 +431,7 @@ impl Context {
             return Ok(());
         }
         let queue = &self.queues[queue.min(self.queues.len() - 1)];
-        let queue = queue.lock().unwrap_or_else(|e| e.into_inner());
+        let queue = locked(queue);
         calls::begins("vkQueueSubmit2", "");
         // SAFETY: the lock keeps the queue to one thread; the command buffers submitted are recorded and what they name is alive until
         // the timeline says it is done.
@@ -474,6 +459,13 @@ impl Context {
         self.watchdog.has_given_up()
     }
 
+    /// Destroys an object of the device. If the device was given up, it may still use the object, which stays.
+    pub(super) fn destroy(&self, work: impl FnOnce(&ash::Device)) {
+        if !self.is_given_up() {
+            work(&self.device);
+        }
+    }
+
     /// Adds the driver's report to an error, if the error is the loss of the device and the driver reports anything.
     pub(super) fn explain(&self, error: GpuError) -> GpuError {
         let GpuError::Vulkan { operation, result: vk::Result::ERROR_DEVICE_LOST } = error else { return error };
@@ -482,7 +474,7 @@ impl Context {
             if self.faults.pretends_loss() || self.is_given_up() {
                 return LossReport::default();
             }
-            let queues: Vec<_> = self.queues.iter().map(|q| q.lock().unwrap_or_else(|e| e.into_inner())).collect();
+            let queues: Vec<_> = self.queues.iter().map(locked).collect();
             self.loss.read(self.device.handle(), &queues.iter().map(|q| **q).collect::<Vec<_>>())
         });
         match report.is_empty() {
@@ -500,7 +492,7 @@ impl Context {
     /// Runs `work` with exclusive access to the rendering queue, for uses other than [`Context::submit`].
     #[cfg(feature = "view")]
     pub(super) fn on_queue<T>(&self, work: impl FnOnce(vk::Queue) -> T) -> T {
-        work(*self.queues[0].lock().unwrap_or_else(|e| e.into_inner()))
+        work(*locked(&self.queues[0]))
     }
 
     /// Waits for an idle queue if an older validation layer needs it. Such a layer does not see waits for timelines: it keeps what every submission
@@ -558,7 +550,7 @@ impl Context {
         let operation = || "wait for an idle device".to_string();
         self.watchdog.check(operation)?;
         (0..self.queues.len()).try_for_each(|queue| self.wait_queue(queue))?;
-        let _queues: Vec<_> = self.queues.iter().map(|q| q.lock().unwrap_or_else(|e| e.into_inner())).collect();
+        let _queues: Vec<_> = self.queues.iter().map(locked).collect();
         // What presents pictures signals no fence. The queues are empty, so that this does not block.
         // SAFETY: the locks keep every queue of the device to this thread.
         unsafe { self.device.device_wait_idle() }.context(operation)
@@ -589,14 +581,14 @@ impl Drop for Context {
         if self.is_given_up() {
             // The device may still be at work: its memory is not freed, and the driver stays loaded.
             std::mem::forget((self.entry.clone(), self.messenger.take()));
-            std::mem::forget(self.allocator.lock().unwrap_or_else(|e| e.into_inner()).take());
+            std::mem::forget(locked(&self.allocator).take());
             return;
         }
         self.pipeline_cache.store(&self.device);
         self.pipeline_cache.destroy(&self.device);
         // SAFETY: everything made from this context held an `Arc` of it and is gone. The order is the one of creation reversed.
         unsafe {
-            drop(self.allocator.lock().unwrap_or_else(|e| e.into_inner()).take());
+            drop(locked(&self.allocator).take());
             self.device.destroy_device(None);
             drop(self.messenger.take());
             end_instance(&self.entry, &self.instance);

@@ -102,13 +102,9 @@ impl DescriptorSets {
 
 impl Drop for DescriptorSets {
     fn drop(&mut self) {
-        if self.context.is_given_up() {
-            return;
-        }
-        for pool in &self.pools {
-            // SAFETY: whoever drops this has waited for the device; a pool frees its sets.
-            unsafe { self.context.device.destroy_descriptor_pool(*pool, None) };
-        }
+        // SAFETY: whoever drops this has waited for the device; a pool frees its sets.
+        let destroy = |device: &ash::Device, pool| unsafe { device.destroy_descriptor_pool(pool, None) };
+        self.context.destroy(|device| self.pools.iter().for_each(|pool| destroy(device, *pool)));
     }
 }
 

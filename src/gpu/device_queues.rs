@@ -41,11 +41,6 @@ impl DeviceQueues {
         })
     }
 
-    /// Blocks until everything that was submitted to these queues is done.
-    pub(crate) fn wait_all(&self) -> Result<(), GpuError> {
-        self.timelines.wait_all()
-    }
-
     /// Runs host work, and records its span if spans are enabled.
     pub fn host<T>(&mut self, name: &'static str, work: impl FnOnce(&mut DeviceQueues) -> T) -> T {
         let begin = self.timings.since_began();
@@ -67,9 +62,9 @@ impl DeviceQueues {
             log.record(queue, barrier, accesses);
         }
         let Some(Barrier { from, to }) = barrier else { return };
-        let (before, after) = ((stages(from), writes(from)), (stages(to), reads(to) | writes(to)));
+        let ((before, written, _), (after, writes, reads)) = (masks(from), masks(to));
         // SAFETY: the command buffer is being recorded, outside any render pass.
-        unsafe { memory_barrier(&context.device, commands, before, after) };
+        unsafe { memory_barrier(&context.device, commands, (before, written), (after, reads | writes)) };
     }
 
     /// Notes in the log that a time stamp was recorded on this queue.
@@ -88,10 +83,6 @@ impl DeviceQueues {
         self.tracker.submitted(queue, waits, value);
         self.log.iter_mut().for_each(|log| log.submit(queue, waits, value));
     }
-}
-
-fn flags<T: std::ops::BitOr<Output = T> + Default>(workers: PipelineStages, of: [(PipelineStage, T); 3]) -> T {
-    of.into_iter().filter(|(worker, _)| workers.has(*worker)).fold(T::default(), |all, (_, flags)| all | flags)
 }
 
 /// Records a barrier of memory between accesses of some stages and those of others.
@@ -114,42 +105,19 @@ pub(super) unsafe fn memory_barrier(
     unsafe { device.cmd_pipeline_barrier2(commands, &dependency) };
 }
 
-fn stages(workers: PipelineStages) -> vk::PipelineStageFlags2 {
-    flags(
-        workers,
-        [
-            (PipelineStage::Compute, vk::PipelineStageFlags2::COMPUTE_SHADER),
-            (PipelineStage::Copy, vk::PipelineStageFlags2::ALL_TRANSFER),
-            (PipelineStage::Host, vk::PipelineStageFlags2::HOST),
-        ],
-    )
-}
-
-fn writes(workers: PipelineStages) -> vk::AccessFlags2 {
-    flags(
-        workers,
-        [
-            (PipelineStage::Compute, vk::AccessFlags2::SHADER_STORAGE_WRITE),
-            (PipelineStage::Copy, vk::AccessFlags2::TRANSFER_WRITE),
-            (PipelineStage::Host, vk::AccessFlags2::NONE),
-        ],
-    )
-}
-
-fn reads(workers: PipelineStages) -> vk::AccessFlags2 {
-    flags(
-        workers,
-        [
-            // Numbers of passes are written by the host, and need no barrier. But their buffer may take memory that a readback had before:
-            // the host waited in between, which layers older than 1.3.297 do not know of timelines.
-            (
-                PipelineStage::Compute,
-                vk::AccessFlags2::SHADER_SAMPLED_READ
-                    | vk::AccessFlags2::SHADER_STORAGE_READ
-                    | vk::AccessFlags2::UNIFORM_READ,
-            ),
-            (PipelineStage::Copy, vk::AccessFlags2::TRANSFER_READ),
-            (PipelineStage::Host, vk::AccessFlags2::HOST_READ),
-        ],
-    )
+/// Pipeline stages, writes and reads of these workers.
+fn masks(workers: PipelineStages) -> (vk::PipelineStageFlags2, vk::AccessFlags2, vk::AccessFlags2) {
+    use vk::{AccessFlags2 as A, PipelineStageFlags2 as P};
+    // Numbers of passes are written by the host, and need no barrier. But their buffer may take memory that a readback had before: the host
+    // waited in between, which layers older than 1.3.297 do not know of timelines.
+    let shader_reads = A::SHADER_SAMPLED_READ | A::SHADER_STORAGE_READ | A::UNIFORM_READ;
+    let all = [
+        (PipelineStage::Compute, P::COMPUTE_SHADER, A::SHADER_STORAGE_WRITE, shader_reads),
+        (PipelineStage::Copy, P::ALL_TRANSFER, A::TRANSFER_WRITE, A::TRANSFER_READ),
+        (PipelineStage::Host, P::HOST, A::NONE, A::HOST_READ),
+    ];
+    let there = all.into_iter().filter(|(worker, ..)| workers.has(*worker));
+    there.fold(Default::default(), |(stages, writes, reads), (_, stage, write, read)| {
+        (stages | stage, writes | write, reads | read)
+    })
 }

@@ -28,6 +28,17 @@ impl std::str::FromStr for DeviceChoice {
     }
 }
 
+/// The kinds of devices with their names, the best first.
+const KINDS: [(vk::PhysicalDeviceType, &str); 5] = [
+    (vk::PhysicalDeviceType::DISCRETE_GPU, "discrete GPU"),
+    (vk::PhysicalDeviceType::INTEGRATED_GPU, "integrated GPU"),
+    (vk::PhysicalDeviceType::VIRTUAL_GPU, "virtual GPU"),
+    (vk::PhysicalDeviceType::OTHER, "other"),
+    (vk::PhysicalDeviceType::CPU, "software"),
+];
+/// The index in [`KINDS`] of a kind that it does not have.
+const OTHER: usize = 3;
+
 /// A physical device, with what it lacks and supports.
 #[derive(Clone, Debug)]
 pub struct Candidate {
@@ -108,23 +119,12 @@ impl Candidate {
     }
 
     pub fn kind_name(&self) -> &'static str {
-        match self.kind {
-            vk::PhysicalDeviceType::DISCRETE_GPU => "discrete GPU",
-            vk::PhysicalDeviceType::INTEGRATED_GPU => "integrated GPU",
-            vk::PhysicalDeviceType::VIRTUAL_GPU => "virtual GPU",
-            vk::PhysicalDeviceType::CPU => "software",
-            _ => "other",
-        }
+        KINDS[self.rank()].1
     }
 
-    fn rank(&self) -> u32 {
-        match self.kind {
-            vk::PhysicalDeviceType::DISCRETE_GPU => 0,
-            vk::PhysicalDeviceType::INTEGRATED_GPU => 1,
-            vk::PhysicalDeviceType::VIRTUAL_GPU => 2,
-            vk::PhysicalDeviceType::CPU => 4,
-            _ => 3,
-        }
+    /// The index of its kind in [`KINDS`].
+    fn rank(&self) -> usize {
+        KINDS.iter().position(|(kind, _)| *kind == self.kind).unwrap_or(OTHER)
     }
 
     pub fn api_version(&self) -> String {
@@ -189,74 +189,47 @@ fn candidate(entry: &ash::Entry, instance: &ash::Instance, handle: vk::PhysicalD
     need(!queues.is_empty(), "a compute queue");
     let valid_bits = queues.first().map_or(0, |q| q.valid_bits);
     let mut missing_optional = Vec::new();
-    match queues.len() {
-        0 | 1 => missing_optional
-            .push("an asynchronous compute queue: frames are converted between pictures, not in parallel with them"),
-        2 => missing_optional.push("a transfer queue: frames are copied on the queue that converts them"),
-        _ => {}
-    }
-    if valid_bits == 0 {
-        missing_optional.push("time stamps: no times are printed");
-    }
+    let mut lack = |there: bool, what: &'static str| (!there).then(|| missing_optional.push(what));
+    let no_compute = "an asynchronous compute queue: frames are converted between pictures, not in parallel with them";
+    let no_transfer = "a transfer queue: frames are copied on the queue that converts them";
+    lack(queues.len() > 2, if queues.len() == 2 { no_transfer } else { no_compute });
+    lack(valid_bits > 0, "time stamps: no times are printed");
     let calibrated_timestamps = valid_bits > 0 && has(ash::ext::calibrated_timestamps::NAME);
-    if !calibrated_timestamps {
-        missing_optional
-            .push("VK_EXT_calibrated_timestamps: a trace aligns the device's times with the host's by estimate");
-    }
+    let uncalibrated = "VK_EXT_calibrated_timestamps: a trace aligns the device's times with the host's by estimate";
+    lack(calibrated_timestamps, uncalibrated);
     let reads_monotonic = calibrated_timestamps && reads_monotonic(entry, instance, handle);
-    if calibrated_timestamps && !reads_monotonic {
-        missing_optional
-            .push("CLOCK_MONOTONIC among the calibrated clocks: a trace's clocks are read one after the other");
-    }
+    let in_turn = "CLOCK_MONOTONIC among the calibrated clocks: a trace's clocks are read one after the other";
+    lack(!calibrated_timestamps || reads_monotonic, in_turn);
     let push_descriptors = has(ash::khr::push_descriptor::NAME);
-    if !push_descriptors {
-        missing_optional.push("VK_KHR_push_descriptor: descriptors are sets of a pool");
-    }
+    lack(push_descriptors, "VK_KHR_push_descriptor: descriptors are sets of a pool");
     let mut executables = vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default();
-    if has(ash::khr::pipeline_executable_properties::NAME) {
-        let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut executables);
-        // SAFETY: as above.
-        unsafe { instance.get_physical_device_features2(handle, &mut features) };
-    }
-    // SAFETY: as above.
-    let pipeline_statistics =
-        unsafe { instance.get_physical_device_features(handle) }.pipeline_statistics_query == vk::TRUE;
-    if !pipeline_statistics {
-        missing_optional.push("pipelineStatisticsQuery: invocations are not counted");
-    }
-    if !can_present {
-        missing_optional.push("VK_KHR_swapchain and dynamicRendering: no presentation");
-    }
+    let mut id = vk::PhysicalDevicePresentIdFeaturesKHR::default();
+    let mut wait = vk::PhysicalDevicePresentWaitFeaturesKHR::default();
+    let mut fault = vk::PhysicalDeviceFaultFeaturesEXT::default();
+    let mut features = vk::PhysicalDeviceFeatures2::default()
+        .push_next(&mut executables)
+        .push_next(&mut id)
+        .push_next(&mut wait)
+        .push_next(&mut fault);
+    // SAFETY: as above. A driver ignores structures of extensions that it does not have.
+    unsafe { instance.get_physical_device_features2(handle, &mut features) };
+    let pipeline_statistics = features.features.pipeline_statistics_query == vk::TRUE;
+    let compile_statistics =
+        has(ash::khr::pipeline_executable_properties::NAME) && executables.pipeline_executable_info == vk::TRUE;
+    lack(pipeline_statistics, "pipelineStatisticsQuery: invocations are not counted");
+    lack(can_present, "VK_KHR_swapchain and dynamicRendering: no presentation");
     let budget = has(ash::ext::memory_budget::NAME).then(|| MemoryBudget::read(instance, handle));
-    if budget.is_none() {
-        missing_optional.push("VK_EXT_memory_budget: memory is allocated until the driver refuses");
-    }
-    let (mut present_wait, mut device_fault) = (false, false);
-    if properties.api_version >= vk::API_VERSION_1_3 {
-        let mut id = vk::PhysicalDevicePresentIdFeaturesKHR::default();
-        let mut wait = vk::PhysicalDevicePresentWaitFeaturesKHR::default();
-        let mut fault = vk::PhysicalDeviceFaultFeaturesEXT::default();
-        let mut features =
-            vk::PhysicalDeviceFeatures2::default().push_next(&mut id).push_next(&mut wait).push_next(&mut fault);
-        // SAFETY: as above. A driver ignores structures of extensions that it does not have.
-        unsafe { instance.get_physical_device_features2(handle, &mut features) };
-        present_wait = can_present
-            && has(ash::khr::present_id::NAME)
-            && has(ash::khr::present_wait::NAME)
-            && id.present_id == vk::TRUE
-            && wait.present_wait == vk::TRUE;
-        device_fault = has(ash::ext::device_fault::NAME) && fault.device_fault == vk::TRUE;
-    }
-    if !present_wait {
-        missing_optional.push("VK_KHR_present_wait: the time from a picture to the monitor is not known");
-    }
-    if !device_fault {
-        missing_optional.push("VK_EXT_device_fault: the driver does not report why a device was lost");
-    }
+    lack(budget.is_some(), "VK_EXT_memory_budget: memory is allocated until the driver refuses");
+    let is_current = properties.api_version >= vk::API_VERSION_1_3;
+    let has_extensions = has(ash::khr::present_id::NAME) && has(ash::khr::present_wait::NAME);
+    let can_wait = id.present_id == vk::TRUE && wait.present_wait == vk::TRUE;
+    let present_wait = is_current && can_present && has_extensions && can_wait;
+    let device_fault = is_current && has(ash::ext::device_fault::NAME) && fault.device_fault == vk::TRUE;
+    lack(present_wait, "VK_KHR_present_wait: the time from a picture to the monitor is not known");
+    lack(device_fault, "VK_EXT_device_fault: the driver does not report why a device was lost");
     let checkpoints = has(ash::nv::device_diagnostic_checkpoints::NAME);
-    if !checkpoints {
-        missing_optional.push("VK_NV_device_diagnostic_checkpoints: no report of the pass in which a device was lost");
-    }
+    let unknown_pass = "VK_NV_device_diagnostic_checkpoints: no report of the pass in which a device was lost";
+    lack(checkpoints, unknown_pass);
     Candidate {
         handle,
         name: text(properties.device_name_as_c_str()),
@@ -270,7 +243,7 @@ fn candidate(entry: &ash::Entry, instance: &ash::Instance, handle: vk::PhysicalD
         reads_monotonic,
         push_descriptors,
         pipeline_statistics,
-        compile_statistics: executables.pipeline_executable_info == vk::TRUE,
+        compile_statistics,
         can_present,
         driver_identity: DriverIdentity {
             vendor: properties.vendor_id,
@@ -297,6 +270,9 @@ fn reads_monotonic(entry: &ash::Entry, instance: &ash::Instance, handle: vk::Phy
     there.contains(&vk::TimeDomainEXT::CLOCK_MONOTONIC)
 }
 
+/// The granularity of copies of a queue that can copy any part of an image.
+const SINGLE_TEXELS: vk::Extent3D = vk::Extent3D { width: 1, height: 1, depth: 1 };
+
 /// The queues to use: one for compute, preferably with graphics, since that one may present pictures; another for compute, preferably
 /// without graphics; and one for transfers only.
 fn queues(families: &[vk::QueueFamilyProperties]) -> Vec<QueueInfo> {
@@ -307,9 +283,7 @@ fn queues(families: &[vk::QueueFamilyProperties]) -> Vec<QueueInfo> {
         valid_bits: families[family].timestamp_valid_bits,
         computes: families[family].queue_flags.contains(compute),
         draws: families[family].queue_flags.contains(graphics),
-        copies_slices: families[family].min_image_transfer_granularity.depth == 1
-            && families[family].min_image_transfer_granularity.width == 1
-            && families[family].min_image_transfer_granularity.height == 1,
+        copies_slices: families[family].min_image_transfer_granularity == SINGLE_TEXELS,
     };
     let find =
         |fits: &dyn Fn(&vk::QueueFamilyProperties) -> bool| families.iter().position(|f| f.queue_count > 0 && fits(f));

@@ -7,6 +7,7 @@ use crate::passes::fault_injection::{Change, Command};
 use crate::passes::slots::{Format, Initializer};
 use crate::passes::{DispatchArgs, Params, Pass, Slot};
 use crate::scene::Scene;
+use crate::sync::locked;
 use ash::vk;
 use std::borrow::Cow;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -22,25 +23,8 @@ pub enum InjectionPoint {
     Acquire,
 }
 
-/// The Vulkan result of a call that is made to fail, for modules that do not use types of Vulkan.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum InjectedFailure {
-    OutOfDeviceMemory,
-    OutOfHostMemory,
-    DeviceLost,
-    TimeOut,
-}
-
-impl InjectedFailure {
-    pub fn result(self) -> vk::Result {
-        match self {
-            InjectedFailure::OutOfDeviceMemory => vk::Result::ERROR_OUT_OF_DEVICE_MEMORY,
-            InjectedFailure::OutOfHostMemory => vk::Result::ERROR_OUT_OF_HOST_MEMORY,
-            InjectedFailure::DeviceLost => vk::Result::ERROR_DEVICE_LOST,
-            InjectedFailure::TimeOut => vk::Result::TIMEOUT,
-        }
-    }
-}
+/// The result of a call that is made to fail, for modules that do not use types of Vulkan.
+pub use ash::vk::Result as InjectedFailure;
 
 /// Content for newly allocated memory, to find uses of uninitialized memory.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -97,11 +81,11 @@ pub struct Faults {
 impl Faults {
     /// The `after`-th call from now (0: the next) at this point returns `result` and does not reach the driver.
     pub fn inject(&self, point: InjectionPoint, after: u32, result: vk::Result) {
-        *self.planned.lock().unwrap_or_else(|e| e.into_inner()) = Some((point, after, result));
+        *locked(&self.planned) = Some((point, after, result));
     }
 
     pub(super) fn check(&self, point: InjectionPoint) -> Result<(), vk::Result> {
-        let mut planned = self.planned.lock().unwrap_or_else(|e| e.into_inner());
+        let mut planned = locked(&self.planned);
         match planned.as_mut() {
             Some((at, 0, result)) if *at == point => {
                 let result = *result;
@@ -119,12 +103,12 @@ impl Faults {
 
     /// The `after`-th submission from now (0: the next) and all later ones never reach the device, which then appears to hang.
     pub fn hang(&self, after: u32) {
-        *self.hang.lock().unwrap_or_else(|e| e.into_inner()) = Some(after);
+        *locked(&self.hang) = Some(after);
     }
 
     /// True if the submission that follows must not reach the device, because the device is to appear to hang.
     pub(super) fn keeps_submission(&self) -> bool {
-        let mut hang = self.hang.lock().unwrap_or_else(|e| e.into_inner());
+        let mut hang = locked(&self.hang);
         match hang.as_mut() {
             Some(0) => true,
             Some(left) => {
@@ -156,12 +140,12 @@ impl Faults {
 
     /// Cancels a failure of [`Faults::inject`] that has not happened yet.
     pub fn forget(&self) {
-        *self.planned.lock().unwrap_or_else(|e| e.into_inner()) = None;
+        *locked(&self.planned) = None;
     }
 
     /// From now on the driver appears to give this report after a loss of the device.
     pub fn report_loss(&self, report: LossReport) {
-        *self.loss.lock().unwrap_or_else(|e| e.into_inner()) = Some(report);
+        *locked(&self.loss) = Some(report);
     }
 
     /// True if the loss of the device was injected, so that the driver must not be asked for its cause.
@@ -170,7 +154,7 @@ impl Faults {
     }
 
     pub(super) fn loss_report(&self) -> Option<LossReport> {
-        self.loss.lock().unwrap_or_else(|e| e.into_inner()).clone()
+        locked(&self.loss).clone()
     }
 
     /// From now on the device reports a memory budget of `bytes` bytes, of which none are used: only a single allocation larger than that is refused,
@@ -178,31 +162,31 @@ impl Faults {
     pub fn limit_memory(&self, bytes: u64) {
         let heap = HeapBudget { size: bytes, budget: bytes, used: 0, is_device_local: true };
         let types = vec![(0, vk::MemoryPropertyFlags::from_raw(u32::MAX)); 32];
-        *self.budget.lock().unwrap_or_else(|e| e.into_inner()) = Some(MemoryBudget { heaps: vec![heap], types });
+        *locked(&self.budget) = Some(MemoryBudget { heaps: vec![heap], types });
     }
 
     pub(super) fn budget(&self) -> Option<MemoryBudget> {
-        self.budget.lock().unwrap_or_else(|e| e.into_inner()).clone()
+        locked(&self.budget).clone()
     }
 
     /// From now on newly allocated memory holds this content; `None`: it is not filled. Slots that must start with zeros still do
     /// ([`Slot::starts_clear`](crate::passes::Slot::starts_clear)).
     pub fn poison(&self, poison: Option<Poison>) {
-        *self.poison.lock().unwrap_or_else(|e| e.into_inner()) = poison;
+        *locked(&self.poison) = poison;
     }
 
     pub(super) fn poisoned(&self) -> Option<Poison> {
-        *self.poison.lock().unwrap_or_else(|e| e.into_inner())
+        *locked(&self.poison)
     }
 
     /// From now on each dispatch of the pass is recorded `times` times: results stay the same, and the time grows. 0 leaves the dispatch out. A later
     /// call replaces an earlier one, also for another pass.
     pub fn slow_down(&self, pass: &'static str, times: u32) {
-        *self.slow.lock().unwrap_or_else(|e| e.into_inner()) = Some((pass, times));
+        *locked(&self.slow) = Some((pass, times));
     }
 
     pub(super) fn times(&self, pass: &str) -> u32 {
-        match *self.slow.lock().unwrap_or_else(|e| e.into_inner()) {
+        match *locked(&self.slow) {
             Some((slow, times)) if slow == pass => times,
             _ => 1,
         }

@@ -8,6 +8,7 @@ use crate::passes::Slot;
 use crate::passes::slots::{Format, Shape};
 use crate::plan::Plan;
 use crate::scene::{Sampling, Scene, WindowTexels};
+use crate::sync::locked;
 use ash::vk;
 
 /// By which instructions shaders read single texels.
@@ -117,7 +118,7 @@ pub fn adapt_scene(context: &Context, texel_access: TexelAccess, mut scene: Scen
 
 /// The format in which the window takes pictures, if passes can store it.
 fn window_texels(context: &Context) -> WindowTexels {
-    let wanted = *context.window_texels.lock().unwrap_or_else(|e| e.into_inner());
+    let wanted = *locked(&context.window_texels);
     let format = match wanted {
         WindowTexels::Rgba8 => return wanted,
         WindowTexels::Bgra8 => vulkan(Format::Bgra8),

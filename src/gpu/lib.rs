@@ -54,7 +54,7 @@ mod validation;
 mod watchdog;
 pub mod window;
 
-use echolume_base::{files, picture, text, tree};
+use echolume_base::{files, picture, sync, text, tree};
 use echolume_core::{barriers, passes, plan, queues, scene, spirv};
 use echolume_probe as probe;
 

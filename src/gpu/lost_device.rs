@@ -3,40 +3,26 @@
 
 use crate::passes::PASSES;
 use ash::vk;
-use std::ffi::c_void;
+use std::borrow::Cow;
+use std::ffi::{CStr, FromBytesUntilNulError, c_void};
 use std::fmt::{self, Display, Formatter};
 
 /// Most addresses, codes or checkpoints that one line reports of each.
 const MAX_REPORTED: usize = 4;
 
 /// The driver's report on the loss of a device. Each list may be empty, because drivers report only what they know.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default)]
 pub struct LossReport {
     pub description: String,
-    pub addresses: Vec<FaultAddress>,
-    pub codes: Vec<VendorCode>,
+    /// Of failed memory accesses and of instructions.
+    pub addresses: Vec<vk::DeviceFaultAddressInfoEXT>,
+    /// Codes that only the vendor can interpret.
+    pub codes: Vec<vk::DeviceFaultVendorInfoEXT>,
     pub checkpoints: Vec<Checkpoint>,
 }
 
-/// An address in the report: of a failed memory access, or of an instruction.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct FaultAddress {
-    pub kind: &'static str,
-    pub address: u64,
-    /// The fault lies in the aligned block of this many bytes, a power of two, that contains the address; 1 means exactly there.
-    pub precision: u64,
-}
-
-/// A code in the report that only the vendor can interpret.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct VendorCode {
-    pub description: String,
-    pub code: u64,
-    pub data: u64,
-}
-
 /// A pass that a queue had reached when the device was lost.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 pub struct Checkpoint {
     /// Number of the queue, from 0.
     pub queue: usize,
@@ -53,12 +39,19 @@ impl Display for LossReport {
         if !self.description.trim().is_empty() {
             parts.push(plain(&self.description));
         }
-        let range = |a: &FaultAddress| match a.precision {
-            0 | 1 => format!("{} at {:#x}", a.kind, a.address),
-            precision => format!("{} at {:#x} within {precision} bytes", a.kind, a.address),
+        let range = |a: &vk::DeviceFaultAddressInfoEXT| {
+            let place = format!("{} at {:#x}", kind_of(a.address_type), a.reported_address);
+            match a.address_precision {
+                0 | 1 => place,
+                // The fault lies in the aligned block of this many bytes, a power of two, that contains the address.
+                precision => format!("{place} within {precision} bytes"),
+            }
         };
         parts.extend(self.addresses.iter().take(MAX_REPORTED).map(range));
-        let code = |c: &VendorCode| format!("{} (code {:#x}, {:#x})", plain(&c.description), c.code, c.data);
+        let code = |c: &vk::DeviceFaultVendorInfoEXT| {
+            let description = text(c.description_as_c_str());
+            format!("{} (code {:#x}, {:#x})", plain(&description), c.vendor_fault_code, c.vendor_fault_data)
+        };
         parts.extend(self.codes.iter().take(MAX_REPORTED).map(code));
         let reached = |c: &Checkpoint| {
             format!("queue {} had {} '{}'", c.queue, if c.is_done { "reached" } else { "begun" }, c.pass)
@@ -122,8 +115,12 @@ fn pass_of(marker: *mut c_void) -> &'static str {
     number.checked_sub(1).and_then(|n| PASSES.get(n)).map_or("another pass", |pass| pass.name)
 }
 
+/// A text of the driver; empty if it does not end.
+fn text(driver: Result<&CStr, FromBytesUntilNulError>) -> Cow<'_, str> {
+    driver.map_or(Cow::default(), CStr::to_string_lossy)
+}
+
 fn read_faults(faults: &ash::ext::device_fault::Device, device: vk::Device) -> LossReport {
-    let text = |c: Result<&std::ffi::CStr, _>| c.map(|c| c.to_string_lossy().into_owned()).unwrap_or_default();
     let get = faults.fp().get_device_fault_info_ext;
     let mut counts = vk::DeviceFaultCountsEXT::default();
     // SAFETY: the extension is enabled and the device is lost; without a place for them only the counts are returned.
@@ -146,22 +143,8 @@ fn read_faults(faults: &ash::ext::device_fault::Device, device: vk::Device) -> L
     }
     addresses.truncate(counts.address_info_count as usize);
     codes.truncate(counts.vendor_info_count as usize);
-    let address = |a: &vk::DeviceFaultAddressInfoEXT| FaultAddress {
-        kind: kind_of(a.address_type),
-        address: a.reported_address,
-        precision: a.address_precision,
-    };
-    let code = |c: &vk::DeviceFaultVendorInfoEXT| VendorCode {
-        description: text(c.description_as_c_str()),
-        code: c.vendor_fault_code,
-        data: c.vendor_fault_data,
-    };
-    LossReport {
-        description: text(info.description_as_c_str()),
-        addresses: addresses.iter().map(address).collect(),
-        codes: codes.iter().map(code).collect(),
-        checkpoints: Vec::new(),
-    }
+    let description = text(info.description_as_c_str()).into_owned();
+    LossReport { description, addresses, codes, checkpoints: Vec::new() }
 }
 
 fn kind_of(kind: vk::DeviceFaultAddressTypeEXT) -> &'static str {
@@ -183,13 +166,19 @@ mod tests {
     #[test]
     fn a_report_is_one_line_of_what_the_driver_knows() {
         assert!(LossReport::default().is_empty());
+        let address = |address_type, reported_address, address_precision| vk::DeviceFaultAddressInfoEXT {
+            address_type,
+            reported_address,
+            address_precision,
+        };
+        let code = vk::DeviceFaultVendorInfoEXT::default();
         let report = LossReport {
             description: "GPU hang\n\u{1b}[31mred".into(),
             addresses: vec![
-                FaultAddress { kind: "invalid read", address: 0x1000, precision: 4096 },
-                FaultAddress { kind: "failing instruction", address: 0x20, precision: 1 },
+                address(vk::DeviceFaultAddressTypeEXT::READ_INVALID, 0x1000, 4096),
+                address(vk::DeviceFaultAddressTypeEXT::INSTRUCTION_POINTER_FAULT, 0x20, 1),
             ],
-            codes: vec![VendorCode { description: "MMU fault".into(), code: 13, data: 7 }],
+            codes: vec![code.description(c"MMU fault").expect("short").vendor_fault_code(13).vendor_fault_data(7)],
             checkpoints: vec![
                 Checkpoint { queue: 0, pass: "shadow", is_done: true },
                 Checkpoint { queue: 1, pass: "scan_convert", is_done: false },
@@ -204,7 +193,7 @@ mod tests {
         ] {
             assert!(line.contains(part), "{part}: {line}");
         }
-        let many = LossReport { codes: vec![report.codes[0].clone(); 100], ..LossReport::default() };
+        let many = LossReport { codes: vec![report.codes[0]; 100], ..LossReport::default() };
         assert_eq!(many.to_string().matches("MMU fault").count(), MAX_REPORTED);
     }
 

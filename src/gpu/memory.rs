@@ -3,6 +3,7 @@
 use super::context::Context;
 use super::error::{ErrorContext, GpuError};
 use super::faults::InjectionPoint;
+use crate::sync::locked;
 use ash::vk;
 use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
@@ -28,7 +29,7 @@ pub(super) fn reserve(
 ) -> Result<Allocation, GpuError> {
     context.faults.check(InjectionPoint::Allocate).context(operation)?;
     context.counts.allocations.fetch_add(1, Ordering::Relaxed);
-    let mut allocator = context.allocator.lock().unwrap_or_else(|e| e.into_inner());
+    let mut allocator = locked(&context.allocator);
     let Some(allocator) = allocator.as_mut() else {
         return Err(GpuError::Memory { operation: operation(), fault: "the context is shutting down".into() });
     };
@@ -59,7 +60,7 @@ pub(super) fn reserve(
 
 /// Frees device memory that [`reserve`] allocated.
 pub(super) fn free(context: &Context, allocation: Option<Allocation>) {
-    let mut allocator = context.allocator.lock().unwrap_or_else(|e| e.into_inner());
+    let mut allocator = locked(&context.allocator);
     if let (Some(allocator), Some(allocation)) = (allocator.as_mut(), allocation) {
         // Freeing an allocation of this allocator cannot fail, and a Drop could not report it.
         let _ = allocator.free(allocation);

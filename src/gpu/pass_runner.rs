@@ -142,7 +142,7 @@ impl PassRunner {
             results.push((bind, image.shape.size(), image.format, buffer));
         }
         recorder.submit(&mut queues)?;
-        let done = queues.wait_all();
+        let done = queues.timelines.wait_all();
         // Everything above is freed at the end, also when waiting failed.
         queues.timelines.drain();
         done?;
@@ -183,20 +183,7 @@ impl PassTimer {
         pass: &'static Pass,
         contents: &[(Slot, Texels)],
     ) -> Result<PassTimer, GpuError> {
-        PassTimer::with_texel_access(context, scene, pass, contents, TexelAccess::for_device(&context.candidate))
-    }
-
-    /// Does what [`PassTimer::new`] does, which explains `contents`, with shaders that read single texels by `texel_access`.
-    ///
-    /// # Errors
-    /// The device cannot hold a slot or a shader does not compile, which the error names, or the device fails.
-    pub fn with_texel_access(
-        context: &Arc<Context>,
-        scene: &Scene,
-        pass: &'static Pass,
-        contents: &[(Slot, Texels)],
-        texel_access: TexelAccess,
-    ) -> Result<PassTimer, GpuError> {
+        let texel_access = TexelAccess::for_device(&context.candidate);
         let scene = &formats::adapt_scene(context, texel_access, scene.clone());
         let visible = scene.visible_bounds.slices();
         let first = match pass.frequency {
@@ -250,7 +237,7 @@ impl PassTimer {
             keep.push(upload);
         }
         self.recorder.submit(&mut self.queues)?;
-        let done = self.queues.wait_all();
+        let done = self.queues.timelines.wait_all();
         // The staging buffers are freed at the end, also when waiting failed.
         self.queues.timelines.drain();
         done
@@ -282,7 +269,7 @@ impl PassTimer {
         self.recorder.begin(&mut self.queues)?;
         self.recorder.copy_out(&mut self.queues, image, slot, 0, &buffer);
         self.recorder.submit(&mut self.queues)?;
-        let done = self.queues.wait_all();
+        let done = self.queues.timelines.wait_all();
         // The buffer is freed at the end, also when waiting failed.
         self.queues.timelines.drain();
         done?;

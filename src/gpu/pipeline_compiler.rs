@@ -8,9 +8,10 @@ use super::pipelines::{Key, Pipeline, Pipelines};
 use crate::passes::{DispatchArgs, Pass};
 use crate::plan::Plan;
 use crate::scene::Scene;
+use crate::sync::locked;
 use std::collections::{HashMap, HashSet, VecDeque};
 use std::sync::atomic::Ordering;
-use std::sync::{Arc, Condvar, Mutex, MutexGuard};
+use std::sync::{Arc, Condvar, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -82,16 +83,6 @@ struct Shared {
     faults: Mutex<HashMap<Key, String>>,
 }
 
-impl Shared {
-    fn queue(&self) -> MutexGuard<'_, Queue> {
-        self.queue.lock().unwrap_or_else(|e| e.into_inner())
-    }
-
-    fn faults(&self) -> MutexGuard<'_, HashMap<Key, String>> {
-        self.faults.lock().unwrap_or_else(|e| e.into_inner())
-    }
-}
-
 /// A thread that compiles pipelines in the background, and what was requested of it.
 pub(crate) struct AsyncPipelineCompiler {
     shared: Arc<Shared>,
@@ -137,11 +128,11 @@ impl AsyncPipelineCompiler {
                 held.push(pipeline);
                 continue;
             }
-            if let Some(fault) = self.shared.faults().get(&key) {
+            if let Some(fault) = locked(&self.shared.faults).get(&key) {
                 return Err(GpuError::Shader { shader: key.0.into(), fault: fault.clone() });
             }
             is_ready &= !is_alive;
-            let mut queue = self.shared.queue();
+            let mut queue = locked(&self.shared.queue);
             if queue.pending.insert(key.clone()) {
                 let scene = shared.get_or_insert_with(|| Arc::new(scene.clone())).clone();
                 queue.asked.push_back(Job { key, pass: step.pass, scene, args });
@@ -154,7 +145,7 @@ impl AsyncPipelineCompiler {
 
     /// Compiles the pipelines of these scenes whenever no requested pipeline is missing. They replace the scenes of an earlier call.
     pub fn warm(&self, scenes: Vec<SceneMaker>) {
-        let mut queue = self.shared.queue();
+        let mut queue = locked(&self.shared.queue);
         queue.stop_warming();
         queue.warmed = 0;
         queue.scenes.extend(scenes);
@@ -163,19 +154,19 @@ impl AsyncPipelineCompiler {
 
     /// Drops the scenes of [`AsyncPipelineCompiler::warm`] whose pipelines are not compiled yet.
     pub fn stop_warming(&self) {
-        self.shared.queue().stop_warming();
+        locked(&self.shared.queue).stop_warming();
     }
 
     /// True while pipelines of [`AsyncPipelineCompiler::warm`] are left to compile.
     pub fn is_warming(&self) -> bool {
-        let queue = self.shared.queue();
+        let queue = locked(&self.shared.queue);
         queue.is_warming || !queue.scenes.is_empty() || !queue.in_advance.is_empty()
     }
 }
 
 impl Drop for AsyncPipelineCompiler {
     fn drop(&mut self) {
-        self.shared.queue().is_over = true;
+        locked(&self.shared.queue).is_over = true;
         self.shared.changed.notify_one();
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
@@ -195,7 +186,7 @@ impl Worker {
     fn run(self) {
         let mut has_compiled = false;
         loop {
-            let mut queue = self.shared.queue();
+            let mut queue = locked(&self.shared.queue);
             if queue.is_over {
                 return;
             }
@@ -204,7 +195,7 @@ impl Worker {
                     // Nothing is left: a program that is killed later has this on disk.
                     has_compiled = false;
                     drop(queue);
-                    let context = self.pipelines.context();
+                    let context = &self.pipelines.context;
                     context.pipeline_cache.store(&context.device);
                     // Compilers of drivers need much memory for a short time.
                     host_memory::give_back();
@@ -217,9 +208,9 @@ impl Worker {
             match work {
                 Work::Asked(job) => {
                     if let Err(fault) = self.compile(&job) {
-                        self.shared.faults().insert(job.key.clone(), fault.to_string());
+                        locked(&self.shared.faults).insert(job.key.clone(), fault.to_string());
                     }
-                    self.shared.queue().pending.remove(&job.key);
+                    locked(&self.shared.queue).pending.remove(&job.key);
                     has_compiled = true;
                     if let Some(wake) = &self.wake {
                         wake();
@@ -243,13 +234,13 @@ impl Worker {
     fn compile(&self, job: &Job) -> Result<(), GpuError> {
         let is_new = self.pipelines.cached(&job.key).is_none();
         self.pipelines.get(job.pass, &job.scene, &job.args)?;
-        self.pipelines.context().counts.async_pipelines.fetch_add(is_new.into(), Ordering::Relaxed);
+        self.pipelines.context.counts.async_pipelines.fetch_add(is_new.into(), Ordering::Relaxed);
         Ok(())
     }
 
     /// Lines up the pipelines of a scene that are missing.
     fn look_at(&self, make: SceneMaker) {
-        let context = self.pipelines.context();
+        let context = &self.pipelines.context;
         let Some(scene) = make() else { return };
         let scene = formats::adapt_scene(context, self.texel_access, scene);
         let plan = Plan::new(&scene);
@@ -265,7 +256,7 @@ impl Worker {
             is_missing.then(|| Job { key, pass, scene: scene.clone(), args })
         });
         let missing: Vec<Job> = missing.collect();
-        let mut queue = self.shared.queue();
+        let mut queue = locked(&self.shared.queue);
         // Meanwhile the user may have acted, and warming ended.
         if queue.is_warming {
             // Fewer than are kept, so that none of them is forgotten for another.
@@ -278,6 +269,6 @@ impl Worker {
     /// Leaves the processor to others for a time, unless there is something to do that drawing waits for.
     fn pause(&self, time: Duration) {
         let waits = |queue: &mut Queue| queue.asked.is_empty() && !queue.is_over;
-        drop(self.shared.changed.wait_timeout_while(self.shared.queue(), time, waits));
+        drop(self.shared.changed.wait_timeout_while(locked(&self.shared.queue), time, waits));
     }
 }

@@ -8,6 +8,7 @@ use super::context::Context;
 use super::error::{ErrorContext, GpuError};
 use super::formats::{self, TexelAccess};
 use super::recently_used::RecentlyUsed;
+use super::resources;
 use crate::passes::fault_injection::Command;
 use crate::passes::slots::{Format, Shape};
 use crate::passes::{DispatchArgs, Pass, Slot, interface_check};
@@ -16,11 +17,12 @@ use crate::scene::Scene;
 use crate::spirv::dead_code::remove_dead_code;
 use crate::spirv::specialize::specialize;
 use crate::spirv::{self, Kind, Module};
+use crate::sync::locked;
 use ash::vk;
 use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Arc, LazyLock, Mutex, MutexGuard, Weak};
+use std::sync::{Arc, LazyLock, Mutex, Weak};
 use std::time::{Duration, Instant};
 
 /// A compute pipeline and its layout.
@@ -65,7 +67,7 @@ type Compiled = (Key, Arc<Pipeline>);
 /// The compiled pipelines, so that returning to an earlier setting compiles nothing. Of the pipelines that no plan uses, the most recently used
 /// [`ContextOptions::max_unused_pipelines`](super::ContextOptions::max_unused_pipelines) are kept.
 pub struct Pipelines {
-    context: Arc<Context>,
+    pub(super) context: Arc<Context>,
     made: Mutex<RecentlyUsed<Key, Pipeline>>,
     shaders: Arc<Shaders>,
     texel_access: TexelAccess,
@@ -107,7 +109,7 @@ impl Pipelines {
         if !Arc::ptr_eq(&shaders, &embedded()) {
             return Ok(Arc::new(Pipelines::new(context, shaders, texel_access)?));
         }
-        let mut shared = context.shared.lock().unwrap_or_else(|e| e.into_inner());
+        let mut shared = locked(&context.shared);
         shared.retain(|held| held.strong_count() > 0);
         let mut held = shared.iter().filter_map(Weak::upgrade).filter_map(|held| held.downcast::<Pipelines>().ok());
         if let Some(found) = held.find(|p| p.texel_access == texel_access) {
@@ -128,14 +130,7 @@ impl Pipelines {
         shaders: Arc<Shaders>,
         texel_access: TexelAccess,
     ) -> Result<Pipelines, GpuError> {
-        let create = vk::SamplerCreateInfo::default()
-            .mag_filter(context.faults.filter())
-            .min_filter(context.faults.filter())
-            .address_mode_u(vk::SamplerAddressMode::CLAMP_TO_EDGE)
-            .address_mode_v(vk::SamplerAddressMode::CLAMP_TO_EDGE)
-            .address_mode_w(vk::SamplerAddressMode::CLAMP_TO_EDGE);
-        // SAFETY: the create structure is complete.
-        let sampler = unsafe { context.device.create_sampler(&create, None) }.context(|| "create sampler".into())?;
+        let sampler = resources::sampler(context, context.faults.filter())?;
         context.name(sampler, "trilinear");
         let made = Mutex::new(RecentlyUsed::new(context.max_unused_pipelines));
         Ok(Pipelines { context: context.clone(), made, shaders, texel_access, sampler })
@@ -159,21 +154,13 @@ impl Pipelines {
 
     /// The pipeline of a key. None if it is not compiled.
     pub fn cached(&self, key: &Key) -> Option<Arc<Pipeline>> {
-        self.made().get(key)
-    }
-
-    fn made(&self) -> MutexGuard<'_, RecentlyUsed<Key, Pipeline>> {
-        self.made.lock().unwrap_or_else(|e| e.into_inner())
+        locked(&self.made).get(key)
     }
 
     /// Keeps a pipeline. What is forgotten for it is destroyed without the lock: some drivers take their time.
     fn keep(&self, key: Key, pipeline: Arc<Pipeline>) {
-        let forgotten = self.made().insert(key, pipeline);
+        let forgotten = locked(&self.made).insert(key, pipeline);
         drop(forgotten);
-    }
-
-    pub fn context(&self) -> &Arc<Context> {
-        &self.context
     }
 
     /// The pipeline for a dispatch of a pass in a scene; it is compiled at its first use.
@@ -224,7 +211,7 @@ impl Pipelines {
         let current = |key: &Key| is_current(key).then(|| self.cached(key)).flatten();
         let (steps, compiled) = self.complete(plan, scene, current, &|_, _| true);
         let steps = steps?;
-        self.made().retain(is_current);
+        locked(&self.made).retain(is_current);
         compiled.into_iter().for_each(|(key, pipeline)| self.keep(key, pipeline));
         Ok(steps)
     }
@@ -280,7 +267,7 @@ impl Pipelines {
     fn make(&self, key: &Key, pass: &Pass, scene: &Scene, args: &DispatchArgs) -> Result<Arc<Pipeline>, GpuError> {
         let prepared = self.prepare(key, pass, scene, args)?;
         let cache = &self.context.pipeline_cache;
-        let how = Compile { cache: cache.handle(), flags: vk::PipelineCreateFlags::empty() };
+        let how = Compile { cache: cache.handle, flags: vk::PipelineCreateFlags::empty() };
         let pipeline = self.compile(key.0, prepared, how)?;
         cache.used(pipeline.compilation.1);
         Ok(Arc::new(pipeline))
@@ -316,36 +303,8 @@ impl Pipelines {
     /// # Errors
     /// The driver refuses the shader, or memory is exhausted.
     pub fn compile(&self, name: &'static str, prepared: Prepared, how: Compile) -> Result<Pipeline, GpuError> {
-        Pipeline::new(&self.context, self.sampler, name, prepared, how)
-    }
-}
-
-/// The values of specialization constants by `SpecId`.
-fn by_id(module: &Module, constants: &[(&'static str, i32)]) -> Vec<(u32, i32)> {
-    let value = |name: &str| constants.iter().find(|(of, _)| *of == name).map(|(_, value)| *value);
-    module.constants.iter().filter_map(|c| Some((c.id, value(&c.name)?))).collect()
-}
-
-impl Drop for Pipelines {
-    fn drop(&mut self) {
-        self.made().clear();
-        if self.context.is_given_up() {
-            return;
-        }
-        // SAFETY: pipelines that use the sampler are dropped by whoever holds them only after the device is done.
-        unsafe { self.context.device.destroy_sampler(self.sampler, None) };
-    }
-}
-
-impl Pipeline {
-    fn new(
-        context: &Arc<Context>,
-        sampler: vk::Sampler,
-        name: &'static str,
-        prepared: Prepared,
-        how: Compile,
-    ) -> Result<Pipeline, GpuError> {
         let Prepared { words, module, constants } = prepared;
+        let context = &self.context;
         let device = &context.device;
         let operation = || format!("create pipeline '{name}'");
         let bindings: Vec<_> = module
@@ -370,7 +329,7 @@ impl Pipeline {
         let mut pipeline = Pipeline {
             context: context.clone(),
             module,
-            sampler,
+            sampler: self.sampler,
             set_layout,
             layout: vk::PipelineLayout::null(),
             handle: vk::Pipeline::null(),
@@ -431,16 +390,27 @@ impl Pipeline {
     }
 }
 
+/// The values of specialization constants by `SpecId`.
+fn by_id(module: &Module, constants: &[(&'static str, i32)]) -> Vec<(u32, i32)> {
+    let value = |name: &str| constants.iter().find(|(of, _)| *of == name).map(|(_, value)| *value);
+    module.constants.iter().filter_map(|c| Some((c.id, value(&c.name)?))).collect()
+}
+
+impl Drop for Pipelines {
+    fn drop(&mut self) {
+        locked(&self.made).clear();
+        // SAFETY: pipelines that use the sampler are dropped by whoever holds them only after the device is done.
+        self.context.destroy(|device| unsafe { device.destroy_sampler(self.sampler, None) });
+    }
+}
+
 impl Drop for Pipeline {
     fn drop(&mut self) {
-        if self.context.is_given_up() {
-            return;
-        }
         // SAFETY: whoever drops the last reference has waited for the device; null handles are allowed.
-        unsafe {
-            self.context.device.destroy_pipeline(self.handle, None);
-            self.context.device.destroy_pipeline_layout(self.layout, None);
-            self.context.device.destroy_descriptor_set_layout(self.set_layout, None);
-        }
+        self.context.destroy(|device| unsafe {
+            device.destroy_pipeline(self.handle, None);
+            device.destroy_pipeline_layout(self.layout, None);
+            device.destroy_descriptor_set_layout(self.set_layout, None);
+        });
     }
 }

@@ -15,19 +15,90 @@ use gpu_allocator::vulkan::Allocation;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// An image, its memory and its views.
-pub struct Image {
+/// An image of the device, its memory and its views.
+pub(crate) struct RawImage {
     context: Arc<Context>,
     pub handle: vk::Image,
-    /// A view of the complete image, all layers included.
-    pub view: vk::ImageView,
-    /// For the frame array, one view for each layer: from that layer to the last one of its ring entry. A batch of frames begins with the first layer
-    /// of its view. Validation assumes that every layer of a view is read, so a view contains no layers of other entries, which may be being written.
-    pub(crate) from_layer: Vec<vk::ImageView>,
+    pub views: Vec<vk::ImageView>,
+    allocation: Option<Allocation>,
+}
+
+impl RawImage {
+    /// Makes an image with a single mip level in layout UNDEFINED, with views of these ranges. `operation`: for errors.
+    ///
+    /// # Errors
+    /// Memory is exhausted, or the device fails.
+    fn new(
+        context: &Arc<Context>,
+        name: &str,
+        create: vk::ImageCreateInfo,
+        (kind, ranges): (vk::ImageViewType, impl IntoIterator<Item = vk::ImageSubresourceRange>),
+        operation: &dyn Fn() -> String,
+    ) -> Result<RawImage, GpuError> {
+        let create = create.mip_levels(1).samples(vk::SampleCountFlags::TYPE_1).tiling(vk::ImageTiling::OPTIMAL);
+        let device = &context.device;
+        // SAFETY: the create structure is complete and its pointers live; limits and formats of slots were checked for the plan.
+        let handle = unsafe { device.create_image(&create, None) }.context(operation)?;
+        // From here on, dropping `image` cleans up after a failure.
+        let mut image = RawImage { context: context.clone(), handle, views: Vec::new(), allocation: None };
+        // SAFETY: the image was just made by this device.
+        let requirements = unsafe { device.get_image_memory_requirements(handle) };
+        let wanted = Reserve { name, requirements, location: MemoryLocation::GpuOnly, linear: false };
+        let allocation = reserve(context, wanted, operation)?;
+        // SAFETY: the allocation fits the requirements and lives as long as the image.
+        let bound = unsafe { device.bind_image_memory(handle, allocation.memory(), allocation.offset()) };
+        image.allocation = Some(allocation);
+        bound.context(operation)?;
+        for range in ranges {
+            let create = vk::ImageViewCreateInfo::default()
+                .image(handle)
+                .view_type(kind)
+                .format(create.format)
+                .subresource_range(range);
+            // SAFETY: the image is bound to memory and alive.
+            let view = unsafe { device.create_image_view(&create, None) };
+            let view = view.context(|| format!("create a view of image '{name}'"))?;
+            context.name(view, name);
+            image.views.push(view);
+        }
+        context.name(handle, name);
+        Ok(image)
+    }
+
+    /// Makes a 2D image in layout UNDEFINED, with one view.
+    ///
+    /// # Errors
+    /// The device has no memory for it, or fails.
+    #[cfg(feature = "view")]
+    pub fn flat(
+        context: &Arc<Context>,
+        name: &'static str,
+        format: vk::Format,
+        [width, height]: [u32; 2],
+        usage: vk::ImageUsageFlags,
+    ) -> Result<RawImage, GpuError> {
+        let create = vk::ImageCreateInfo::default()
+            .image_type(vk::ImageType::TYPE_2D)
+            .format(format)
+            .extent(vk::Extent3D { width, height, depth: 1 })
+            .array_layers(1)
+            .usage(usage);
+        let views = (vk::ImageViewType::TYPE_2D, [WHOLE]);
+        RawImage::new(context, name, create, views, &|| format!("create a {name} ({width}x{height})"))
+    }
+}
+
+/// The image of a slot.
+pub struct Image {
+    /// Its first view is of the complete image, all layers included. That of the frame array has another one for each layer: from that layer to the
+    /// last one of its ring entry. A batch of frames begins with the first layer of its view. Validation assumes that every layer of a view is read, so a
+    /// view contains no layers of other entries, which may be being written.
+    pub(crate) raw: RawImage,
+    /// That of `raw`.
+    pub handle: vk::Image,
     pub extent: vk::Extent3D,
     pub shape: Shape,
     pub format: Format,
-    allocation: Option<Allocation>,
 }
 
 impl Image {
@@ -60,48 +131,20 @@ impl Image {
             .image_type(kind)
             .format(formats::vulkan(format))
             .extent(extent)
-            .mip_levels(1)
             .array_layers(layers)
-            .samples(vk::SampleCountFlags::TYPE_1)
-            .tiling(vk::ImageTiling::OPTIMAL)
             .usage(formats::usage(context, slot));
         if slot.crosses_queues() && context.queue_families.len() > 1 {
             create = create.sharing_mode(vk::SharingMode::CONCURRENT).queue_family_indices(&context.queue_families);
         }
-        let device = &context.device;
-        // SAFETY: the create structure is complete and its pointers live; limits and formats were checked for the plan.
-        let handle = unsafe { device.create_image(&create, None) }.context(operation)?;
-        // From here on, dropping `image` cleans up after a failure.
-        let mut image = Image {
-            context: context.clone(),
-            handle,
-            view: vk::ImageView::null(),
-            from_layer: Vec::new(),
-            extent,
-            shape,
-            format,
-            allocation: None,
+        let from_layer = |layer| {
+            let count = ring_entry_end(layers, layer) - layer;
+            vk::ImageSubresourceRange { base_array_layer: layer, layer_count: count, ..WHOLE }
         };
-        // SAFETY: the image was just made by this device.
-        let requirements = unsafe { device.get_image_memory_requirements(handle) };
-        let wanted = Reserve { name: slot.name(), requirements, location: MemoryLocation::GpuOnly, linear: false };
-        let allocation = reserve(context, wanted, &operation)?;
-        // SAFETY: the allocation fits the requirements and lives as long as the image.
-        let bound = unsafe { device.bind_image_memory(handle, allocation.memory(), allocation.offset()) };
-        image.allocation = Some(allocation);
-        bound.context(operation)?;
-        image.view = image.create_view(slot.name(), view_kind, WHOLE)?;
-        if slot == Slot::Frames {
-            for layer in 0..layers {
-                let count = ring_entry_end(layers, layer) - layer;
-                let range = vk::ImageSubresourceRange { base_array_layer: layer, layer_count: count, ..WHOLE };
-                let view = image.create_view(slot.name(), view_kind, range)?;
-                image.from_layer.push(view);
-            }
-        }
-        context.name(handle, slot.name());
+        let batches = (0..layers).filter(|_| slot == Slot::Frames).map(from_layer);
+        let views = (view_kind, std::iter::once(WHOLE).chain(batches));
+        let raw = RawImage::new(context, slot.name(), create, views, &operation)?;
         tracing::debug!("image '{}': {width}x{height}x{} {format:?}, {mebibytes} MiB", slot.name(), depth.max(layers));
-        Ok(image)
+        Ok(Image { handle: raw.handle, raw, extent, shape, format })
     }
 
     /// True if the other image has the same shape and format.
@@ -141,24 +184,6 @@ impl Image {
     pub fn layout(&self) -> (Shape, usize) {
         (self.shape, self.format.texel_bytes())
     }
-
-    fn create_view(
-        &self,
-        name: &str,
-        kind: vk::ImageViewType,
-        range: vk::ImageSubresourceRange,
-    ) -> Result<vk::ImageView, GpuError> {
-        let create = vk::ImageViewCreateInfo::default()
-            .image(self.handle)
-            .view_type(kind)
-            .format(formats::vulkan(self.format))
-            .subresource_range(range);
-        // SAFETY: the image is bound to memory and alive.
-        let view = unsafe { self.context.device.create_image_view(&create, None) };
-        let view = view.context(|| format!("create a view of image '{name}'"))?;
-        self.context.name(view, name);
-        Ok(view)
-    }
 }
 
 /// The first layer of an image, for copies.
@@ -170,7 +195,7 @@ pub(crate) const COLOUR: vk::ImageSubresourceLayers = vk::ImageSubresourceLayers
 };
 
 /// One side of a barrier: stages, their accesses, and the layout of the images.
-type Side = (vk::PipelineStageFlags2, vk::AccessFlags2, vk::ImageLayout);
+pub(crate) type Side = (vk::PipelineStageFlags2, vk::AccessFlags2, vk::ImageLayout);
 
 /// Records a barrier of complete images.
 ///
@@ -208,19 +233,31 @@ pub const WHOLE: vk::ImageSubresourceRange = vk::ImageSubresourceRange {
     layer_count: vk::REMAINING_ARRAY_LAYERS,
 };
 
-impl Drop for Image {
+/// A sampler that takes the texel at the edge for places beyond it.
+///
+/// # Errors
+/// The device fails.
+pub(crate) fn sampler(context: &Context, filter: vk::Filter) -> Result<vk::Sampler, GpuError> {
+    let create = vk::SamplerCreateInfo::default()
+        .mag_filter(filter)
+        .min_filter(filter)
+        .address_mode_u(vk::SamplerAddressMode::CLAMP_TO_EDGE)
+        .address_mode_v(vk::SamplerAddressMode::CLAMP_TO_EDGE)
+        .address_mode_w(vk::SamplerAddressMode::CLAMP_TO_EDGE);
+    // SAFETY: the create structure is complete.
+    unsafe { context.device.create_sampler(&create, None) }.context(|| "create sampler".into())
+}
+
+impl Drop for RawImage {
     fn drop(&mut self) {
-        if self.context.is_given_up() {
-            return;
-        }
-        // SAFETY: whoever drops an image has waited for the device to be done with it; null handles are allowed.
-        unsafe {
-            for view in self.from_layer.drain(..).chain([self.view]) {
-                self.context.device.destroy_image_view(view, None);
+        self.context.destroy(|device| {
+            // SAFETY: whoever drops an image has waited for the device to be done with it.
+            unsafe {
+                self.views.iter().for_each(|view| device.destroy_image_view(*view, None));
+                device.destroy_image(self.handle, None);
             }
-            self.context.device.destroy_image(self.handle, None);
-        }
-        free(&self.context, self.allocation.take());
+            free(&self.context, self.allocation.take());
+        });
     }
 }
 

@@ -15,14 +15,13 @@ pub(super) struct SceneCompiler {
     /// Started at its first use. It ends before the pipelines do.
     background: Option<AsyncPipelineCompiler>,
     pipelines: Arc<Pipelines>,
-    texel_access: TexelAccess,
+    /// How single texels are read.
+    pub texel_access: TexelAccess,
     frames_at_once: Option<u32>,
     wake: Option<Wake>,
 }
 
 impl SceneCompiler {
-    /// The arguments have the meaning of the fields of the same names of [`super::RendererOptions`].
-    ///
     /// # Errors
     /// The device fails.
     pub fn new(
@@ -37,14 +36,9 @@ impl SceneCompiler {
         Ok(SceneCompiler { background: None, pipelines, texel_access, frames_at_once, wake })
     }
 
-    /// How single texels are read.
-    pub fn texel_access(&self) -> TexelAccess {
-        self.texel_access
-    }
-
     /// The scene with the fields that depend on the device set, and its plan.
     pub fn plan(&self, scene: Scene) -> (Scene, Plan) {
-        let adapted = formats::adapt_scene(self.pipelines.context(), self.texel_access, scene);
+        let adapted = formats::adapt_scene(&self.pipelines.context, self.texel_access, scene);
         let scene = Scene { frames_at_once: self.frames_at_once.unwrap_or(adapted.frames_at_once), ..adapted };
         let plan = Plan::new(&scene);
         (scene, plan)
@@ -61,7 +55,7 @@ impl SceneCompiler {
         scene: &Scene,
         goes_on: &(dyn Fn(usize, usize) -> bool + Sync),
     ) -> Result<Vec<Arc<Pipeline>>, GpuError> {
-        formats::check(self.pipelines.context(), plan, scene)?;
+        formats::check(&self.pipelines.context, plan, scene)?;
         self.pipelines.of_plan_while(plan, scene, goes_on)
     }
 
@@ -94,7 +88,7 @@ impl SceneCompiler {
     /// A shader does not compile, the device cannot hold a slot, or the thread cannot be started.
     pub fn prepare(&mut self, scene: &Scene) -> Result<bool, GpuError> {
         let (scene, plan) = self.plan(scene.clone());
-        formats::check(self.pipelines.context(), &plan, &scene)?;
+        formats::check(&self.pipelines.context, &plan, &scene)?;
         self.background()?.prepare(&plan, &scene)
     }
 

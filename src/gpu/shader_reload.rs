@@ -5,11 +5,12 @@ use super::pipeline_compiler::Wake;
 use super::pipelines::{Shaders, embedded};
 use crate::shader_source::{self, Source};
 use crate::shader_tools::Compiler;
+use crate::sync::locked;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, SystemTime};
 
@@ -80,14 +81,14 @@ impl ShaderFolder {
 
     fn words(&self, name: &str) -> Result<Vec<u32>, String> {
         let source = {
-            let state = self.state();
+            let state = locked(&self.state);
             if let Some(words) = state.compiled.get(name) {
                 return Ok(words.to_vec());
             }
             state.sources.get(name).cloned().ok_or_else(|| format!("is not in {}", self.glsl.display()))?
         };
         let made = self.compiler.compile(&source);
-        let mut state = self.state();
+        let mut state = locked(&self.state);
         match &made {
             // Meanwhile the file may have changed.
             Ok(words) if state.sources.get(name).is_some_and(|now| Arc::ptr_eq(now, &source)) => {
@@ -102,7 +103,7 @@ impl ShaderFolder {
 
     /// Why the present sources are not all in use: the first fault, which may have several lines. None if there is no fault.
     pub fn fault(&self) -> Option<String> {
-        let state = self.state();
+        let state = locked(&self.state);
         state
             .unreadable
             .iter()
@@ -115,7 +116,7 @@ impl ShaderFolder {
     /// The shaders whose source changed and was compiled since the last call, so that pipelines of them are out of date. None if there are none.
     /// Otherwise refused shaders ([`ShaderFolder::refuse`]) are included until [`ShaderFolder::accept`].
     pub fn take_changed(&self) -> Option<HashSet<String>> {
-        let mut state = self.state();
+        let mut state = locked(&self.state);
         let mut changed = std::mem::take(&mut state.changed);
         if !changed.is_empty() {
             changed.extend(state.refused.iter().flat_map(|(shaders, _)| shaders.iter().cloned()));
@@ -126,12 +127,12 @@ impl ShaderFolder {
     /// Notes that no pipelines can be made of these shaders although they compile. `fault`: the reason.
     pub fn refuse(&self, shaders: HashSet<String>, fault: String) {
         tracing::warn!("{fault}");
-        self.state().refused = Some((shaders, fault));
+        locked(&self.state).refused = Some((shaders, fault));
     }
 
     /// Notes that pipelines were made of all shaders of [`ShaderFolder::take_changed`].
     pub fn accept(&self) {
-        self.state().refused = None;
+        locked(&self.state).refused = None;
     }
 
     /// Reads the folder again and compiles what is different: first what is in use, then the rest, so that its faults are known.
@@ -141,13 +142,13 @@ impl ShaderFolder {
             Ok(read) => read,
             Err(fault) => {
                 tracing::warn!("shaders: {fault}");
-                self.state().unreadable = Some(fault);
+                locked(&self.state).unreadable = Some(fault);
                 return done();
             }
         };
         let (mut used, mut rest) = (Vec::new(), Vec::new());
         {
-            let mut state = self.state();
+            let mut state = locked(&self.state);
             state.unreadable = None;
             state.faults.retain(|name, _| read.contains_key(name));
             for (name, source) in read {
@@ -160,7 +161,7 @@ impl ShaderFolder {
         }
         for group in [used, rest] {
             let made: Vec<_> = group.par_iter().map(|source| self.compiler.compile(source)).collect();
-            let mut state = self.state();
+            let mut state = locked(&self.state);
             for (source, made) in group.into_iter().zip(made) {
                 let name = source.name.clone();
                 match made {
@@ -178,10 +179,6 @@ impl ShaderFolder {
             drop(state);
             done();
         }
-    }
-
-    fn state(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(|e| e.into_inner())
     }
 }
 

@@ -5,6 +5,7 @@ use super::error::{ErrorContext, GpuError};
 use super::faults::InjectionPoint;
 use super::paced::Paced;
 use super::watchdog::Progress;
+use crate::sync::locked;
 use ash::vk;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -62,7 +63,7 @@ impl Timeline {
         match &self.paced {
             None => self.send(&work, value)?,
             Some(paced) => {
-                let mut paced = paced.lock().unwrap_or_else(|e| e.into_inner());
+                let mut paced = locked(paced);
                 let expected = work.expected;
                 paced.push(value, expected, (value, work));
                 self.send_due(&mut paced).inspect_err(|_| paced.pop_back())?;
@@ -105,7 +106,7 @@ impl Timeline {
     /// The device fails. What was not submitted stays held back.
     pub(super) fn release(&self, value: u64) -> Result<(), GpuError> {
         let Some(paced) = &self.paced else { return Ok(()) };
-        let mut paced = paced.lock().unwrap_or_else(|e| e.into_inner());
+        let mut paced = locked(paced);
         while let Some((value, work)) = paced.up_to(value) {
             self.send(work, *value)?;
             paced.sent();
@@ -115,11 +116,11 @@ impl Timeline {
 
     /// Number of submissions that are held back.
     fn held(&self) -> usize {
-        self.paced.as_ref().map_or(0, |paced| paced.lock().unwrap_or_else(|e| e.into_inner()).held())
+        self.paced.as_ref().map_or(0, |paced| locked(paced).held())
     }
 
     fn progress<T>(&self, with: impl FnOnce(&mut Progress) -> T) -> T {
-        with(&mut self.progress.lock().unwrap_or_else(|e| e.into_inner()))
+        with(&mut locked(&self.progress))
     }
 
     fn operation(&self) -> String {
@@ -132,7 +133,7 @@ impl Timeline {
         let reached = unsafe { self.context.device.get_semaphore_counter_value(self.semaphore) }?;
         self.progress(|progress| progress.reached(reached, Instant::now()));
         if let Some(paced) = &self.paced {
-            paced.lock().unwrap_or_else(|e| e.into_inner()).reached(reached);
+            locked(paced).reached(reached);
         }
         Ok(reached)
     }
@@ -189,7 +190,7 @@ impl Timeline {
             return Ok(true);
         }
         if let Some(paced) = &self.paced {
-            self.send_due(&mut paced.lock().unwrap_or_else(|e| e.into_inner()))?;
+            self.send_due(&mut locked(paced))?;
         }
         self.context.watchdog.check_deadline(self.busy_since(), || self.operation())?;
         Ok(false)
@@ -204,8 +205,8 @@ impl Timeline {
     }
 }
 
-/// The timelines of all queues that a renderer uses.
-pub(crate) struct Timelines(Vec<Timeline>);
+/// The timelines of all queues that a renderer uses, by queue.
+pub(crate) struct Timelines(pub(super) Vec<Timeline>);
 
 impl Timelines {
     pub fn new(context: &Arc<Context>, queues: usize) -> Result<Timelines, GpuError> {
@@ -239,14 +240,7 @@ impl Timelines {
         self.0.iter().map(Timeline::held).sum()
     }
 
-    pub(super) fn of(&self, queue: usize) -> &Timeline {
-        &self.0[queue]
-    }
-
-    pub(super) fn of_mut(&mut self, queue: usize) -> &mut Timeline {
-        &mut self.0[queue]
-    }
-
+    /// Blocks until everything that was submitted to these queues is done.
     pub(crate) fn wait_all(&self) -> Result<(), GpuError> {
         self.0.iter().try_for_each(Timeline::wait_all)
     }
@@ -275,10 +269,7 @@ impl Drop for Timelines {
 
 impl Drop for Timeline {
     fn drop(&mut self) {
-        if self.context.is_given_up() {
-            return;
-        }
         // SAFETY: the owner waited for the device before it drops its timeline.
-        unsafe { self.context.device.destroy_semaphore(self.semaphore, None) };
+        self.context.destroy(|device| unsafe { device.destroy_semaphore(self.semaphore, None) });
     }
 }

@@ -238,13 +238,11 @@ impl Stamps {
 
 impl Drop for Stamps {
     fn drop(&mut self) {
-        if self.context.is_given_up() {
-            return;
-        }
-        for pool in [Some(self.pool), self.statistics].into_iter().flatten() {
-            // SAFETY: whoever drops the stamps has waited for the device.
-            unsafe { self.context.device.destroy_query_pool(pool, None) };
-        }
+        // SAFETY: whoever drops the stamps has waited for the device; a null handle is allowed.
+        self.context.destroy(|device| unsafe {
+            device.destroy_query_pool(self.pool, None);
+            device.destroy_query_pool(self.statistics.unwrap_or_default(), None);
+        });
     }
 }
 
@@ -331,15 +329,7 @@ impl Timings {
         }
         for stamp in stamps {
             let ns = elapsed(stamp.from, stamp.to, valid_bits, period);
-            match self.times.iter_mut().find(|t| t.name == stamp.name) {
-                Some(time) => {
-                    time.runs += stamp.runs;
-                    time.total += ns;
-                }
-                None => {
-                    self.times.push(PassTime { name: stamp.name, runs: stamp.runs, total: ns });
-                }
-            }
+            PassTime { name: stamp.name, runs: stamp.runs, total: ns }.add_to(&mut self.times);
             if let Some(spans) = &mut self.spans {
                 let begin = spans.on_host_clock(stamp.from, valid_bits, period);
                 let Stamp { name, runs, invocations, .. } = *stamp;

@@ -1,6 +1,7 @@
 //! The Khronos validation layer: the checks that are requested of it, and its messages.
 
 use super::error::{ErrorContext, GpuError};
+use crate::sync::locked;
 use ash::vk;
 use std::ffi::{CStr, c_void};
 use std::sync::Mutex;
@@ -101,7 +102,7 @@ impl Messenger {
 
     /// All warnings and errors so far, without known false positives.
     pub fn messages(&self) -> Vec<String> {
-        self.messages.lock().unwrap_or_else(|e| e.into_inner()).clone()
+        locked(&self.messages).clone()
     }
 
     /// True if the layer is one of those that do not see waits for timelines.
@@ -163,7 +164,7 @@ unsafe extern "system" fn on_message(
     // Older layers repeat the name in the message.
     let text = if text.contains(&name) { text } else { format!("{name}: {text}") };
     tracing::error!(target: "validation", "{text}");
-    messages.lock().unwrap_or_else(|e| e.into_inner()).push(text);
+    locked(messages).push(text);
     vk::FALSE
 }
 

@@ -4,6 +4,7 @@
 //! destroying what a submission still uses, and some drivers block in such a call or free memory that the device still writes.
 
 use super::error::{ErrorContext, GpuError};
+use crate::sync::locked;
 use ash::vk;
 use std::collections::VecDeque;
 use std::sync::Mutex;
@@ -103,11 +104,11 @@ impl Watchdog {
     }
 
     fn given_up(&self) -> Option<GivenUp> {
-        *self.given_up.lock().unwrap_or_else(|e| e.into_inner())
+        *locked(&self.given_up)
     }
 
     fn give_up(&self, why: GivenUp, operation: impl FnOnce() -> String) -> GpuError {
-        let why = *self.given_up.lock().unwrap_or_else(|e| e.into_inner()).get_or_insert(why);
+        let why = *locked(&self.given_up).get_or_insert(why);
         why.error(operation())
     }
 
@@ -125,7 +126,7 @@ impl Watchdog {
     /// # Errors
     /// The device is given up.
     pub(crate) fn check_deadline(&self, since: Instant, operation: impl FnOnce() -> String) -> Result<(), GpuError> {
-        let mut looks = self.looks.lock().unwrap_or_else(|e| e.into_inner());
+        let mut looks = locked(&self.looks);
         match self.deadline.filter(|deadline| looks.is_late(since, Instant::now(), *deadline)) {
             Some(deadline) => Err(self.give_up(GivenUp::Late(deadline), operation)),
             None => Ok(()),

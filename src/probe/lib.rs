@@ -14,7 +14,7 @@ mod rigid;
 mod samples;
 pub mod world;
 
-use echolume_base::{files, tree};
+use echolume_base::{files, sync, tree};
 
 pub use axis::Axis;
 pub use file::ProbeFile;

@@ -4,7 +4,7 @@
 //! holds: lateral, depth, elevation. [`World`] stands beside it and places it. Both are right-handed, so that a volume whose axes are
 //! left-handed in the world (a mirrored one) is drawn with one axis reversed.
 
-use super::grid::Grid;
+use super::grid::{Geometry, Grid};
 use glam::{DAffine3, DMat3, DMat4, DVec3};
 
 /// Largest cosine of the angle between two axes that counts as perpendicular: 0.06 degrees, as files round their matrices.
@@ -107,6 +107,15 @@ impl World {
             return *self;
         }
         World { voxel_to_world: self.voxel_to_world * lattice(of).inverse() * lattice(other) }
+    }
+
+    /// The map from voxel indices of `grid`, which is in the coordinates of a volume with this geometry, to the world. `own`: the map of the volume's
+    /// own voxels; the coordinates are the world's where there is none, or for a sweep.
+    pub fn resampled(own: Option<World>, geometry: &Geometry, grid: &Grid) -> World {
+        match (geometry, own) {
+            (Geometry::Cartesian(of), Some(world)) => world.on(of, grid),
+            _ => World::of(grid),
+        }
     }
 
     /// The rigid map from the coordinates in which a volume is drawn, mm, to the world. `of`: the grid of its voxels.

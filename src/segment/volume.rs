@@ -19,6 +19,7 @@ use crate::labels::Labels;
 use crate::lattice::{self, Region, voxel};
 use crate::mesh::smooth::Smoother;
 use crate::statistics;
+use crate::statistics::mix;
 use std::collections::HashMap;
 
 /// Half of the thickness of the shell, in standard deviations of the smoothing that found the surface, and the most, in inner radii.
@@ -235,9 +236,6 @@ struct Random(u64);
 impl Random {
     fn below(&mut self, count: usize) -> usize {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) % count as u64) as usize
+        (mix(self.0) % count as u64) as usize
     }
 }

@@ -17,7 +17,7 @@ pub mod user_presets;
 pub mod worksheet;
 pub mod workspace;
 
-use echolume_base::{canvas, digest, files, html_page, metrics, picture, text, tree};
+use echolume_base::{canvas, digest, files, html_page, metrics, picture, sync, text, tree};
 use echolume_core::{passes, plan, scene};
 use echolume_gpu::{self as gpu, machine};
 use echolume_segment as segment;

@@ -4,7 +4,7 @@
 use super::segmentation::{self, Segment};
 use super::volume_file::VolumeFile;
 use crate::files::InputError;
-use crate::probe::{Geometry, Grid, Indices, Probe, World};
+use crate::probe::{Geometry, Grid, Indices, World};
 use crate::{Frame, Source, VolumeFrames};
 use crate::{SampleType, StoredType};
 use glam::DVec3;
@@ -37,9 +37,21 @@ impl Target {
         Target { grid, world: World::of(&grid), sample, outside: 0.0, capture: None }
     }
 
-    /// The same target as a DICOM secondary capture of 8 bits. `shown`: the stored values that become 0 and 255.
+    /// The target of the volume with this index of a recording, on the grid of [`target_grid`]. Outside the insonified region it has the value of no
+    /// echo.
+    ///
+    /// # Errors
+    /// That of [`target_grid`].
+    pub fn of(source: &dyn Source, volume: usize, spacing: Option<f64>) -> Result<Target, String> {
+        let geometry = source.geometry(volume);
+        let grid = target_grid(&geometry, spacing)?;
+        let world = World::resampled(source.world_of(volume), &geometry, &grid);
+        Ok(Target { world, outside: no_echo(source), ..Target::new(grid, source.sample_type()) })
+    }
+
+    /// The same target as a DICOM secondary capture of 8 bits, black outside the insonified region. `shown`: the stored values that become 0 and 255.
     pub fn captured(self, shown: [f64; 2]) -> Target {
-        Target { sample: SampleType::U8, capture: Some(shown), ..self }
+        Target { sample: SampleType::U8, outside: 0.0, capture: Some(shown), ..self }
     }
 
     /// The format of a file name, with the form that is asked for.
@@ -81,6 +93,22 @@ impl Target {
             return Err(InputError::new(path, "--outside", fault));
         }
         Ok(())
+    }
+}
+
+/// The grid of a converted volume: with the requested voxel spacing, mm, otherwise that of a Cartesian volume itself, or for a sweep one with the
+/// distance of its samples.
+///
+/// # Errors
+/// One line without the file's name: the spacing is not allowed or gives too many voxels.
+pub fn target_grid(geometry: &Geometry, spacing: Option<f64>) -> Result<Grid, String> {
+    match (geometry, spacing) {
+        // Every voxel stays what and where it is.
+        (Geometry::Cartesian(grid), None) => Ok(*grid),
+        (Geometry::Sweep(probe), None) => {
+            lattice(geometry, probe.sample_pitch).map_err(|e| format!("the sample spacing {e}; give --spacing"))
+        }
+        (_, Some(spacing)) => lattice(geometry, spacing).map_err(|e| format!("--spacing {e}")),
     }
 }
 
@@ -185,7 +213,10 @@ impl Volume {
     /// The stored value at a position in the coordinates of the geometry, mm, interpolated trilinearly; None outside the insonified region.
     pub fn at(&self, place: DVec3) -> Option<f64> {
         let index = match &self.geometry {
-            Geometry::Sweep(probe) => self.indices(probe, place),
+            Geometry::Sweep(probe) => {
+                let at = probe.to_indices(place);
+                [at.sample, at.line, at.slice]
+            }
             Geometry::Cartesian(grid) => ((place - DVec3::from(grid.origin)) / DVec3::from(grid.spacing)).to_array(),
         };
         let mut low = [0; 3];
@@ -263,11 +294,6 @@ impl Volume {
         }
     }
 
-    fn indices(&self, probe: &Probe, place: DVec3) -> [f64; 3] {
-        let at = probe.to_indices(place);
-        [at.sample, at.line, at.slice]
-    }
-
     /// Writes the volume, resampled on the grid of `target`. The values are those of the original file, whose sample type must be `target.sample`, or
     /// 0 to 255 for a secondary capture. `each` is called after every slice.
     ///
@@ -320,21 +346,8 @@ impl Volume {
     }
 }
 
-/// Writes a segmentation on a grid along the axes of the world. `label` gives the label at a position, mm; 0 is in no segment.
-///
-/// # Errors
-/// The format cannot hold the segmentation, or the file cannot be written.
-pub(super) fn write_labels(
-    grid: &Grid,
-    segments: &[Segment],
-    path: &Path,
-    label: impl Fn(DVec3) -> u8 + Sync,
-) -> Result<(), InputError> {
-    segmentation::write(path, grid, &World::of(grid), segments, |voxel| label(place_of(grid, voxel)), || ())
-}
-
 /// The sample value, in the units of the source's file, that stands for no echo: the low end of the displayed range, such as -60 dB.
-pub fn no_echo(source: &dyn Source) -> f64 {
+fn no_echo(source: &dyn Source) -> f64 {
     source.range()[0] - source.sample_type().shift()
 }
 
@@ -364,7 +377,7 @@ fn write_voxels(
     let mut file =
         target.format(path)?.create(path, target.grid.size, &target.world, target.sample).map_err(written)?;
     write_slices(target, &mut file, value, each).map_err(written)?;
-    file.finish().map_err(written)
+    file.complete().map_err(written)
 }
 
 fn write_slices(
@@ -392,7 +405,7 @@ fn write_slices(
 }
 
 /// The centre of a voxel, mm.
-fn place_of(grid: &Grid, voxel: [usize; 3]) -> DVec3 {
+pub(super) fn place_of(grid: &Grid, voxel: [usize; 3]) -> DVec3 {
     DVec3::from(grid.origin) + DVec3::from(grid.spacing) * DVec3::from_array(voxel.map(|n| n as f64))
 }
 

@@ -204,14 +204,13 @@ fn joined(header: &Path, mut parts: Vec<Pixels>, part_bytes: u64) -> Result<Pixe
 }
 
 /// Files with the same number of bytes of samples each.
-#[derive(Debug)]
 struct Parts {
     parts: Arc<[Pixels]>,
     part_bytes: u64,
 }
 
 impl Gathered for Parts {
-    fn open(&self, skip: u64) -> io::Result<Box<dyn Read + Send>> {
+    fn open(self: Arc<Self>, skip: u64) -> io::Result<Box<dyn Read + Send>> {
         let part_bytes = self.part_bytes.max(1);
         let (parts, next) = (self.parts.clone(), (skip / part_bytes) as usize);
         Ok(Box::new(PartStream { parts, part_bytes, next, inside: skip % part_bytes, now: None }))
@@ -294,14 +293,8 @@ struct Reordered {
     all: OnceLock<Arc<[u8]>>,
 }
 
-impl std::fmt::Debug for Reordered {
-    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        write!(f, "{:?} in the order {:?}", self.inner, self.stored.order)
-    }
-}
-
 impl Gathered for Reordered {
-    fn open(&self, skip: u64) -> io::Result<Box<dyn Read + Send>> {
+    fn open(self: Arc<Self>, skip: u64) -> io::Result<Box<dyn Read + Send>> {
         let all = match self.all.get() {
             Some(all) => all.clone(),
             None => {

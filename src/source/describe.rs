@@ -9,7 +9,7 @@ use std::path::Path;
 const MAX_PATH_CHARACTERS: usize = 300;
 
 /// A number for users: at most four decimals, without trailing zeros; large and tiny numbers with an exponent.
-pub(super) fn number(value: f64) -> String {
+pub fn number(value: f64) -> String {
     if value != 0.0 && !(1e-3..1e7).contains(&value.abs()) {
         return format!("{value:.4e}");
     }

@@ -76,6 +76,11 @@ pub(super) fn stored_pose(pose: Option<&DAffine3>) -> [u8; POSE_BYTES] {
 }
 
 impl Header {
+    /// Of frames without poses and of no phantom, whose geometry is the same both ways.
+    pub(super) fn of(geometry: Geometry, stored: StoredType, range: [f64; 2]) -> Header {
+        Header { forward: geometry.clone(), backward: geometry, stored, range, posed: false, synthetic: false }
+    }
+
     /// Size of a frame, bytes. None if it is 0 or above 1 GiB.
     pub fn frame_bytes(&self) -> Option<u64> {
         let [width, height] = self.forward.frame_size();
@@ -165,11 +170,20 @@ pub trait Source: Send {
     /// True if the first volume is swept backwards. Unless a source states it, this is told by the motor's travel: true if the motor travels back
     /// during a frame of that volume.
     fn goes_back(&self) -> bool {
-        travels_back(&self.geometry(0))
+        let Geometry::Sweep(probe) = self.geometry(0) else { return false };
+        match &probe.advance {
+            Advance::None => false,
+            Advance::Same(a) => *a < 0.0,
+            Advance::Each(table) => table.iter().any(|a| *a < 0.0),
+        }
     }
-    /// The properties that all frames have in common.
+    /// The properties that all frames have in common. If all volumes are swept in one direction, both geometries are the same.
     fn header(&self) -> Header {
-        header_of(self)
+        let forward = self.geometry(0);
+        let second = if self.volumes() > 1 { self.geometry(1) } else { forward.clone() };
+        let (forward, backward) = if self.goes_back() { (second, forward) } else { (forward, second) };
+        let (posed, synthetic) = (self.pose().is_some(), self.is_synthetic());
+        Header { forward, backward, stored: self.stored_type(), range: self.range(), posed, synthetic }
     }
     /// All files that are read; empty for a source that is computed.
     fn files(&self) -> Vec<PathBuf> {
@@ -276,23 +290,4 @@ pub(super) fn check_volume(path: &Path, volume: usize, count: usize) -> Result<(
 pub(super) fn file_bytes(source: &dyn Source) -> u64 {
     let files: BTreeSet<PathBuf> = source.files().into_iter().collect();
     files.iter().filter_map(|file| file.metadata().ok()).filter(|about| about.is_file()).map(|about| about.len()).sum()
-}
-
-/// The header of the frames of a source. If all volumes are swept in one direction, both geometries are the same.
-fn header_of<S: Source + ?Sized>(source: &S) -> Header {
-    let forward = source.geometry(0);
-    let second = if source.volumes() > 1 { source.geometry(1) } else { forward.clone() };
-    let (forward, backward) = if source.goes_back() { (second, forward) } else { (forward, second) };
-    let (posed, synthetic) = (source.pose().is_some(), source.is_synthetic());
-    Header { forward, backward, stored: source.stored_type(), range: source.range(), posed, synthetic }
-}
-
-/// True if the motor travels back between the first line of each frame and its last.
-fn travels_back(geometry: &Geometry) -> bool {
-    let Geometry::Sweep(probe) = geometry else { return false };
-    match &probe.advance {
-        Advance::None => false,
-        Advance::Same(a) => *a < 0.0,
-        Advance::Each(table) => table.iter().any(|a| *a < 0.0),
-    }
 }

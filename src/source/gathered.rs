@@ -2,20 +2,21 @@
 
 use std::io::{self, Cursor, Read};
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// Samples of a recording that do not lie in one range of one file, such as those of several files.
-pub(super) trait Gathered: std::fmt::Debug + Send + Sync {
+pub(super) trait Gathered: Send + Sync {
     /// Opens the samples as one stream, from `skip` bytes after their beginning.
     ///
     /// # Errors
     /// A file cannot be opened or read.
-    fn open(&self, skip: u64) -> io::Result<Box<dyn Read + Send>>;
+    fn open(self: Arc<Self>, skip: u64) -> io::Result<Box<dyn Read + Send>>;
     /// The files that hold the samples.
     fn files(&self) -> Vec<PathBuf>;
 }
 
 /// A sequence of pictures or frames of equal size that are decoded one by one.
-pub(super) trait Decoded: Clone + std::fmt::Debug + Send + Sync + 'static {
+pub(super) trait Decoded: Send + Sync + 'static {
     /// Bytes of the decoded samples of one picture or frame.
     fn each(&self) -> usize;
     /// The decoded samples of the picture or frame with this index; empty behind the last.
@@ -27,10 +28,10 @@ pub(super) trait Decoded: Clone + std::fmt::Debug + Send + Sync + 'static {
 }
 
 impl<D: Decoded> Gathered for D {
-    fn open(&self, skip: u64) -> io::Result<Box<dyn Read + Send>> {
+    fn open(self: Arc<Self>, skip: u64) -> io::Result<Box<dyn Read + Send>> {
         let each = self.each().max(1) as u64;
         let next = usize::try_from(skip / each).unwrap_or(usize::MAX);
-        let mut stream = DecodedStream { from: self.clone(), next, samples: Cursor::default() };
+        let mut stream = DecodedStream { from: self, next, samples: Cursor::default() };
         if !skip.is_multiple_of(each) {
             stream.decode()?;
             stream.samples.set_position(skip % each);
@@ -44,7 +45,7 @@ impl<D: Decoded> Gathered for D {
 }
 
 struct DecodedStream<D> {
-    from: D,
+    from: Arc<D>,
     next: usize,
     samples: Cursor<Vec<u8>>,
 }

@@ -6,6 +6,7 @@ use crate::files::escaped;
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::Path;
+use std::sync::LazyLock;
 
 /// Longest name that is shown, characters, and most different ones that are kept.
 const MAX_NAME: usize = 64;
@@ -74,6 +75,15 @@ impl Key {
     pub(super) const fn new(name: &'static str, aspect: Aspect, done: Use) -> Key {
         Key { name, aspect, done }
     }
+}
+
+/// The keys of a format with many of them.
+pub(super) type Keys = LazyLock<Vec<Key>>;
+
+/// The keys of groups, in order. A group: names, divided by `|`, since some hold spaces, and what is common to them.
+pub(super) fn keys(groups: &[(&'static str, Aspect, Use)]) -> Vec<Key> {
+    let each = |&(names, aspect, done): &(&'static str, _, _)| names.split('|').map(move |n| Key::new(n, aspect, done));
+    groups.iter().flat_map(each).collect()
 }
 
 /// A row of a table of keys in docs/formats.md.

@@ -5,11 +5,10 @@ use super::keys::{Aspect, Key, Unused, Use};
 use super::layout::{Cartesian, Layout, LineOrder, StoredGeometry, extent};
 use super::packed::{InputFile, Pixels};
 use super::pixel::{Number, PixelFormat};
-use super::transforms::Poses;
 use crate::files::InputError;
 use crate::probe::file::SLAB;
 use crate::probe::{Advance, Array, Axis, AxisOrder, Grid, Motion, Probe, World};
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 use std::f64::consts::FRAC_PI_2;
 use std::io::{self, Read};
 use std::path::Path;
@@ -83,11 +82,8 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
     let path = file.path;
     let items = Items::walk(file)?;
     if items.wavelet {
-        return Err(InputError::new(
-            path,
-            "voxels",
-            "are wavelet-compressed, which is not read: export the volume uncompressed",
-        ));
+        let why = "are wavelet-compressed, which is not read: export the volume uncompressed";
+        return Err(InputError::new(path, "voxels", why));
     }
     let (samples, lines) = (items.count(SAMPLES, "samples")?, items.count(LINES, "lines")?);
     let frames = items.count(FRAMES, "frames")?;
@@ -112,23 +108,9 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
         true => file.pixels(offset),
         false => Pixels { length, ..file.pixels(offset) },
     };
-    let layout = Layout {
-        format: "Kretz volume",
-        pixel: PixelFormat::grey(Number::U8),
-        frame_size: [samples, lines],
-        frames: frames * volumes,
-        pixels,
-        line_order,
-        geometry,
-        backward,
-        volumes,
-        states_geometry: true,
-        poses: Poses::default(),
-        times: BTreeMap::new(),
-        synthetic: false,
-        remarks,
-        unused: items.unused,
-    };
+    let pixel = PixelFormat::grey(Number::U8);
+    let stated = Layout::new("Kretz volume", pixel, [samples, lines], frames * volumes, pixels, geometry);
+    let layout = Layout { line_order, backward, volumes, remarks, unused: items.unused, ..stated };
     layout.check(path, "C000 (size)")?;
     Ok(layout)
 }
@@ -198,11 +180,8 @@ impl<'a> Items<'a> {
             let mut unread = length;
             if READ_WHOLE.contains(&tag) && !items.small.contains_key(&tag) {
                 if length > MAX_TABLE_BYTES {
-                    return Err(InputError::new(
-                        path,
-                        name(tag, "item"),
-                        format!("has {length} bytes, which is too long"),
-                    ));
+                    let why = format!("has {length} bytes, which is too long");
+                    return Err(InputError::new(path, name(tag, "item"), why));
                 }
                 let mut bytes = Vec::new();
                 (&mut input).take(length).read_to_end(&mut bytes).map_err(unreadable)?;

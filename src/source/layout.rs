@@ -75,6 +75,34 @@ pub(super) struct Cartesian {
 }
 
 impl Layout {
+    /// The layout of one volume, or of several that `geometry` has, whose file states its geometry and nothing else.
+    pub fn new(
+        format: &'static str,
+        pixel: PixelFormat,
+        frame_size: [usize; 2],
+        frames: usize,
+        pixels: Pixels,
+        geometry: StoredGeometry,
+    ) -> Layout {
+        Layout {
+            format,
+            pixel,
+            frame_size,
+            frames,
+            pixels,
+            line_order: LineOrder::InOrder,
+            geometry,
+            backward: false,
+            volumes: 1,
+            states_geometry: true,
+            poses: Poses::default(),
+            times: BTreeMap::new(),
+            synthetic: false,
+            remarks: Vec::new(),
+            unused: Unused::default(),
+        }
+    }
+
     /// Size of a frame as `pixels` gives it, decompressed and in the type of `pixel`, bytes.
     pub fn frame_bytes(&self) -> u64 {
         self.frame_size[0] as u64 * self.frame_size[1] as u64 * self.pixel.bytes() as u64

@@ -11,7 +11,7 @@ pub mod cardiac;
 pub mod coarse;
 pub mod convert;
 mod data_files;
-mod describe;
+pub mod describe;
 mod dicom;
 mod drawn;
 pub mod formats;
@@ -54,7 +54,7 @@ mod value_range;
 pub mod volume_file;
 pub mod volume_sequence;
 
-use echolume_base::{files, memory, text, tree};
+use echolume_base::{files, memory, statistics, sync, text, tree};
 use echolume_probe as probe;
 
 pub use crate::files::InputError;

@@ -2,7 +2,7 @@
 
 use super::data_files::{self, Pattern};
 use super::frame::DEMO_DATA;
-use super::keys::{Aspect, Key, Stated, Unused, Use};
+use super::keys::{Aspect, Keys, Stated, Use, keys};
 use super::layout::{Layout, StoredGeometry, extent, warned};
 use super::packed::{Encoding, InputFile, Pixels};
 use super::pixel::{Number, PixelFormat};
@@ -100,23 +100,10 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
     }
     let times = header.frames.times(if header.dimensions() < 4 { 1 } else { depth }, frames);
     let poses = header.frames.poses(path, if header.dimensions() < 4 { 1 } else { depth }, &mut remarks);
-    let mut layout = Layout {
-        format,
-        pixel,
-        frame_size: [width, height],
-        frames,
-        pixels: file.pixels(header.length),
-        line_order: lines,
-        geometry,
-        backward: false,
-        volumes,
-        states_geometry,
-        poses,
-        times,
-        synthetic: header.synthetic,
-        remarks,
-        unused: Unused::default(),
-    };
+    let pixels = file.pixels(header.length);
+    let stated = Layout::new(format, pixel, [width, height], frames, pixels, geometry);
+    let (line_order, synthetic) = (lines, header.synthetic);
+    let mut layout = Layout { line_order, volumes, states_geometry, poses, times, synthetic, remarks, ..stated };
     find_pixels(file, &header, &mut layout)?;
     layout.check(path, "DimSize")?;
     layout.unused = header
@@ -374,57 +361,35 @@ const MAX_HEADER_LINES: usize = 500_000;
 
 /// The fields of a header that are read, and those of MetaIO that are not. The values of all others are skipped, so that no patient's name gets
 /// into a message.
-pub(super) static KEYS: [Key; 49] = [
-    Key::new("ObjectType", Aspect::Storage, Use::Used),
-    Key::new("NDims", Aspect::Geometry, Use::Used),
-    Key::new("DimSize", Aspect::Geometry, Use::Used),
-    Key::new("ElementType", Aspect::Storage, Use::Used),
-    Key::new("ElementNumberOfChannels", Aspect::Value, Use::Used),
-    Key::new("ElementSpacing", Aspect::Geometry, Use::Used),
-    Key::new("ElementSize", Aspect::Geometry, Use::Optional),
-    Key::new("DistanceUnits", Aspect::Geometry, Use::Used),
-    Key::new("Kinds", Aspect::Time, Use::Used),
-    Key::new("Offset", Aspect::Geometry, Use::Used),
-    Key::new("Position", Aspect::Geometry, Use::Used),
-    Key::new("Origin", Aspect::Geometry, Use::Used),
-    Key::new("TransformMatrix", Aspect::Orientation, Use::Used),
-    Key::new("Rotation", Aspect::Orientation, Use::Used),
-    Key::new("Orientation", Aspect::Orientation, Use::Used),
-    Key::new("AnatomicalOrientation", Aspect::Orientation, Use::Warned(&["RAI", "???"])),
-    Key::new("CenterOfRotation", Aspect::Geometry, Use::Warned(&["0"])),
-    Key::new("ElementToIntensityFunctionSlope", Aspect::Value, Use::Warned(&["1"])),
-    Key::new("ElementToIntensityFunctionOffset", Aspect::Value, Use::Warned(&["0"])),
-    Key::new("BinaryData", Aspect::Storage, Use::Used),
-    Key::new("BinaryDataByteOrderMSB", Aspect::Storage, Use::Used),
-    Key::new("ElementByteOrderMSB", Aspect::Storage, Use::Used),
-    Key::new("CompressedData", Aspect::Storage, Use::Used),
-    Key::new("CompressedDataSize", Aspect::Storage, Use::Used),
-    Key::new("HeaderSize", Aspect::Storage, Use::Used),
-    Key::new("HeaderSizePerSlice", Aspect::Storage, Use::Refused(&["0"])),
-    Key::new("ElementDataFile", Aspect::Storage, Use::Used),
-    Key::new("UltrasoundImageOrientation", Aspect::Orientation, Use::Used),
-    Key::new("UltrasoundImageType", Aspect::Value, Use::Used),
-    Key::new("IsTransducerConvex", Aspect::Geometry, Use::Optional),
-    Key::new("TransducerRadius", Aspect::Geometry, Use::Optional),
-    Key::new("ScanLinePitch", Aspect::Geometry, Use::Optional),
-    Key::new("MotorType", Aspect::Geometry, Use::Optional),
-    Key::new("MotorRadius", Aspect::Geometry, Use::Optional),
-    Key::new("FramePitch", Aspect::Geometry, Use::Optional),
-    Key::new("AxialResolution", Aspect::Geometry, Use::Optional),
-    Key::new(COMMENT, Aspect::About, Use::Used),
-    Key::new("ObjectSubType", Aspect::About, Use::Listed),
-    Key::new("Name", Aspect::About, Use::Listed),
-    Key::new("ID", Aspect::About, Use::Listed),
-    Key::new("ParentID", Aspect::About, Use::Listed),
-    Key::new("AcquisitionDate", Aspect::About, Use::Listed),
-    Key::new("Color", Aspect::About, Use::Listed),
-    Key::new("Modality", Aspect::About, Use::Listed),
-    Key::new("SequenceID", Aspect::About, Use::Listed),
-    Key::new("ElementMin", Aspect::About, Use::Listed),
-    Key::new("ElementMax", Aspect::About, Use::Listed),
-    Key::new("ElementNBits", Aspect::About, Use::Listed),
-    Key::new("CompressionLevel", Aspect::About, Use::Listed),
-];
+pub(super) static KEYS: Keys = Keys::new(|| {
+    keys(&[
+        ("ObjectType", Aspect::Storage, Use::Used),
+        ("NDims|DimSize", Aspect::Geometry, Use::Used),
+        ("ElementType", Aspect::Storage, Use::Used),
+        ("ElementNumberOfChannels", Aspect::Value, Use::Used),
+        ("ElementSpacing", Aspect::Geometry, Use::Used),
+        ("ElementSize", Aspect::Geometry, Use::Optional),
+        ("DistanceUnits", Aspect::Geometry, Use::Used),
+        ("Kinds", Aspect::Time, Use::Used),
+        ("Offset|Position|Origin", Aspect::Geometry, Use::Used),
+        ("TransformMatrix|Rotation|Orientation", Aspect::Orientation, Use::Used),
+        ("AnatomicalOrientation", Aspect::Orientation, Use::Warned(&["RAI", "???"])),
+        ("CenterOfRotation", Aspect::Geometry, Use::Warned(&["0"])),
+        ("ElementToIntensityFunctionSlope", Aspect::Value, Use::Warned(&["1"])),
+        ("ElementToIntensityFunctionOffset", Aspect::Value, Use::Warned(&["0"])),
+        ("BinaryData|BinaryDataByteOrderMSB|ElementByteOrderMSB|CompressedData", Aspect::Storage, Use::Used),
+        ("CompressedDataSize|HeaderSize", Aspect::Storage, Use::Used),
+        ("HeaderSizePerSlice", Aspect::Storage, Use::Refused(&["0"])),
+        ("ElementDataFile", Aspect::Storage, Use::Used),
+        ("UltrasoundImageOrientation", Aspect::Orientation, Use::Used),
+        ("UltrasoundImageType", Aspect::Value, Use::Used),
+        ("IsTransducerConvex|TransducerRadius|ScanLinePitch|MotorType|MotorRadius", Aspect::Geometry, Use::Optional),
+        ("FramePitch|AxialResolution", Aspect::Geometry, Use::Optional),
+        (COMMENT, Aspect::About, Use::Used),
+        ("ObjectSubType|Name|ID|ParentID|AcquisitionDate|Color|Modality|SequenceID", Aspect::About, Use::Listed),
+        ("ElementMin|ElementMax|ElementNBits|CompressionLevel", Aspect::About, Use::Listed),
+    ])
+});
 
 const SPACING: [&str; 2] = ["ElementSpacing", "ElementSize"];
 const ORIGIN: [&str; 3] = ["Offset", "Position", "Origin"];
@@ -636,10 +601,8 @@ fn prescan_probe(header: &Header, [samples, lines]: [usize; 2], frames: usize) -
             }
             "LinearMotor" => (Motion::Translated, Axis::centred(frame_pitch * MM, frames)),
             other => {
-                return header.fault(
-                    "MotorType",
-                    format!("{} is not read, only TiltingMotor and LinearMotor are", quoted(other)),
-                );
+                let why = format!("{} is not read, only TiltingMotor and LinearMotor are", quoted(other));
+                return header.fault("MotorType", why);
             }
         }
     };

@@ -1,11 +1,10 @@
 //! NIfTI-1 and NIfTI-2 (`.nii`, and `.hdr` with `.img`): a header of fixed size in either byte order, then samples. Its world is RAS; it
 //! becomes LPS.
 
-use super::keys::{Aspect, Key, Unused, Use, not_used};
-use super::layout::{Cartesian, Layout, LineOrder, StoredGeometry, extent, warned};
+use super::keys::{Aspect, Keys, Unused, Use, keys, not_used};
+use super::layout::{Cartesian, Layout, StoredGeometry, extent, warned};
 use super::packed::{Encoding, InputFile, Pixels};
 use super::pixel::{Number, PixelFormat};
-use super::transforms::Poses;
 use crate::files::InputError;
 use crate::probe::{AxisOrder, World};
 use glam::{DMat3, DVec3};
@@ -22,47 +21,24 @@ const MAX_FRAMES: u64 = 1 << 20;
 const TO_LPS: DVec3 = DVec3::new(-1.0, -1.0, 1.0);
 
 /// The fields of a NIfTI header and how they are treated. Text fields may hold a patient's name: none of their values is shown.
-pub(super) static KEYS: [Key; 39] = [
-    Key::new("sizeof_hdr", Aspect::Storage, Use::Used),
-    Key::new("magic", Aspect::Storage, Use::Used),
-    Key::new("dim", Aspect::Geometry, Use::Used),
-    Key::new("datatype", Aspect::Storage, Use::Used),
-    Key::new("bitpix", Aspect::Storage, Use::Used),
-    Key::new("vox_offset", Aspect::Storage, Use::Used),
-    Key::new("pixdim", Aspect::Geometry, Use::Used),
-    Key::new("xyzt_units", Aspect::Geometry, Use::Used),
-    Key::new("sform_code", Aspect::Orientation, Use::Used),
-    Key::new("srow_*", Aspect::Orientation, Use::Used),
-    Key::new("qform_code", Aspect::Orientation, Use::Used),
-    Key::new("quatern_*", Aspect::Orientation, Use::Optional),
-    Key::new("qoffset_*", Aspect::Geometry, Use::Optional),
-    Key::new("scl_slope", Aspect::Value, Use::Used),
-    Key::new("scl_inter", Aspect::Value, Use::Used),
-    Key::new("toffset", Aspect::Time, Use::Used),
-    Key::new("slice_start", Aspect::Time, Use::Listed),
-    Key::new("slice_end", Aspect::Time, Use::Listed),
-    Key::new("slice_code", Aspect::Time, Use::Listed),
-    Key::new("slice_duration", Aspect::Time, Use::Warned(&["0"])),
-    Key::new("dim_info", Aspect::About, Use::Listed),
-    Key::new("intent_code", Aspect::About, Use::Listed),
-    Key::new("intent_p1", Aspect::About, Use::Listed),
-    Key::new("intent_p2", Aspect::About, Use::Listed),
-    Key::new("intent_p3", Aspect::About, Use::Listed),
-    Key::new("intent_name", Aspect::About, Use::Listed),
-    Key::new("cal_max", Aspect::About, Use::Listed),
-    Key::new("cal_min", Aspect::About, Use::Listed),
-    Key::new("descrip", Aspect::About, Use::Listed),
-    Key::new("aux_file", Aspect::About, Use::Listed),
-    Key::new("extension", Aspect::About, Use::Listed),
-    Key::new("data_type", Aspect::About, Use::Listed),
-    Key::new("db_name", Aspect::About, Use::Listed),
-    Key::new("extents", Aspect::About, Use::Listed),
-    Key::new("session_error", Aspect::About, Use::Listed),
-    Key::new("regular", Aspect::About, Use::Listed),
-    Key::new("glmax", Aspect::About, Use::Listed),
-    Key::new("glmin", Aspect::About, Use::Listed),
-    Key::new("unused_str", Aspect::About, Use::Listed),
-];
+pub(super) static KEYS: Keys = Keys::new(|| {
+    keys(&[
+        ("sizeof_hdr|magic", Aspect::Storage, Use::Used),
+        ("dim", Aspect::Geometry, Use::Used),
+        ("datatype|bitpix|vox_offset", Aspect::Storage, Use::Used),
+        ("pixdim|xyzt_units", Aspect::Geometry, Use::Used),
+        ("sform_code|srow_*|qform_code", Aspect::Orientation, Use::Used),
+        ("quatern_*", Aspect::Orientation, Use::Optional),
+        ("qoffset_*", Aspect::Geometry, Use::Optional),
+        ("scl_slope|scl_inter", Aspect::Value, Use::Used),
+        ("toffset", Aspect::Time, Use::Used),
+        ("slice_start|slice_end|slice_code", Aspect::Time, Use::Listed),
+        ("slice_duration", Aspect::Time, Use::Warned(&["0"])),
+        ("dim_info|intent_code|intent_p1|intent_p2|intent_p3|intent_name|cal_max|cal_min", Aspect::About, Use::Listed),
+        ("descrip|aux_file|extension|data_type|db_name|extents|session_error|regular", Aspect::About, Use::Listed),
+        ("glmax|glmin|unused_str", Aspect::About, Use::Listed),
+    ])
+});
 
 /// Where the fields are that are not read: name, and offset and bytes in version 1 and in version 2, if they are there.
 const NOT_READ: [(&str, Place, Place); 23] = [
@@ -205,23 +181,12 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
         remarks.push(warned(path, "not used", text));
     }
     let world = world(file, &header, &mut remarks)?;
-    let mut layout = Layout {
-        format: if version == 1 { "NIfTI-1" } else { "NIfTI-2" },
-        pixel,
-        frame_size: [size[0], size[1]],
-        frames: frames as usize,
-        pixels: pixels(file, &header)?,
-        line_order: LineOrder::InOrder,
-        geometry: StoredGeometry::Cartesian(Cartesian { size, volumes, world, order: AxisOrder::STORED }),
-        backward: false,
-        volumes: 1,
-        states_geometry: true,
-        poses: Poses::default(),
-        times: times(file, &header, size[2], volumes, &mut remarks),
-        synthetic: false,
-        unused: unused(file, &header, &mut remarks),
-        remarks,
-    };
+    let format = if version == 1 { "NIfTI-1" } else { "NIfTI-2" };
+    let geometry = StoredGeometry::Cartesian(Cartesian { size, volumes, world, order: AxisOrder::STORED });
+    let stated = Layout::new(format, pixel, [size[0], size[1]], frames as usize, pixels(file, &header)?, geometry);
+    let times = times(file, &header, size[2], volumes, &mut remarks);
+    let unused = unused(file, &header, &mut remarks);
+    let mut layout = Layout { times, unused, remarks, ..stated };
     let claimed = layout.frame_bytes() * frames;
     if !layout.pixels.is_compressed() && layout.pixels.length > claimed {
         let more = layout.pixels.length - claimed;

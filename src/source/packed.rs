@@ -146,7 +146,7 @@ impl<'a> InputFile<'a> {
 }
 
 /// The location of the samples of a recording: a file and a range of its bytes, or [`Gathered`].
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub(super) struct Pixels {
     pub path: PathBuf,
     /// Offset in the file of the first byte that is read.
@@ -189,7 +189,7 @@ impl Pixels {
     /// The file cannot be read, or is cut short or corrupt.
     pub fn open(&self, skip: u64) -> io::Result<PixelStream> {
         if let Some(gathered) = &self.gathered {
-            return Ok(PixelStream::Packed(gathered.open(skip)?));
+            return Ok(PixelStream::Packed(gathered.clone().open(skip)?));
         }
         let mut file = CountedFile::open(&self.path)?;
         if !self.is_compressed() {

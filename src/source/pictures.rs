@@ -7,15 +7,13 @@ use image::metadata::Orientation;
 use image::{ImageDecoder, ImageReader};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 /// File name endings of the pictures of a stack, in lower case without the dot. A folder of such pictures is a recording.
 pub const ENDINGS: [&str; 7] = ["png", "jpg", "jpeg", "bmp", "pgm", "ppm", "pnm"];
 
 /// The picture files of a stack, in their order.
-#[derive(Clone, Debug)]
 pub(super) struct Pictures {
-    pub files: Arc<[PathBuf]>,
+    pub files: Vec<PathBuf>,
     /// True if at least one picture is in colour. All pictures are then read with three channels.
     pub is_colour: bool,
     /// Bytes of the samples of one picture.

@@ -32,12 +32,13 @@ use crate::Frame;
 use crate::SampleType;
 use crate::files::InputError;
 use crate::probe::{Geometry, Grid, ProbeFile, Volumes};
+use crate::sync::locked;
 use crate::tree::{FromNode, Node};
 use glam::DAffine3;
 use std::collections::VecDeque;
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::Path;
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -215,10 +216,8 @@ impl StreamHeader {
             None => {
                 let of_stream = keys.probe.map(|tables| ProbeFile::from_tables(Path::new(NAME), tables)).transpose()?;
                 let Some(file) = probe.or(of_stream) else {
-                    return fault(
-                        "probe",
-                        "is missing: neither it nor \"cartesian\" is there, and no probe file was given",
-                    );
+                    let why = "is missing: neither it nor \"cartesian\" is there, and no probe file was given";
+                    return fault("probe", why);
                 };
                 let (forward, backward, volumes) = geometries(&file, size, keys.both_ways, keys.speed_ratio)?;
                 (forward, backward, volumes, file.range())
@@ -281,15 +280,9 @@ impl StreamHeader {
         let (volume, number) = (index / each, (index % each) as usize);
         // The direction depends on the parity only.
         let backward = self.volumes.backward((volume % 2) as usize);
-        Frame {
-            volume: u32::try_from(volume).unwrap_or(u32::MAX),
-            number: number as u32,
-            slice: if backward { self.volumes.frames - 1 - number } else { number },
-            backward,
-            time,
-            pose: None,
-            bytes: Vec::new(),
-        }
+        let slice = if backward { self.volumes.frames - 1 - number } else { number };
+        let volume = u32::try_from(volume).unwrap_or(u32::MAX);
+        Frame { number: number as u32, backward, time, ..Frame::of_slice(volume, slice, Vec::new()) }
     }
 }
 
@@ -488,7 +481,7 @@ impl<'a, R: Read> Reader<'a, R> {
                 continue;
             }
             // Of a stream without any frame nothing would notice that nobody listens.
-            if self.queue.lock().closed {
+            if locked(&self.queue.state).closed {
                 return Ok(false);
             }
             let start = piped_record::next_start(&record);
@@ -584,13 +577,13 @@ impl Queue {
 
     /// Limit of the queued bytes. A single event is always queued.
     fn set_limit(&self, limit: usize) {
-        self.lock().limit = limit;
+        locked(&self.state).limit = limit;
     }
 
     /// Adds an event, waiting until it fits. False: the receiver was dropped.
     fn push(&self, event: Event) -> bool {
         let weight = weight(&event);
-        let mut state = self.lock();
+        let mut state = locked(&self.state);
         while !state.closed && !state.waiting.is_empty() && state.weight.saturating_add(weight) > state.limit {
             state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
         }
@@ -604,12 +597,12 @@ impl Queue {
 
     /// Ends the stream. The first reason is kept.
     fn end(&self, why: Option<String>) {
-        self.lock().end.get_or_insert(why);
+        locked(&self.state).end.get_or_insert(why);
         self.changed.notify_all();
     }
 
     fn close(&self) {
-        let mut state = self.lock();
+        let mut state = locked(&self.state);
         state.closed = true;
         state.waiting.clear();
         self.changed.notify_all();
@@ -617,7 +610,7 @@ impl Queue {
 
     fn next(&self, patience: Duration) -> Event {
         let started = Instant::now();
-        let mut state = self.lock();
+        let mut state = locked(&self.state);
         loop {
             if let Some((event, weight)) = state.waiting.pop_front() {
                 state.weight -= weight;
@@ -633,11 +626,6 @@ impl Queue {
             }
             state = self.changed.wait_timeout(state, left).unwrap_or_else(PoisonError::into_inner).0;
         }
-    }
-
-    fn lock(&self) -> MutexGuard<'_, State> {
-        // Nothing panics while it holds the lock.
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

@@ -1,11 +1,13 @@
 //! Pixels of files: number types, channels and scales, and the conversion to stored samples.
 
 use super::samples::{Replaced, store};
+use crate::tree::Name;
 use crate::{SampleType, StoredType};
 
-/// A number type in which files store samples.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Number {
+/// A number type in which files and messages have samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Name)]
+#[tree(rename_all = "lowercase")]
+pub enum Number {
     U8,
     I8,
     U16,
@@ -30,27 +32,12 @@ impl Number {
     }
 
     /// The type that samples have: the same, or the next larger one that is drawn.
-    fn sample(self) -> SampleType {
+    pub(super) fn sample(self) -> SampleType {
         match self {
             Number::U8 => SampleType::U8,
             Number::U16 => SampleType::U16,
             Number::I8 | Number::I16 => SampleType::I16,
             _ => SampleType::F32,
-        }
-    }
-
-    fn name(self) -> &'static str {
-        match self {
-            Number::U8 => "u8",
-            Number::I8 => "i8",
-            Number::U16 => "u16",
-            Number::I16 => "i16",
-            Number::U32 => "u32",
-            Number::I32 => "i32",
-            Number::U64 => "u64",
-            Number::I64 => "i64",
-            Number::F32 => "f32",
-            Number::F64 => "f64",
         }
     }
 

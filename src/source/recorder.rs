@@ -77,11 +77,8 @@ impl Writer {
         header.check().map_err(|(field, fault)| InputError::new(path, field, fault))?;
         let text = tree::to_json(&header).map_err(|e| InputError::new(path, "header", e.to_string()))?;
         if text.len() > MAX_HEADER_BYTES as usize {
-            return Err(InputError::new(
-                path,
-                "header",
-                format!("has {} bytes, at most {MAX_HEADER_BYTES}", text.len()),
-            ));
+            let why = format!("has {} bytes, at most {MAX_HEADER_BYTES}", text.len());
+            return Err(InputError::new(path, "header", why));
         }
         let file = private(OpenOptions::new().write(true).create_new(true))
             .open(path)
@@ -248,10 +245,8 @@ impl Reader {
             return Err(fault("version", format!("is {version}, this program reads {VERSION}")));
         }
         if size > MAX_HEADER_BYTES || u64::from(size) + 20 > length {
-            return Err(fault(
-                "header",
-                format!("claims {size} bytes; the file has {length}, a header at most {MAX_HEADER_BYTES}"),
-            ));
+            let why = format!("claims {size} bytes; the file has {length}, a header at most {MAX_HEADER_BYTES}");
+            return Err(fault("header", why));
         }
         let mut text = vec![0; size as usize + 4];
         file.read_exact(&mut text).map_err(unreadable)?;

@@ -71,11 +71,8 @@ impl Recording {
         let probe_file = choose_probe_file(path, options.probe, &mut layout)?;
         let is_cartesian = probe_file.is_none() && matches!(layout.geometry, StoredGeometry::Cartesian(_));
         if options.depth_axis.is_some() && !is_cartesian {
-            return Err(InputError::new(
-                path,
-                "--depth-axis",
-                "is for Cartesian volumes; the probe says where depth is",
-            ));
+            let why = "is for Cartesian volumes; the probe says where depth is";
+            return Err(InputError::new(path, "--depth-axis", why));
         }
         let stored_bytes = layout.pixel.sample().bytes();
         let mut remarks = Vec::from_iter(layout.pixel.remark().map(|text| ("pixels".to_string(), text)));
@@ -185,13 +182,7 @@ impl Recording {
             }
             let mut all = Vec::new();
             for _ in 0..stored[2] {
-                match self.read_frame() {
-                    Ok(bytes) => all.extend(bytes),
-                    Err(error) => {
-                        self.stream = None;
-                        return Err(error);
-                    }
-                }
+                all.extend(self.read_frame()?);
             }
             self.turned = Some((volume, order.reorder(&all, stored, width)));
         }
@@ -199,15 +190,8 @@ impl Recording {
         let whole = self.turned.as_ref().map(|(_, whole)| &whole[..]).unwrap_or_default();
         let bytes = whole.get(number * slice..(number + 1) * slice).unwrap_or_default().to_vec();
         self.next_drawn += 1;
-        Ok(Some(Frame {
-            volume: volume as u32,
-            number: number as u32,
-            slice: number,
-            backward: false,
-            time: self.layout.times.get(&(volume * stored[2])).copied(),
-            pose: None,
-            bytes,
-        }))
+        let time = self.layout.times.get(&(volume * stored[2])).copied();
+        Ok(Some(Frame { time, ..Frame::of_slice(volume as u32, number, bytes) }))
     }
 
     /// A description of the file for users: pairs of title and value. Never a patient's name or number.
@@ -264,6 +248,7 @@ impl Recording {
         Ok(())
     }
 
+    /// Reads the next frame of the file. After an error the file is opened again.
     fn read_frame(&mut self) -> Result<Vec<u8>, InputError> {
         let (index, size) = (self.next, self.layout.frame_bytes());
         let mut stream = match self.stream.take() {
@@ -423,13 +408,7 @@ impl Source for Recording {
         if index >= self.frames_to_read() {
             return Ok(None);
         }
-        let bytes = match self.read_frame() {
-            Ok(bytes) => bytes,
-            Err(error) => {
-                self.stream = None;
-                return Err(error);
-            }
-        };
+        let bytes = self.read_frame()?;
         let (volume, number) = (index / self.volumes.frames, index % self.volumes.frames);
         let backward = self.volumes.backward(volume);
         let (bytes, slice) = match &self.placement {
@@ -438,15 +417,9 @@ impl Source for Recording {
             }
             _ => (bytes, if backward { self.volumes.frames - 1 - number } else { number }),
         };
-        Ok(Some(Frame {
-            volume: volume as u32,
-            number: number as u32,
-            slice,
-            backward,
-            time: self.layout.times.get(&index).copied(),
-            pose: None,
-            bytes,
-        }))
+        let time = self.layout.times.get(&index).copied();
+        let frame = Frame::of_slice(volume as u32, slice, bytes);
+        Ok(Some(Frame { number: number as u32, backward, time, ..frame }))
     }
 
     fn is_synthetic(&self) -> bool {

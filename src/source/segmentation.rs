@@ -84,9 +84,7 @@ pub fn write(
             packed.write_all(&slice)?;
             each();
         }
-        let mut file = packed.finish()?;
-        file.finish()?;
-        file.rename()
+        packed.finish()?.complete()
     };
     write().map_err(|e| InputError::unwritable(path, &e))
 }

@@ -58,10 +58,8 @@ impl Sequence {
         let size = [probe.samples, probe.lines.len(), frames * kept.len()];
         let header = header(size, source.stored_type().into(), &comment(source.is_synthetic()), times);
         if header.len() > MAX_HEADER_BYTES {
-            return Err(fault(
-                "time stamps",
-                format!("make a header of {} bytes, at most {MAX_HEADER_BYTES} are written", header.len()),
-            ));
+            let why = format!("make a header of {} bytes, at most {MAX_HEADER_BYTES} are written", header.len());
+            return Err(fault("time stamps", why));
         }
         Ok(Sequence { kept, left_out, frames, header, probe: text })
     }

@@ -1,18 +1,16 @@
 //! Numbered pictures of one size as the slices of a Cartesian volume: those of a folder, or those that a pattern such as `slice-*.png` names.
 
 use super::keys::Unused;
-use super::layout::{Cartesian, Layout, LineOrder, StoredGeometry, extent, warned};
+use super::layout::{Cartesian, Layout, StoredGeometry, extent, warned};
 use super::packed::{Encoding, Pixels};
 use super::pictures::{About, ENDINGS, Pictures, beside_pixels};
 use super::pixel::{Number, PixelFormat};
-use super::transforms::Poses;
 use super::{OpenOptions, describe};
 use crate::files::{self, InputError, escaped, progress, quoted};
 use crate::probe::{AxisOrder, Grid, World};
 use crate::tree::{self, FromNode};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 /// Most files of a folder that are looked at.
 const MAX_FILES: usize = 1 << 20;
@@ -40,20 +38,17 @@ pub(super) fn read(path: &Path, options: &OpenOptions) -> Result<Layout, InputEr
     let fault = |field: &str, fault: String| InputError::new(path, field, fault);
     let (folder, names) = list(path)?;
     let order = order(&names).map_err(|why| fault("pictures", why))?;
-    let pictures: Arc<[PathBuf]> = order.into_iter().map(|n| folder.join(&names[n])).collect();
+    let pictures: Vec<PathBuf> = order.into_iter().map(|n| folder.join(&names[n])).collect();
     let (mut size, mut is_colour, mut is_turned, mut length) = (None, false, false, 0);
     progress::expect_files(pictures.len() as u64);
-    for picture in pictures.iter() {
+    for picture in &pictures {
         let about = About::of(picture).map_err(|why| InputError::new(picture, "file", why))?;
         progress::file_read();
         let ([width, height], deep) = *size.get_or_insert((about.size, about.deep));
         if about.size != [width, height] {
             let [a, b] = about.size;
-            return Err(InputError::new(
-                picture,
-                "picture",
-                format!("has {a} x {b} pixels, the first {width} x {height}"),
-            ));
+            let why = format!("has {a} x {b} pixels, the first {width} x {height}");
+            return Err(InputError::new(picture, "picture", why));
         }
         if about.deep != deep {
             return Err(InputError::new(picture, "picture", "has not as many bits a pixel as the first"));
@@ -103,23 +98,9 @@ pub(super) fn read(path: &Path, options: &OpenOptions) -> Result<Layout, InputEr
     remarks.push(("pictures".into(), format!("{} to {}", named(pictures.first()), named(pictures.last()))));
     let pixel = PixelFormat { channels: if is_colour { 3 } else { 1 }, ..PixelFormat::grey(number) };
     let pictures = Pictures { files: pictures, is_colour, each: frame_size[0] * frame_size[1] * pixel.bytes() };
-    let layout = Layout {
-        format: "stack of pictures",
-        pixel,
-        frame_size,
-        frames,
-        pixels: Pixels::gathered(path, Encoding::Pictures, length, pictures),
-        line_order: LineOrder::InOrder,
-        geometry,
-        backward: false,
-        volumes: 1,
-        states_geometry,
-        poses: Poses::default(),
-        times: BTreeMap::new(),
-        synthetic: false,
-        remarks,
-        unused,
-    };
+    let pixels = Pixels::gathered(path, Encoding::Pictures, length, pictures);
+    let stated = Layout::new("stack of pictures", pixel, frame_size, frames, pixels, geometry);
+    let layout = Layout { states_geometry, remarks, unused, ..stated };
     layout.check(path, "pictures")?;
     Ok(layout)
 }

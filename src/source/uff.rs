@@ -213,7 +213,9 @@ impl Beamformed {
 
     /// What the numbers are, by their signs, and the largest.
     fn measure(&self) -> Result<Scale, InputError> {
-        if matches!(&self.data, Data::Real(set) if set.dtype_is_byte()) {
+        if let Data::Real(set) = &self.data
+            && let hdf5_reader::Datatype::FixedPoint { size: 1, signed: false, .. } = set.dtype()
+        {
             return Ok(Scale::Grey);
         }
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -265,17 +267,6 @@ impl Beamformed {
                 Ok(real.into_iter().zip(imaginary).map(|(a, b)| a.hypot(b)).collect())
             }
         }
-    }
-}
-
-/// The type of a dataset, as far as it matters here.
-trait Kind {
-    fn dtype_is_byte(&self) -> bool;
-}
-
-impl Kind for Dataset {
-    fn dtype_is_byte(&self) -> bool {
-        matches!(self.dtype(), hdf5_reader::Datatype::FixedPoint { size: 1, signed: false, .. })
     }
 }
 

@@ -1,6 +1,6 @@
 //! Volume files that are written: MetaImage, NRRD, NIfTI-1 and DICOM, each with its voxel-to-world matrix. A file is complete or absent.
 
-use super::dicom::{DicomWriter, Form, MOST_BYTES};
+use super::dicom::{DicomWriter, MOST_BYTES};
 use crate::files::{InputError, Unfinished};
 use crate::probe::SampleType;
 use crate::probe::World;
@@ -41,11 +41,8 @@ impl VolumeFile {
             (".dcm", VolumeFile::Dicom { capture: false }),
         ];
         if stem(path, SEQUENCE).is_some() {
-            return Err(InputError::new(
-                path,
-                "file",
-                "is a sequence of volumes by its name, but one volume is written",
-            ));
+            let why = "is a sequence of volumes by its name, but one volume is written";
+            return Err(InputError::new(path, "file", why));
         }
         match formats.iter().find(|(ending, _)| name.ends_with(ending)) {
             Some((_, format)) => Ok(*format),
@@ -97,17 +94,14 @@ impl VolumeFile {
         size: [usize; 3],
         world: &World,
         sample: SampleType,
-    ) -> io::Result<VolumeWriter> {
+    ) -> io::Result<Box<dyn VolumeWriter>> {
         let file = Unfinished::create(path)?;
         if let VolumeFile::Dicom { capture } = self {
-            let form = Form { capture, width: sample.bytes() };
-            return Ok(VolumeWriter::Dicom(Box::new(DicomWriter::create(file, size, world, form)?)));
+            return Ok(Box::new(DicomWriter::create(file, size, world, capture, sample.bytes())?));
         }
-        let mut writer = match self {
-            VolumeFile::Nifti { packed: true } => {
-                VolumeWriter::Packed(Box::new(GzEncoder::new(file, Compression::default())))
-            }
-            _ => VolumeWriter::Plain(file),
+        let mut writer: Box<dyn VolumeWriter> = match self {
+            VolumeFile::Nifti { packed: true } => Box::new(GzEncoder::new(file, Compression::default())),
+            _ => Box::new(file),
         };
         writer.write_all(&self.header(size, world, sample))?;
         Ok(writer)
@@ -230,42 +224,28 @@ fn nifti(size: [usize; 3], world: &World, sample: SampleType) -> Vec<u8> {
 }
 
 /// A volume file that is being written.
-pub(super) enum VolumeWriter {
-    Plain(Unfinished),
-    Packed(Box<GzEncoder<Unfinished>>),
-    Dicom(Box<DicomWriter>),
-}
-
-impl VolumeWriter {
+pub(super) trait VolumeWriter: Write {
     /// Renames the complete file to its target.
     ///
     /// # Errors
     /// The file cannot be written.
-    pub fn finish(self) -> io::Result<()> {
-        let mut file = match self {
-            VolumeWriter::Plain(file) => file,
-            VolumeWriter::Packed(packed) => packed.finish()?,
-            VolumeWriter::Dicom(dicom) => return dicom.finish(),
-        };
-        file.finish()?;
-        file.rename()
+    fn complete(self: Box<Self>) -> io::Result<()>;
+}
+
+impl VolumeWriter for Unfinished {
+    fn complete(self: Box<Self>) -> io::Result<()> {
+        Unfinished::complete(*self)
     }
 }
 
-impl Write for VolumeWriter {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        match self {
-            VolumeWriter::Plain(file) => file.write(bytes),
-            VolumeWriter::Packed(packed) => packed.write(bytes),
-            VolumeWriter::Dicom(dicom) => dicom.write(bytes),
-        }
+impl VolumeWriter for GzEncoder<Unfinished> {
+    fn complete(self: Box<Self>) -> io::Result<()> {
+        self.finish()?.complete()
     }
+}
 
-    fn flush(&mut self) -> io::Result<()> {
-        match self {
-            VolumeWriter::Plain(file) => file.flush(),
-            VolumeWriter::Packed(packed) => packed.flush(),
-            VolumeWriter::Dicom(dicom) => dicom.flush(),
-        }
+impl VolumeWriter for DicomWriter {
+    fn complete(self: Box<Self>) -> io::Result<()> {
+        self.finish()
     }
 }

@@ -127,9 +127,7 @@ impl VolumeSequence {
             volume.write_samples(target, &mut packed).map_err(written)?;
             each();
         }
-        let mut file = packed.finish().map_err(written)?;
-        file.finish().map_err(written)?;
-        file.rename().map_err(written)
+        packed.finish().and_then(Unfinished::complete).map_err(written)
     }
 
     fn header(&self, target: &Target) -> String {

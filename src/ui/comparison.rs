@@ -313,7 +313,7 @@ impl Comparison {
                 Ok(Read::Volume(header, frames)) => {
                     other.is_synthetic = header.synthetic;
                     let frames = Frames { header: Some(header), frames };
-                    match Feed::waking(Box::new(frames), None, Some(self.wake.clone())) {
+                    match Feed::observed(Box::new(frames), None, Some(self.wake.clone()), None) {
                         Ok(feed) => compared.stream.replace_source(feed),
                         Err(fault) => news = Some(News::Fault(fault.to_string())),
                     }

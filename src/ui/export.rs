@@ -1,15 +1,13 @@
 //! Saves pictures, recordings and exports of the view in background threads. File names contain the time and nothing about the patient.
 
 use super::controls::Handiwork;
-use super::volume_export::{Export, Job, write_frames};
+use super::volume_export::{Export, Job};
 use crate::files;
 use crate::gpu::Wake;
-use crate::live::cine::CineVolume;
 use crate::picture::Picture;
 use crate::progress_lines::Progress;
 use crate::scene::Settings;
 use crate::segment::{Labels, files::write_segments};
-use crate::source::recorder::Header;
 use crate::source::segmentation::Segment;
 use crate::texts;
 use crate::workspace::{self, Origin};
@@ -92,10 +90,11 @@ impl Exporter {
         &mut self,
         make: impl FnOnce() -> Result<Picture, String> + Send + 'static,
     ) -> Result<(), String> {
-        self.keep(|own| own.save("png", Holds::Nothing, move |file| make()?.save(file)))
+        self.written("png", Holds::Nothing, move |file| make()?.save(file))
     }
 
-    /// Saves a file with this file name ending by `write`, which is called on a thread. `holds`: what it contains that would be lost otherwise.
+    /// Saves a file with this file name ending by `write`, which is called on a thread. The view waits for it before it ends. `holds`: what the file
+    /// contains that would be lost otherwise.
     ///
     /// # Errors
     /// Too many files are being saved, or no thread can be started.
@@ -105,7 +104,10 @@ impl Exporter {
         holds: Holds,
         write: impl FnOnce(&Path) -> Result<(), String> + Send + 'static,
     ) -> Result<(), String> {
-        self.keep(|own| own.save(ending, holds, write))
+        self.threads.retain(|thread| !thread.is_finished());
+        let thread = self.save(ending, holds, write)?;
+        self.threads.push(thread);
+        Ok(())
     }
 
     /// Saves a workspace. `labels`: those that are written beside it instead of the file that `origin` names, if any voxel has one; None: they
@@ -138,14 +140,6 @@ impl Exporter {
     /// Path of the folder of saved files.
     pub(super) fn folder(&self) -> &Path {
         &self.folder
-    }
-
-    /// Saves volumes as a `.frames` recording. `holds`: what it contains that would be lost otherwise.
-    ///
-    /// # Errors
-    /// Too many files are being saved, or no thread can be started.
-    pub(super) fn volumes(&mut self, header: Header, volumes: Vec<CineVolume>, holds: Holds) -> Result<(), String> {
-        self.keep(|own| own.save("frames", holds, move |file| write_frames(file, header, &volumes)))
     }
 
     /// Starts an export. Only one runs at a time.
@@ -191,14 +185,6 @@ impl Exporter {
         if let Some((_, export, _)) = &self.export {
             export.cancel();
         }
-    }
-
-    /// Begins to save. The view waits for it before it ends.
-    fn keep(&mut self, begin: impl FnOnce(&mut Exporter) -> Result<JoinHandle<()>, String>) -> Result<(), String> {
-        self.threads.retain(|thread| !thread.is_finished());
-        let thread = begin(self)?;
-        self.threads.push(thread);
-        Ok(())
     }
 
     fn save(
@@ -260,8 +246,10 @@ fn unused_name(folder: &Path, stamp: &str, number: u32, extension: &str) -> Path
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::live::cine::CineVolume;
     use crate::probe::{Geometry, Grid};
     use crate::source::StoredType;
+    use crate::source::recorder::Header;
     use crate::volume_export::FORMATS;
     use std::time::Duration;
 

@@ -1,8 +1,8 @@
 //! The pointer by keyboard ("mouse keys"): while it is on, keys move a pointer over the picture, click, and hold the left button. It produces the
 //! inputs of a mouse, so that every gesture can be made by keys.
 
-use super::command::HeldKeys;
 use super::input::{Button, Input, Key, Modifiers};
+use super::keys::HeldKeys;
 
 /// A step of the pointer, as a share of the shorter edge of the picture: from edge to edge in two seconds while a key repeats.
 const STEP: f64 = 0.02;

@@ -1,6 +1,6 @@
 //! The live volume on a screen, and the gestures that control it.
 //!
-//! - [`input`] is what a window, a touch screen or an input device reports. `gestures` and the keys of [`command`] turn inputs
+//! - [`input`] is what a window, a touch screen or an input device reports. `gestures` and `keys` turn inputs
 //!   into commands, and `controls` applies these to the settings.
 //! - [`console`] connects inputs, stream and screen. [`frame_budget`] keeps the time of a picture on the rungs of the
 //!   quality ladder, [`source_supervisor`] keeps the source open, [`recordings`] lists what else is open, [`export`] saves files (`volume_export` in the formats of other programs), and [`panels`] lays out what is
@@ -26,6 +26,7 @@ pub mod frame_budget;
 mod gestures;
 pub mod input;
 mod keyboard_pointer;
+mod keys;
 mod labelling;
 mod open_list;
 mod palette;
@@ -46,7 +47,7 @@ mod view;
 mod volume_export;
 pub mod window;
 
-use echolume_base::{files, picture, progress_lines, statistics, text};
+use echolume_base::{files, picture, progress_lines, statistics, sync, text, tree};
 use echolume_core::{mesh, passes, plan, scene};
 use echolume_lab::error_report;
 use echolume_segment as segment;

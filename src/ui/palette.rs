@@ -1,10 +1,10 @@
 //! Every command and control by name, for the search of the window.
 
-use crate::command::{self, Command, CompareView, InspectorTab, KEY_BINDINGS, Link};
+use crate::command::Command;
 use crate::controls::EXAMS;
 use crate::sliders::{GROUPS, SLIDERS};
-use crate::texts;
-use crate::texts::hints;
+use crate::texts::keys::{KEY_BINDINGS, WITHOUT_KEY, key_label};
+use crate::texts::{self, hints};
 use crate::volume_export::FORMATS;
 
 /// An entry in the search of all commands and controls.
@@ -18,37 +18,13 @@ pub(crate) struct Entry {
     pub command: Command,
 }
 
-/// What no key does.
-const WITHOUT_KEY: [(&str, &str, Command); 20] = [
-    (texts::VIEW_3D, texts::VIEW_3D_HINT, Command::Rendering),
-    (texts::EXCHANGE_LEFT_AND_RIGHT, texts::EXCHANGE_LEFT_AND_RIGHT_HINT, Command::ExchangeLeftAndRight),
-    (texts::SAVE_RESULTS, texts::SAVE_RESULTS_HINT, Command::SaveMeasures),
-    (texts::CLEAR_RESULTS, texts::CLEAR_HINT, Command::ClearMeasures),
-    (texts::CANCEL_EXPORT, texts::CANCEL_EXPORT_HINT, Command::CancelExport),
-    (texts::SAVES_BAR, texts::BAR_ON_SAVED_PICTURES_HINT, Command::SavesBar(true)),
-    (texts::SAVES_NO_BAR, texts::BAR_ON_SAVED_PICTURES_HINT, Command::SavesBar(false)),
-    (texts::REFERENCE_PICTURE_ON, texts::REFERENCE_PICTURE_HINT, Command::Reference(true)),
-    (texts::REFERENCE_PICTURE_OFF, texts::REFERENCE_PICTURE_HINT, Command::Reference(false)),
-    (texts::SIDES, texts::SIDES_HINT, Command::InspectorTab(InspectorTab::Marks)),
-    (texts::PROBE_MARKER, texts::SIDES_HINT, Command::InspectorTab(InspectorTab::Marks)),
-    (texts::MEASUREMENTS, texts::TAB_MEASURE_HINT, Command::InspectorTab(InspectorTab::Measure)),
-    (texts::COLOUR, texts::COLOUR_HINT, Command::InspectorTab(InspectorTab::Look)),
-    (texts::OPACITY_OF, texts::OPACITY_OF_HINT, Command::InspectorTab(InspectorTab::Look)),
-    (texts::FIND_TILES, texts::COMPARED_TILES_HINT, Command::CompareView(CompareView::Tiles)),
-    (texts::FIND_DIFFERENCE, texts::COMPARED_DIFFERENCE_HINT, Command::CompareView(CompareView::Difference)),
-    (texts::FIND_WIPE, texts::COMPARED_WIPE_HINT, Command::CompareView(CompareView::Wipe)),
-    (texts::FIND_FURTHER, texts::ADD_COMPARED_HINT, Command::CompareFurther),
-    (texts::FIND_ALIGN, texts::ALIGN_HINT, Command::Align),
-    (texts::FIND_LINK_LOOK, texts::LINK_LOOK_HINT, Command::ToggleLink(Link::Look)),
-];
-
 /// All entries of the search: commands, presets, export formats, controls.
 pub(crate) fn entries() -> impl Iterator<Item = Entry> {
     // A key beside another for the same is not told.
     let is_first = |n: &usize| !KEY_BINDINGS[..*n].iter().any(|other| other.command == KEY_BINDINGS[*n].command);
     let by_key = (0..KEY_BINDINGS.len()).filter(is_first).map(|n| {
         let binding = &KEY_BINDINGS[n];
-        let (name, key) = (capitalised(binding.description), command::key_label(binding));
+        let (name, key) = (capitalised(binding.description), key_label(binding));
         Entry { name, about: about(binding.command).into(), key, command: binding.command }
     });
     let entry = |name: &str, about: &str, command| Entry {

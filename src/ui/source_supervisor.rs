@@ -139,7 +139,8 @@ impl SourceSupervisor {
         let feed = opened.and_then(|source| {
             // Each source gets its own file: none is overwritten.
             let record = self.record.as_deref().map(unused_name);
-            Feed::waking(source, record.as_deref(), Some(self.wake.clone())).map_err(texts::why_no_thread_for_source)
+            let feed = Feed::observed(source, record.as_deref(), Some(self.wake.clone()), None);
+            feed.map_err(texts::why_no_thread_for_source)
         });
         match feed {
             Ok(feed) => {

@@ -7,13 +7,16 @@ use crate::live::cine::CineVolume;
 use crate::progress_lines::{self, Progress};
 use crate::scene::Measurement;
 use crate::source::recorder::{Header, Writer};
+use crate::sync::locked;
 use crate::text::printable;
 use crate::texts;
 use crate::workspace::{self, Origin};
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::atomic::AtomicBool;
+use std::sync::atomic::Ordering::Relaxed;
+use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::Duration;
 
@@ -31,23 +34,6 @@ const RECORDING: &str = "volume.frames";
 /// Thickness of the base of a relief, mm.
 const BASE: &str = "3";
 
-impl Format {
-    /// True if all volumes between the marks of the cine loop are exported, false if only the shown one is.
-    pub(super) fn takes_the_loop(&self) -> bool {
-        self.work == Work::Loop
-    }
-
-    /// True if it is written from the recording itself: a report names that.
-    pub(super) fn is_report(&self) -> bool {
-        self.work == Work::Report
-    }
-
-    /// True if it has the labels instead of the echoes.
-    pub(super) fn is_of_labels(&self) -> bool {
-        self.work == Work::Labels
-    }
-}
-
 /// A format in the menu of exports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Format {
@@ -55,20 +41,23 @@ pub struct Format {
     pub hint: &'static str,
     /// File name ending; for a series of pictures that of its folder.
     pub(super) ending: &'static str,
-    work: Work,
+    pub(super) work: Work,
 }
 
+/// How a format is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Work {
+pub(super) enum Work {
     Convert,
     Mesh,
     Relief,
     Turntable,
+    /// All volumes between the marks of the cine loop.
     Loop,
     /// A picture whose longer edge has this number of pixels.
     Picture(u32),
     /// The measurements of the recording, and the JSON that makes the report again.
     Report,
+    /// The labels instead of the echoes.
     Labels,
 }
 
@@ -99,38 +88,29 @@ pub const FORMATS: &[Format] = &[
 /// An export in progress.
 #[derive(Debug, Default)]
 pub(super) struct Export {
-    state: Mutex<State>,
+    is_cancelled: AtomicBool,
+    is_finished: AtomicBool,
     /// The progress that the process reported last.
     progress: Arc<Mutex<Option<Progress>>>,
 }
 
-#[derive(Debug, Default)]
-struct State {
-    is_cancelled: bool,
-    is_finished: bool,
-}
-
 impl Export {
-    fn lock(&self) -> MutexGuard<'_, State> {
-        lock(&self.state)
-    }
-
     /// Cancels the export. Nothing of it is left.
     pub(super) fn cancel(&self) {
-        self.lock().is_cancelled = true;
+        self.is_cancelled.store(true, Relaxed);
     }
 
     pub(super) fn finish(&self) {
-        self.lock().is_finished = true;
+        self.is_finished.store(true, Relaxed);
     }
 
     pub(super) fn is_finished(&self) -> bool {
-        self.lock().is_finished
+        self.is_finished.load(Relaxed)
     }
 
     /// The progress that the export has reported last; None before it has reported any.
     pub(super) fn progress(&self) -> Option<Progress> {
-        *lock(&self.progress)
+        *locked(&self.progress)
     }
 
     /// Exports the volumes of a job to `file`, which must not exist. The file is complete or not written.
@@ -143,13 +123,15 @@ impl Export {
         let beside = file.parent().unwrap_or(Path::new("."));
         let folder = WorkFolder::new(beside, ".echolume-export-")?;
         let recording = folder.path().join(RECORDING);
-        if !job.format.is_report() {
+        let is_report = job.format.work == Work::Report;
+        // A report names the recording itself.
+        if !is_report {
             write_frames(&recording, job.header.clone(), &job.volumes)?;
         }
         let made = folder.path().join(format!("out.{}", job.format.ending));
         self.process(&mut job.command(&recording, &made)?, &|| signals.signal().is_some())?;
         let moved = |ending: &str| std::fs::rename(made.with_extension(ending), file.with_extension(ending));
-        let json = if job.format.is_report() { moved("json") } else { Ok(()) };
+        let json = if is_report { moved("json") } else { Ok(()) };
         json.and_then(|()| std::fs::rename(&made, file)).map_err(|e| format!("{}: {e}", file.display()))
     }
 
@@ -180,7 +162,7 @@ impl Export {
     /// Waits for the process, and ends it where it has to stop.
     fn wait(&self, child: &mut Child, must_stop: &dyn Fn() -> bool) -> Result<ExitStatus, String> {
         loop {
-            if self.lock().is_cancelled || must_stop() {
+            if self.is_cancelled.load(Relaxed) || must_stop() {
                 // It may have ended by itself.
                 let _ = child.kill();
                 let _ = child.wait();
@@ -206,7 +188,7 @@ fn listen(messages: impl Read, progress: &Mutex<Option<Progress>>) -> String {
     // A line of any length is read in pieces; a full pipe would block the process.
     while (&mut messages).take(MAX_LINE).read_until(b'\n', &mut line).is_ok_and(|read| read > 0) {
         match std::str::from_utf8(&line).ok().and_then(|line| progress_lines::parse(line.trim_end())) {
-            Some(found) => *lock(progress) = Some(found),
+            Some(found) => *locked(progress) = Some(found),
             None => said.extend(&line),
         }
         // The last words say why.
@@ -214,10 +196,6 @@ fn listen(messages: impl Read, progress: &Mutex<Option<Progress>>) -> String {
         line.clear();
     }
     String::from_utf8_lossy(&said).into_owned()
-}
-
-fn lock<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {
-    shared.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Writes volumes as a `.frames` recording. The file is complete or not written.
@@ -244,7 +222,7 @@ pub(super) fn write_frames(file: &Path, header: Header, volumes: &[CineVolume]) 
 pub(super) struct Job {
     pub(super) format: Format,
     pub(super) header: Header,
-    /// The shown volume, or all volumes between the marks of the cine loop ([`Format::takes_the_loop`]).
+    /// The shown volume, or all volumes between the marks of the cine loop for [`Work::Loop`].
     pub(super) volumes: Vec<CineVolume>,
     /// Rate at which the cine loop is played, volumes a second.
     pub(super) rate: f64,
@@ -260,51 +238,35 @@ impl Job {
     fn command(&self, recording: &Path, made: &Path) -> Result<Command, String> {
         let program = std::env::current_exe().map_err(texts::why_no_program)?;
         let mut command = Command::new(program);
+        let mut of_workspace = |name: &str, more: &[&str]| {
+            command.arg(name).arg(self.workspace(recording)?).args(more);
+            command.args(["--device", &self.device, "-o"]).arg(self.output(made));
+            Ok::<(), String>(())
+        };
         match self.format.work {
-            Work::Convert => command.arg("convert").args([recording, made]),
-            Work::Mesh => command.arg("mesh").args([recording, made]),
-            Work::Relief => command.arg("mesh").args([recording, made]).args(["--base", BASE]),
             Work::Picture(edge) => {
-                let scene = self.workspace(recording)?;
                 let [width, height] = enlarged(self.settings.picture.size, edge);
-                command
-                    .arg("render")
-                    .arg(scene)
-                    .args(["--size", &format!("{width}x{height}"), "--device", &self.device, "-o"])
-                    .arg(made)
+                of_workspace("render", &["--size", &format!("{width}x{height}")])?;
             }
-            Work::Report => {
-                let scene = self.workspace(recording)?;
-                command.arg("worksheet").arg(scene).args(["--device", &self.device, "-o"]).arg(made)
+            Work::Report => of_workspace("worksheet", &[])?,
+            Work::Turntable => of_workspace("render", &["--turntable", TURNTABLE])?,
+            Work::Loop if self.format.ending == "mp4" => {
+                let rate = self.rate.clamp(FILM_RATES[0], FILM_RATES[1]).to_string();
+                of_workspace("render", &["--volumes", "loop", "--rate", &rate])?;
             }
+            Work::Loop => of_workspace("render", &["--volumes", "loop"])?,
+            Work::Convert => _ = command.arg("convert").args([recording, made]),
+            Work::Mesh => _ = command.arg("mesh").args([recording, made]),
+            Work::Relief => _ = command.arg("mesh").args([recording, made]).args(["--base", BASE]),
             // It is no work of a process.
             Work::Labels => return Err(texts::WHY_NO_LABELS.into()),
-            Work::Turntable => {
-                let scene = self.workspace(recording)?;
-                let series = ["--turntable", TURNTABLE].map(String::from);
-                command
-                    .arg("render")
-                    .arg(scene)
-                    .args(series)
-                    .args(["--device", &self.device, "-o"])
-                    .arg(self.series(made))
-            }
-            Work::Loop => {
-                let scene = self.workspace(recording)?;
-                command.arg("render").arg(scene).args(["--volumes", "loop"]);
-                // Pictures have no rate.
-                if self.format.ending == "mp4" {
-                    command.args(["--rate", &self.rate.clamp(FILM_RATES[0], FILM_RATES[1]).to_string()]);
-                }
-                command.args(["--device", &self.device, "-o"]).arg(self.series(made))
-            }
-        };
+        }
         Ok(command)
     }
 
     /// A folder of pictures has to end like one.
-    fn series(&self, made: &Path) -> PathBuf {
-        if self.format.ending == "mp4" { made.to_path_buf() } else { made.join("") }
+    fn output(&self, made: &Path) -> PathBuf {
+        if matches!(self.format.ending, "turntable" | "loop") { made.join("") } else { made.to_path_buf() }
     }
 
     fn workspace(&self, recording: &Path) -> Result<PathBuf, String> {

@@ -19,6 +19,7 @@ use winit::platform::modifier_supplement::KeyEventExtModifierSupplement;
 use winit::window::{Fullscreen, Window, WindowId};
 
 /// How the window is opened.
+#[derive(Default)]
 pub struct WindowOptions {
     /// Width and height of the window, pixels.
     pub size: [u32; 2],
@@ -350,19 +351,11 @@ fn key(logical: &LogicalKey) -> Option<Key> {
             NamedKey::PageDown => Key::PageDown,
             NamedKey::Home => Key::Home,
             NamedKey::End => Key::End,
-            NamedKey::F1 => Key::Function(1),
-            NamedKey::F2 => Key::Function(2),
-            NamedKey::F3 => Key::Function(3),
-            NamedKey::F4 => Key::Function(4),
-            NamedKey::F5 => Key::Function(5),
-            NamedKey::F6 => Key::Function(6),
-            NamedKey::F7 => Key::Function(7),
-            NamedKey::F8 => Key::Function(8),
-            NamedKey::F9 => Key::Function(9),
-            NamedKey::F10 => Key::Function(10),
-            NamedKey::F11 => Key::Function(11),
-            NamedKey::F12 => Key::Function(12),
-            _ => return None,
+            named => {
+                use NamedKey::{F1, F2, F3, F4, F5, F6, F7, F8, F9, F10, F11, F12};
+                let before = [F1, F2, F3, F4, F5, F6, F7, F8, F9, F10, F11, F12].iter().position(|f| f == named)?;
+                Key::Function(before as u8 + 1)
+            }
         },
         _ => return None,
     })

@@ -138,16 +138,7 @@ pub fn compare_outputs(
         else {
             continue;
         };
-        let (texel, [w, h, _]) = (i / expected.channels, expected.size);
-        all.worst = Some(Worst {
-            output: bind.name.into(),
-            at: [texel % w, texel / w % h, texel / w / h],
-            channel: i % expected.channels,
-            expected: e,
-            got: g,
-            beyond,
-            texels: expected.values.len(),
-        });
+        all.worst = Some(Worst { beyond, ..Worst::of(bind.name, expected, i, [e, g]) });
     }
     all
 }
@@ -240,8 +231,7 @@ pub fn compare_picture(findings: &mut Findings, input: &str, expected: &Picture,
     findings.figures.push(Figure::error("mean difference", apart.mean, MAX_MEAN, Unit::Levels));
     findings.figures.push(Figure::error("values further off than 8 levels", apart.far, MAX_FAR_SHARE, Unit::Share));
     findings.figures.push(Figure::error("pixels of a tile that are", apart.tile, MAX_TILE_SHARE, Unit::Share));
-    let largest = Figure::error("largest difference", apart.largest.into(), 0.0, Unit::Levels);
-    findings.figures.push(Figure { allowed: None, ..largest });
+    findings.figures.push(Figure::informative("largest difference", apart.largest.into(), Unit::Levels));
 }
 
 /// Adds a fault unless two pictures are identical byte for byte. Returns true if they are. `what`: name of the comparison.
@@ -266,10 +256,8 @@ pub fn expect_same_picture(findings: &mut Findings, what: &str, expected: &Pictu
 
 /// Records as figures how many pictures were compared, and how many of them differ; any that differs is above the limit.
 pub(crate) fn add_picture_counts(findings: &mut Findings, compared: usize, differ: usize) {
-    let figure =
-        |what: &str, value: usize, allowed| Figure { allowed, ..Figure::error(what, value as f64, 0.0, Unit::Count) };
-    findings.figures.push(figure("pictures compared", compared, None));
-    findings.figures.push(figure("pictures that differ", differ, Some(0.0)));
+    findings.figures.push(count_figure("pictures compared", compared));
+    findings.figures.push(Figure::error("pictures that differ", differ as f64, 0.0, Unit::Count));
 }
 
 /// A comparison picture of one slice of two arrays, with the same grey scale: values of 0..1 as they are, others from the smallest to the largest
@@ -328,5 +316,5 @@ pub(crate) fn picture_comparison(what: &str, expected: &Picture, got: &Picture) 
 
 /// A count that is reported without a limit.
 pub(crate) fn count_figure(what: &str, value: usize) -> Figure {
-    Figure { allowed: None, ..Figure::error(what, value as f64, 0.0, Unit::Count) }
+    Figure::informative(what, value as f64, Unit::Count)
 }

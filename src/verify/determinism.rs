@@ -2,13 +2,13 @@
 //! of queues, with frames in any order, and with any number of threads of a software device.
 
 use super::built_in::Noise;
-use super::compare::{add_picture_counts, expect_same_picture};
+use super::compare::{add_picture_counts, count_figure, expect_same_picture};
 use super::render::Drawn;
 use super::{Check, DeviceUnderTest, Findings, IsolatedContext, render};
 use crate::gpu::{Context, GpuError, Renderer, RendererOptions};
 use crate::passes::Slot;
 use crate::picture::Picture;
-use crate::report::{Fault, Figure, Level, Unit};
+use crate::report::{Fault, Level};
 use crate::source::igtl::crc64;
 use std::fmt::Write as _;
 use std::io::Read;
@@ -17,24 +17,17 @@ use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// The order in which the frames of a volume are sent.
-#[derive(Clone, Copy)]
-enum FrameOrder {
-    InOrder,
-    /// In random order.
-    Shuffled,
-}
-
 /// How pictures are rendered.
 #[derive(Clone, Copy)]
 struct RenderVariant {
     queues: Option<usize>,
     /// Number of volume images: the last one is rendered, the others hold another volume.
     images: u32,
-    order: FrameOrder,
+    /// True if the frames of a volume are sent in random order.
+    shuffled: bool,
 }
 
-const PLAIN: RenderVariant = RenderVariant { queues: Some(1), images: 1, order: FrameOrder::InOrder };
+const PLAIN: RenderVariant = RenderVariant { queues: Some(1), images: 1, shuffled: false };
 
 pub fn checks(level: Level) -> Vec<Check> {
     let of = |name: &str, own: bool, variant: RenderVariant| {
@@ -42,8 +35,8 @@ pub fn checks(level: Level) -> Vec<Check> {
     };
     let mut checks = vec![
         Check::new("determinism", "again in one renderer", again),
-        of("another renderer, frames in another order", false, RenderVariant { order: FrameOrder::Shuffled, ..PLAIN }),
-        of("another context, frames in another order", true, RenderVariant { order: FrameOrder::Shuffled, ..PLAIN }),
+        of("another renderer, frames in another order", false, RenderVariant { shuffled: true, ..PLAIN }),
+        of("another context, frames in another order", true, RenderVariant { shuffled: true, ..PLAIN }),
         of("three queues, three volume images", true, RenderVariant { queues: Some(3), images: 3, ..PLAIN }),
     ];
     if level == Level::Full {
@@ -55,7 +48,7 @@ pub fn checks(level: Level) -> Vec<Check> {
             of(
                 "three volume images, frames in another order",
                 false,
-                RenderVariant { images: 3, order: FrameOrder::Shuffled, ..PLAIN },
+                RenderVariant { images: 3, shuffled: true, ..PLAIN },
             ),
         ]);
     }
@@ -76,10 +69,7 @@ fn send(renderer: &mut Renderer, of: &Drawn, variant: RenderVariant) -> Result<(
     let mut left: Vec<usize> = (0..of.frames.len()).rev().collect();
     let mut noise = Noise(7);
     while !left.is_empty() {
-        let next = match variant.order {
-            FrameOrder::InOrder => left.len() - 1,
-            FrameOrder::Shuffled => (noise.next() * left.len() as f64) as usize,
-        };
+        let next = if variant.shuffled { (noise.next() * left.len() as f64) as usize } else { left.len() - 1 };
         let slice = left.swap_remove(next);
         let bytes = of.frames[slice].encode(format);
         renderer.frame(slice as u32, &bytes, image)?;
@@ -202,8 +192,7 @@ fn threads(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
             }
         }
     }
-    let figure = Figure::error("numbers of threads compared", f64::from(compared), 0.0, Unit::Count);
-    findings.figures.push(Figure { allowed: None, ..figure });
+    findings.figures.push(count_figure("numbers of threads compared", compared));
     Ok(findings)
 }
 

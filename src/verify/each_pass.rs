@@ -55,16 +55,29 @@ pub fn run_with_reference(
     let args = dispatch_args_of(scene, pass, iteration);
     let inputs = inputs_of(scene, pass, &args, kind, seed);
     let writes = pass.writes(scene, &args);
-    let mut expected = Arrays::default();
-    for bind in &writes {
-        let channels = bind.slot.format(scene).channels();
-        expected.insert(bind.name, Texels::untouched(bind.slot.array_size(scene), channels));
-    }
+    let mut expected = untouched(scene, pass, &args);
     pass.expected(scene, &args, &inputs, &mut expected);
     let extra = ExtraTolerance::of(pass, scene, &args, runner.filter_bits());
     let got = runner.run(scene, pass, &args, &inputs, POISON)?;
     let comparison = compare_outputs(pass, scene, extra, POISON, &expected, &got, &writes);
     Ok(DispatchComparison { inputs, expected, got, writes, comparison })
+}
+
+/// Arrays for all that a pass writes, in which no texel has been written.
+pub(super) fn untouched(scene: &Scene, pass: &Pass, args: &DispatchArgs) -> Arrays {
+    let mut outputs = Arrays::default();
+    for bind in pass.writes(scene, args) {
+        let channels = bind.slot.format(scene).channels();
+        outputs.insert(bind.name, Texels::untouched(bind.slot.array_size(scene), channels));
+    }
+    outputs
+}
+
+/// What the reference of a pass computes from inputs.
+fn made_by_reference(scene: &Scene, pass: &Pass, args: &DispatchArgs, inputs: &Arrays) -> Arrays {
+    let mut outputs = untouched(scene, pass, args);
+    pass.reference(scene, args, inputs, &mut outputs);
+    outputs
 }
 
 /// The checks of the group "passes": one for each pass.
@@ -240,14 +253,7 @@ impl PassSummary {
         let PassSummary { mut findings, runs, failed, largest, used, outliers, bias } = self;
         findings.expect(runs > 0, || format!("no scene needs '{}'", pass.name));
         findings.expect(failed <= MAX_FAULTS, || format!("{} more inputs beyond tolerance", failed - MAX_FAULTS));
-        findings.figures.push(Figure {
-            what: "largest error".into(),
-            value: largest,
-            allowed: None,
-            unit: Unit::Value,
-            samples: Vec::new(),
-            fleeting: false,
-        });
+        findings.figures.push(Figure::informative("largest error", largest, Unit::Value));
         findings.figures.push(Figure::error("share of the tolerance", used, 1.0, Unit::Share));
         findings.figures.push(Figure::error("texels beyond it", outliers, pass.tolerance.outliers, Unit::Share));
         findings.figures.push(Figure::error("mean error, share of the tolerance", bias, MAX_BIAS, Unit::Share));
@@ -366,16 +372,12 @@ fn empty_space_of(scene: &Scene, slot: Slot, volume: &Texels) -> Texels {
     };
     for step in Plan::new(scene).steps.iter().filter(|s| made(s.pass.name)) {
         let args = DispatchArgs { slices: scene.slices(), ..step.args() };
-        let (mut inputs, mut outputs) = (Arrays::default(), Arrays::default());
+        let mut inputs = Arrays::default();
         for bind in step.pass.reads(scene, &args) {
             let there = slots.get(&bind.slot).cloned();
             inputs.insert(bind.name, there.unwrap_or_else(|| input(scene, &bind, args.slices, "zero", &mut Noise(1))));
         }
-        for bind in step.pass.writes(scene, &args) {
-            let channels = bind.slot.format(scene).channels();
-            outputs.insert(bind.name, Texels::untouched(bind.slot.array_size(scene), channels));
-        }
-        step.pass.reference(scene, &args, &inputs, &mut outputs);
+        let outputs = made_by_reference(scene, step.pass, &args, &inputs);
         for bind in step.pass.writes(scene, &args) {
             slots.insert(bind.slot, outputs.get(bind.name).clone());
         }
@@ -418,12 +420,7 @@ pub fn inputs_of(scene: &Scene, pass: &Pass, args: &DispatchArgs, kind: &str, se
         // The list of the pixels whose errors are too large.
         let mut of_lattice = inputs_of(scene, &tolerance::ENLARGE, args, kind, seed);
         for pass in [tolerance::ENLARGE, tolerance::LIST] {
-            let mut outputs = Arrays::default();
-            for bind in pass.writes(scene, args) {
-                let channels = bind.slot.format(scene).channels();
-                outputs.insert(bind.name, Texels::untouched(bind.slot.array_size(scene), channels));
-            }
-            pass.reference(scene, args, &of_lattice, &mut outputs);
+            let outputs = made_by_reference(scene, &pass, args, &of_lattice);
             for bind in pass.writes(scene, args) {
                 of_lattice.insert(bind.name, outputs.get(bind.name).clone());
             }
@@ -433,11 +430,8 @@ pub fn inputs_of(scene: &Scene, pass: &Pass, args: &DispatchArgs, kind: &str, se
         }
     }
     if reads.iter().any(|b| b.slot == Slot::PackedNeighbours) {
-        let mut packed = Arrays::default();
-        let channels = Slot::PackedNeighbours.format(scene).channels();
-        packed.insert("packed_neighbours", Texels::untouched(Slot::PackedNeighbours.array_size(scene), channels));
         let all = DispatchArgs { slices: scene.slices(), ..DispatchArgs::default() };
-        PACKED_NEIGHBOURS.reference(scene, &all, &inputs, &mut packed);
+        let packed = made_by_reference(scene, &PACKED_NEIGHBOURS, &all, &inputs);
         inputs.insert("packed_neighbours", packed.get("packed_neighbours").clone());
     }
     inputs

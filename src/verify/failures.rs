@@ -4,11 +4,11 @@
 
 use super::built_in::{BYTES, FLOATS, frames, scene, wall, wobbler};
 use super::compare::{count_figure, expect_same_picture};
+use super::render::Drawn;
 use super::{Check, DeviceUnderTest, Findings, IsolatedContext, render};
 use crate::gpu::faults::{InjectedFailure, InjectionPoint};
 use crate::gpu::{Context, GpuError, Renderer, RendererOptions};
-use crate::passes::{Slot, Texels};
-use crate::picture::Picture;
+use crate::passes::Slot;
 use crate::probe::{Geometry, Grid};
 use crate::queues::MAX_QUEUES;
 use crate::report::{Fault, Figure, Level, Unit, Worst};
@@ -31,28 +31,35 @@ pub fn checks(_: Level) -> Vec<Check> {
     ]
 }
 
-/// A scene with passes of every stage, its frames and its expected picture.
-struct RenderCase {
-    scene: Scene,
-    frames: Vec<Texels>,
-    picture: Picture,
-}
-
 const SMALL: &str = "mode = 'sr'\npicture = { size = [16, 16] }\nslices = { pixels = 20 }\ndistance = { median = 3 }";
 const LARGER: &str = "mode = 'sr'\npicture = { size = [24, 20] }\nslices = { pixels = 26, median = true }\n\
                       distance = { median = 3, bilateral = { pixels = 1.0, distance = 1.0 } }";
 
-fn case(context: &Arc<Context>, toml: &str) -> Result<RenderCase, GpuError> {
+/// A scene with passes of every stage, and its expected picture.
+fn case(context: &Arc<Context>, toml: &str) -> Result<Drawn, GpuError> {
     let scene = scene(Geometry::Sweep(wobbler()), BYTES, toml).map_err(GpuError::Broken)?;
     let frames = wall(&scene, 0);
     let picture = render::picture(context, &scene, &frames)?;
-    Ok(RenderCase { scene, frames, picture })
+    Ok(Drawn { name: toml.into(), scene, frames, picture })
 }
 
 /// Adds a fault if the context has more device memory allocated than `before`, bytes. `after_what`: what was done since then.
 pub fn expect_memory_returned(findings: &mut Findings, context: &Context, before: u64, after_what: &str) {
     let now = context.allocated();
     findings.expect(now <= before, || format!("{after_what}: {} bytes of device memory are still held", now - before));
+}
+
+/// Adds a fault unless an action failed with the right error. `is`: whether an error, also given as text, is right.
+fn expect_error<T>(
+    findings: &mut Findings,
+    done: Result<T, GpuError>,
+    what: &str,
+    is: impl FnOnce(&GpuError, &str) -> bool,
+) {
+    match done.map_err(|error| (error.to_string(), error)) {
+        Ok(_) => findings.expect(false, || format!("{what}: there was no error")),
+        Err((text, error)) => findings.expect(is(&error, &text), || format!("{what}: the error says: {text}")),
+    }
 }
 
 /// If any allocation fails while a renderer is created, the error names the resource, and nothing leaks.
@@ -63,20 +70,18 @@ fn every_allocation(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     let before = context.allocated();
     let mut refused = 0;
     for after in 0..1000 {
-        context.faults.inject(InjectionPoint::Allocate, after, InjectedFailure::OutOfDeviceMemory.result());
+        context.faults.inject(InjectionPoint::Allocate, after, InjectedFailure::ERROR_OUT_OF_DEVICE_MEMORY);
         let made = Renderer::new(context, case.scene.clone(), &RendererOptions::default());
         context.faults.forget();
-        match made {
-            Ok(_) => break,
-            Err(error) => {
-                let text = error.to_string();
-                findings.expect(text.starts_with("create ") && text.ends_with("out of device memory"), || {
-                    format!("allocation {after} was refused, and the error says: {text}")
-                });
-                refused += 1;
-            }
+        if made.is_ok() {
+            break;
         }
-        expect_memory_returned(&mut findings, context, before, &format!("allocation {after} was refused"));
+        let what = format!("allocation {after} was refused");
+        expect_error(&mut findings, made, &what, |_, text| {
+            text.starts_with("create ") && text.ends_with("out of device memory")
+        });
+        refused += 1;
+        expect_memory_returned(&mut findings, context, before, &what);
     }
     findings.expect(refused > 10, || format!("only {refused} allocations could be refused"));
     let picture = render::picture(context, &case.scene, &case.frames)?;
@@ -96,7 +101,7 @@ fn a_change(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     for after in (0..1000).step_by(step) {
         let mut renderer = render::sent(context, &small.scene, &small.frames, &RendererOptions::default())?;
         renderer.picture()?;
-        context.faults.inject(InjectionPoint::Allocate, after, InjectedFailure::OutOfDeviceMemory.result());
+        context.faults.inject(InjectionPoint::Allocate, after, InjectedFailure::ERROR_OUT_OF_DEVICE_MEMORY);
         let changed = renderer.change(larger.scene.clone());
         context.faults.forget();
         let is_refused = changed.is_err();
@@ -147,14 +152,14 @@ fn submissions(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
 fn failed_once(
     findings: &mut Findings,
     context: &Arc<Context>,
-    case: &RenderCase,
+    case: &Drawn,
     queues: usize,
     after: u32,
 ) -> Result<bool, GpuError> {
     let format = Slot::Frames.format(&case.scene);
     let options = RendererOptions { queues: Some(queues), ..RendererOptions::default() };
     let mut renderer = Renderer::new(context, case.scene.clone(), &options)?;
-    context.faults.inject(InjectionPoint::Submit, after, InjectedFailure::OutOfHostMemory.result());
+    context.faults.inject(InjectionPoint::Submit, after, InjectedFailure::ERROR_OUT_OF_HOST_MEMORY);
     let mut failed = 0;
     for (k, frame) in case.frames.iter().enumerate() {
         let bytes = frame.encode(format);
@@ -183,24 +188,18 @@ fn lost(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     let case = case(context, SMALL)?;
     let before = context.allocated();
     for (what, seam, after, failure) in [
-        ("a device lost at a submission", InjectionPoint::Submit, 0, InjectedFailure::DeviceLost),
-        ("a device lost at a wait", InjectionPoint::Wait, 1, InjectedFailure::DeviceLost),
+        ("a device lost at a submission", InjectionPoint::Submit, 0, InjectedFailure::ERROR_DEVICE_LOST),
+        ("a device lost at a wait", InjectionPoint::Wait, 1, InjectedFailure::ERROR_DEVICE_LOST),
     ] {
         let mut renderer = render::sent(context, &case.scene, &case.frames, &RendererOptions::default())?;
         renderer.picture()?;
         renderer.show(0)?;
-        context.faults.inject(seam, after, failure.result());
+        context.faults.inject(seam, after, failure);
         let result = renderer.picture();
         context.faults.forget();
-        match result {
-            Ok(_) => findings.expect(false, || format!("{what}: a picture was drawn")),
-            Err(error) => {
-                let text = error.to_string();
-                let is_right_kind = error.is_device_lost() && !error.is_given_up();
-                findings
-                    .expect(is_right_kind && text.contains("picture"), || format!("{what}: the error says: {text}"));
-            }
-        }
+        expect_error(&mut findings, result, what, |error, text| {
+            error.is_device_lost() && !error.is_given_up() && text.contains("picture")
+        });
         drop(renderer);
         expect_memory_returned(&mut findings, context, before, what);
     }
@@ -211,7 +210,7 @@ fn lost(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     renderer.picture()?;
     renderer.show(0)?;
     hung.context.faults.hang(0);
-    hung.context.faults.inject(InjectionPoint::Wait, 1, InjectedFailure::TimeOut.result());
+    hung.context.faults.inject(InjectionPoint::Wait, 1, InjectedFailure::TIMEOUT);
     for turn in ["", ", again"] {
         let said = renderer.picture().map_or_else(|error| error.to_string(), |_| "nothing".into());
         let is_named = said.contains("did not finish within") && said.contains("picture");
@@ -256,10 +255,7 @@ fn unexpected_frames(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     ];
     findings.figures.push(count_figure("refused", tried.len()));
     for (what, done, is) in tried {
-        match done {
-            Ok(()) => findings.expect(false, || format!("{what} was taken")),
-            Err(error) => findings.expect(is(&error), || format!("{what}: the error says: {error}")),
-        }
+        expect_error(&mut findings, done, what, |error, _| is(error));
     }
     expect_same_picture(&mut findings, "the picture after that", &case.picture, &renderer.picture()?);
     drop(renderer);
@@ -278,14 +274,10 @@ fn cartesian_scene(size: [usize; 3], toml: &str) -> Result<Scene, GpuError> {
 /// Adds a fault unless the scene is refused by an error that contains `names`, without any allocation.
 fn refused(findings: &mut Findings, context: &Arc<Context>, what: &str, scene: Scene, names: [&str; 2]) {
     let before = context.counts.allocations.load(Ordering::Relaxed);
-    match Renderer::new(context, scene, &RendererOptions::default()) {
-        Ok(_) => findings.expect(false, || format!("{what} was not refused")),
-        Err(error) => {
-            let text = error.to_string();
-            let is_named = names.iter().all(|name| text.contains(name)) && text.lines().count() == 1;
-            findings.expect(is_named, || format!("{what}: expected {names:?}, the error says: {text}"));
-        }
-    }
+    let made = Renderer::new(context, scene, &RendererOptions::default());
+    expect_error(findings, made, &format!("{what}: expected {names:?}"), |_, text| {
+        names.iter().all(|name| text.contains(name)) && text.lines().count() == 1
+    });
     let made = context.counts.allocations.load(Ordering::Relaxed) - before;
     findings.expect(made == 0, || format!("{what}: {made} allocations were made before it was refused"));
 }
@@ -346,13 +338,8 @@ fn beyond_memory(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     let images = context.memory() / (edge as u64).pow(3) + 2;
     let before = context.allocated();
     let options = RendererOptions { volume_images: images as u32, ..RendererOptions::default() };
-    match Renderer::new(context, scene, &options) {
-        Ok(_) => findings.expect(false, || format!("{images} volumes of {edge}^3 bytes were not refused")),
-        Err(error) => {
-            let text = error.to_string();
-            findings.expect(text.contains("image 'volume'"), || format!("{images} volumes: the error says: {text}"));
-        }
-    }
+    let (what, made) = (format!("{images} volumes of {edge}^3 bytes"), Renderer::new(context, scene, &options));
+    expect_error(&mut findings, made, &what, |_, text| text.contains("image 'volume'"));
     expect_memory_returned(&mut findings, context, before, "more volumes than the memory holds");
     let small = cartesian_scene([16; 3], "mode = 'mip'\npicture = { size = [8, 8] }")?;
     let picture = render::picture(context, &small, &frames(&small, |_| 0.5))?;

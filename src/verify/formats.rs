@@ -146,34 +146,22 @@ struct MissingFeature {
 
 fn missing_features() -> Vec<MissingFeature> {
     let plain = RendererOptions::default;
-    let reading = |fetch| RendererOptions { texel_access: Some(fetch), ..RendererOptions::default() };
+    let reading = |fetch| RendererOptions { texel_access: Some(fetch), ..plain() };
+    let (textures, storage) = (|| reading(TexelAccess::Textures), || reading(TexelAccess::Storage));
+    let spans = || RendererOptions { spans: true, ..plain() };
+    let exact = Some(Sampling::Exact);
     let of = |name, change, options, sampling| MissingFeature { name, change, options, sampling, tables: &[] };
     vec![
-        of("no filter", formats::disable_linear_filter, reading(TexelAccess::Textures), Some(Sampling::Exact)),
+        of("no filter", formats::disable_linear_filter, textures(), exact),
         // The maximum allocation holds the volume, but not four times as much.
-        of(
-            "no room for quads",
-            |c| c.candidate.max_allocation = 80 << 10,
-            reading(TexelAccess::Storage),
-            Some(Sampling::Exact),
-        ),
-        of(
-            "no tables as texels",
-            |c| c.candidate.limits.max_texel_buffer_elements = 0,
-            reading(TexelAccess::Storage),
-            None,
-        ),
+        of("no room for quads", |c| c.candidate.max_allocation = 80 << 10, storage(), exact),
+        of("no tables as texels", |c| c.candidate.limits.max_texel_buffer_elements = 0, storage(), None),
         MissingFeature {
             tables: &[65, 1025],
-            ..of(
-                "small tables as texels",
-                |c| c.candidate.limits.max_texel_buffer_elements = 300,
-                reading(TexelAccess::Storage),
-                None,
-            )
+            ..of("small tables as texels", |c| c.candidate.limits.max_texel_buffer_elements = 300, storage(), None)
         },
-        of("texels by texelFetch", |_| (), reading(TexelAccess::Textures), None),
-        of("texels by imageLoad", |_| (), reading(TexelAccess::Storage), None),
+        of("texels by texelFetch", |_| (), textures(), None),
+        of("texels by imageLoad", |_| (), storage(), None),
         of("no pushed descriptors", |c| c.push_descriptor = None, plain(), None),
         of("one queue", |_| (), RendererOptions { queues: Some(1), ..plain() }, None),
         of(
@@ -183,13 +171,8 @@ fn missing_features() -> Vec<MissingFeature> {
             None,
         ),
         of("no time stamps", |c| c.candidate.queues.iter_mut().for_each(|q| q.valid_bits = 0), plain(), None),
-        of("no counts", |c| c.candidate.pipeline_statistics = false, RendererOptions { spans: true, ..plain() }, None),
-        of(
-            "no clock in common",
-            |c| c.candidate.calibrated_timestamps = false,
-            RendererOptions { spans: true, ..plain() },
-            None,
-        ),
+        of("no counts", |c| c.candidate.pipeline_statistics = false, spans(), None),
+        of("no clock in common", |c| c.candidate.calibrated_timestamps = false, spans(), None),
     ]
 }
 

@@ -1,13 +1,13 @@
 //! Group "hazards": frames arrive while pictures are rendered, on one to three queues. Every picture must be identical to the one that is
 //! rendered with a wait after every step. Passes are slowed down so that work overlaps.
 
-use super::built_in::{BYTES, Noise, scene, wall, wobbler};
+use super::built_in::{BYTES, Noise, moved, scene, wall, wobbler};
 use super::compare::{add_picture_counts, expect_same_picture, texel_comparison};
 use super::{Check, DeviceUnderTest, Findings, IsolatedContext, render};
 use crate::gpu::{Context, GpuError, Renderer, RendererOptions};
 use crate::passes::{Slot, Texels};
 use crate::picture::Picture;
-use crate::probe::{Advance, Geometry, Probe};
+use crate::probe::Geometry;
 use crate::queues::MAX_QUEUES;
 use crate::report::{Fault, Level, PictureComparison};
 use crate::scene::Scene;
@@ -79,8 +79,7 @@ fn on_queues(dut: &mut DeviceUnderTest, scenario: Scenario) -> Result<Findings, 
 
 /// The wobbler with a motor that moves during a frame.
 fn moving() -> Geometry {
-    let probe = wobbler();
-    Geometry::Sweep(Probe { advance: Advance::Same(0.3 * probe.slices.pitch()), ..probe })
+    Geometry::Sweep(moved(wobbler(), 0.3))
 }
 
 const PLAIN: &str = "mode = 'vr'\npicture = { size = [24, 24] }\nslices = { pixels = 40, format = 'r8' }";

@@ -1,8 +1,8 @@
 //! Group "known answers": scenes whose correct result is a formula, independent of the f64 reference.
 
 use super::built_in::{BYTES, FLOATS, body_frames, frames, scene, wobbler};
-use super::compare::{ExtraTolerance, compare_outputs, picture_comparison, texel_comparison};
-use super::each_pass::POISON;
+use super::compare::{ExtraTolerance, compare_outputs, count_figure, picture_comparison, texel_comparison};
+use super::each_pass::{POISON, untouched};
 use super::{Check, DeviceUnderTest, Findings, render};
 use crate::gpu::{GpuError, Renderer, RendererOptions};
 use crate::passes::raycast::still::final_sums;
@@ -495,14 +495,11 @@ fn shadow_of_a_hill(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     let hill = |x: usize, y: usize| ((x as f64 - 40.0).powi(2) + (y as f64 - 24.0).powi(2)) / 40.0;
     let distances =
         Texels::from_fn([64, 48, 1], 1, |[x, y, _], _| f64::from((60.0 - 12.0 * (-hill(x, y)).exp()) as f32));
-    let (args, mut inputs, mut expected) = (DispatchArgs::default(), Arrays::default(), Arrays::default());
+    let (args, mut inputs) = (DispatchArgs::default(), Arrays::default());
     for bind in SHADOW.reads(&scene, &args) {
         inputs.insert(bind.name, distances.clone());
     }
-    let writes = SHADOW.writes(&scene, &args);
-    for bind in &writes {
-        expected.insert(bind.name, Texels::untouched(Slot::Shadow.array_size(&scene), 1));
-    }
+    let (mut expected, writes) = (untouched(&scene, &SHADOW, &args), SHADOW.writes(&scene, &args));
     SHADOW.expected(&scene, &args, &inputs, &mut expected);
     let got = dut.pass_runner().run(&scene, &SHADOW, &args, &inputs, POISON)?;
     let compared = compare_outputs(&SHADOW, &scene, ExtraTolerance::default(), POISON, &expected, &got, &writes);
@@ -518,10 +515,6 @@ fn shadow_of_a_hill(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     }
     let allowed = SHADOW.tolerance.outliers;
     findings.figures.push(Figure::error("texels beyond tolerance", compared.outliers, allowed, Unit::Share));
-    findings.figures.push(Figure {
-        what: "texels of edge".into(),
-        allowed: None,
-        ..Figure::error("", edge as f64, 0.0, Unit::Count)
-    });
+    findings.figures.push(count_figure("texels of edge", edge));
     Ok(findings)
 }

@@ -33,7 +33,7 @@ pub mod time_stamps;
 
 pub use compare::{Comparison, ExtraTolerance, compare_outputs, compare_picture, expect_same_picture};
 
-use echolume_base::{baselines, files, html_page, metrics, picture, terminal, text, tree};
+use echolume_base::{baselines, files, html_page, metrics, picture, statistics, terminal, text, tree};
 use echolume_core::{passes, plan, queues, reference, scene, spirv};
 use echolume_gpu::{self as gpu, machine};
 use echolume_lab::profile;
@@ -206,7 +206,9 @@ impl Check {
         };
         findings.notes.extend(findings.left_out.take());
         findings.notes.extend(findings.interrupted.map(|signal| format!("not to its end: {signal}")));
-        self.outcome(verdict, findings, begun)
+        let Findings { figures, faults, notes, pictures, .. } = findings;
+        let seconds = begun.elapsed().as_secs_f64();
+        Outcome { seconds, figures, faults, notes, pictures, ..Outcome::new(self.title(), verdict) }
     }
 
     /// Runs the check and returns errors of the device unchanged.
@@ -232,20 +234,6 @@ impl Check {
     /// Group and name of the check.
     pub fn title(&self) -> CheckName {
         CheckName { group: self.group.into(), name: self.name.clone() }
-    }
-
-    fn outcome(&self, verdict: Verdict, findings: Findings, begun: Instant) -> Outcome {
-        Outcome {
-            group: self.group.into(),
-            name: self.name.clone(),
-            verdict,
-            seconds: begun.elapsed().as_secs_f64(),
-            figures: findings.figures,
-            faults: findings.faults,
-            notes: findings.notes,
-            failed_before: 0,
-            pictures: findings.pictures,
-        }
     }
 }
 

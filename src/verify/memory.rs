@@ -85,16 +85,7 @@ fn slot_difference(slot: Slot, zeros: &Texels, poisoned: [&Texels; 2], scene: &S
         }
         let Some(other) = got.into_iter().find(|got| got.to_bits() != zero.to_bits()) else { continue };
         apart.depend += 1;
-        let (texel, [w, h, _]) = (i / zeros.channels, zeros.size);
-        apart.worst.get_or_insert(Worst {
-            output: slot.name().into(),
-            at: [texel % w, texel / w % h, texel / w / h],
-            channel: i % zeros.channels,
-            expected: *zero,
-            got: other,
-            beyond: 0,
-            texels: zeros.values.len(),
-        });
+        apart.worst.get_or_insert(Worst::of(slot.name(), zeros, i, [*zero, other]));
     }
     apart
 }
@@ -145,8 +136,7 @@ fn check_scene(
 
 fn add_totals(findings: &mut Findings, totals: &Totals) {
     add_picture_counts(findings, 2 * totals.scenes, totals.wrong);
-    let figure = Figure::error("slots compared", totals.slots as f64, 0.0, Unit::Count);
-    findings.figures.push(Figure { allowed: None, ..figure });
+    findings.figures.push(count_figure("slots compared", totals.slots));
     findings.figures.push(Figure::error("values never written", totals.left as f64, 0.0, Unit::Count));
 }
 

@@ -1,6 +1,6 @@
 //! Groups "modes" and "against": pictures of known bodies in every mode, compared with the f64 reference, or with another device.
 
-use super::built_in::{BYTES, FLOATS, body_frames, cartesian, linear, scene, still, uneven, wobbler};
+use super::built_in::{BYTES, FLOATS, body_frames, cartesian, linear, moved, scene, still, uneven, wobbler};
 use super::compare::{MAX_FAR_SHARE, compare_picture, picture_comparison, picture_difference};
 use super::render::reference_picture;
 use super::{Check, DeviceUnderTest, Findings, IsolatedContext, render};
@@ -8,7 +8,7 @@ use crate::gpu::Context;
 use crate::gpu::GpuError;
 use crate::passes::Texels;
 use crate::passes::slots::Format;
-use crate::probe::{Advance, Geometry, Probe};
+use crate::probe::Geometry;
 use crate::report::{Fault, Figure, Level, PictureComparison, Unit};
 use crate::scene::{Input, Scene};
 use crate::source::phantom::{Phantom, PhantomOptions};
@@ -35,12 +35,8 @@ enum Subject {
     Head,
 }
 
-fn moved() -> Probe {
-    Probe { advance: Advance::Same(0.03), ..wobbler() }
-}
-
 fn views() -> Vec<(&'static str, Subject, &'static str)> {
-    let fan = || Subject::Ball(Geometry::Sweep(moved()));
+    let fan = || Subject::Ball(Geometry::Sweep(moved(wobbler(), 0.5)));
     vec![
         (
             "surface",

@@ -29,13 +29,9 @@ pub fn checks(_: Level) -> Vec<Check> {
     ]
 }
 
-fn informative(what: &str, value: f64, unit: Unit) -> Figure {
-    Figure { allowed: None, ..Figure::error(what, value, 0.0, unit) }
-}
-
 /// An informative figure that depends on the load of the machine, so it is never compared.
 fn load_dependent(what: &str, value: f64, unit: Unit) -> Figure {
-    Figure { fleeting: true, ..informative(what, value, unit) }
+    Figure { fleeting: true, ..Figure::informative(what, value, unit) }
 }
 
 fn picture_scene(toml: &str) -> Result<Scene, GpuError> {
@@ -63,7 +59,7 @@ fn bits_and_period(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     }
     let period = f64::from(context.candidate.limits.timestamp_period);
     findings.expect(!has_stamps(context) || (period > 0.0 && period.is_finite()), || format!("a tick of {period} ns"));
-    findings.figures.push(informative("period", period, Unit::Ns));
+    findings.figures.push(Figure::informative("period", period, Unit::Ns));
     if !has_stamps(context) {
         findings.notes.push(NONE.into());
     }

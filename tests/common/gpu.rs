@@ -45,7 +45,8 @@ impl Device {
             return Device { context, provoked: false, runner: Some(runner) };
         }
         // A pipeline takes 5 MiB on lavapipe with validation: those of all tests took 10 GiB.
-        let shared = ContextOptions { specialize: Some(true), max_unused_pipelines: 64, ..ContextOptions::default() };
+        let shared =
+            ContextOptions { specialize: Some(true), max_unused_pipelines: Some(64), ..ContextOptions::default() };
         let mut device = Device::watched_with(shared);
         device.runner = Some(PassRunner::new(&device).expect("a runner of passes"));
         device

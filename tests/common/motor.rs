@@ -4,7 +4,7 @@ use super::files::MOTOR_PROBE;
 use echolume::low_level::probe::ProbeFile;
 use echolume::low_level::probe::motor::simulate::{Simulator, SimulatorOptions};
 use echolume::low_level::probe::motor::tmcl::{Request, command};
-use echolume::low_level::probe::motor::{MotorTable, PortSettings};
+use echolume::low_level::probe::motor::{MotorTable, Parity, PortSettings, StopBits};
 use std::path::Path;
 use std::time::Duration;
 
@@ -18,8 +18,8 @@ pub fn simulated(fault: Option<&str>) -> Simulator {
 }
 
 pub fn settings(simulator: &Simulator, timeout_ms: u64) -> PortSettings {
-    let path = simulator.path().to_str().expect("a plain name");
-    PortSettings { timeout: Duration::from_millis(timeout_ms), ..PortSettings::new(path) }
+    let (path, timeout) = (simulator.path().to_str().expect("a plain name").into(), Duration::from_millis(timeout_ms));
+    PortSettings { path, baud: 9600, parity: Parity::None, stop_bits: StopBits::One, timeout }
 }
 
 /// True if the module received a stop after the last request that moves it.

@@ -1,5 +1,7 @@
 //! Nearly valid bytes, the same for the same seed.
 
+use echolume::low_level::statistics::mix;
+
 /// Longest input, bytes.
 const LONGEST: usize = 1 << 16;
 
@@ -45,10 +47,7 @@ pub struct Random(pub u64);
 impl Random {
     pub fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ z >> 31
+        mix(self.0)
     }
 
     /// 0 to `count` - 1; 0 for none.

@@ -1,8 +1,9 @@
 //! What is said of a device that is lost or has no memory left, and how work goes on with smaller bands.
 
 use crate::common::gpu::*;
+use ash::vk;
 use echolume::low_level::gpu::faults::{InjectedFailure, InjectionPoint};
-use echolume::low_level::gpu::lost_device::{Checkpoint, FaultAddress, LossReport};
+use echolume::low_level::gpu::lost_device::{Checkpoint, LossReport};
 use echolume::low_level::gpu::{Bands, GpuError, Renderer, RendererOptions};
 use echolume::low_level::probe::Geometry;
 use echolume::low_level::scene::Scene;
@@ -24,7 +25,11 @@ fn the_error_of_a_lost_device_has_the_report_of_its_driver() {
     let device = Device::alone();
     let report = LossReport {
         description: "GPU hang".into(),
-        addresses: vec![FaultAddress { kind: "invalid read", address: 0xabc0_0000, precision: 4096 }],
+        addresses: vec![vk::DeviceFaultAddressInfoEXT {
+            address_type: vk::DeviceFaultAddressTypeEXT::READ_INVALID,
+            reported_address: 0xabc0_0000,
+            address_precision: 4096,
+        }],
         codes: Vec::new(),
         checkpoints: vec![Checkpoint { queue: 0, pass: "raycast_projection", is_done: false }],
     };
@@ -33,7 +38,7 @@ fn the_error_of_a_lost_device_has_the_report_of_its_driver() {
             let mut renderer = drawn(&device, small(), &RendererOptions::default());
             renderer.take_times().expect("idle");
             device.faults.report_loss(if reports { report.clone() } else { LossReport::default() });
-            device.faults.inject(point, 0, InjectedFailure::DeviceLost.result());
+            device.faults.inject(point, 0, InjectedFailure::ERROR_DEVICE_LOST);
             renderer.picture().expect_err("lost")
         };
         let (plain, error) = (lost(false), lost(true));

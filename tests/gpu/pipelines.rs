@@ -109,7 +109,7 @@ fn in_mode(mode: &str) -> echolume::low_level::scene::Scene {
 #[test]
 fn forgotten_pipelines_are_compiled_again_and_draw_the_same() {
     // None is kept but the one compiled last: fewer than any plan has.
-    let device = Device::watched_with(ContextOptions { max_unused_pipelines: 0, ..ContextOptions::default() });
+    let device = Device::watched_with(ContextOptions { max_unused_pipelines: Some(0), ..ContextOptions::default() });
     let made = || device.counts.pipelines.load(Ordering::Relaxed);
     let frames = body_frames(&in_mode(MODES[0]), |p| 0.5 + 0.4 * (0.3 * p.y).sin());
     // With every pipeline kept.

@@ -5,6 +5,7 @@ use crate::common::gpu::*;
 use echolume::low_level::passes::{Slot, Texels, is_hit};
 use echolume::low_level::probe::{Axis, Geometry, Grid};
 use echolume::low_level::scene::Scene;
+use echolume::low_level::statistics::mix;
 use glam::DVec3;
 
 /// A block of n^3 voxels of 0.5 mm, including half a voxel beyond the outer centres.
@@ -98,10 +99,8 @@ fn the_sliding_filter_keeps_a_linear_field_and_quietens_noise_as_its_weights_say
     let noise = |p: DVec3| {
         // SplitMix64 of the voxel's index.
         let n = (p * 2.0).round();
-        let mut z = (n.x as u64 * 1_000_003 + n.y as u64 * 10_007 + n.z as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+        let index = n.x as u64 * 1_000_003 + n.y as u64 * 10_007 + n.z as u64;
+        (mix(index.wrapping_mul(0x9e37_79b9_7f4a_7c15)) >> 11) as f64 / (1u64 << 53) as f64
     };
     let inner = |picture: &Texels| -> Vec<f64> { (0..400).map(|i| picture.one(2 + i % 20, 2 + i / 20, 0)).collect() };
     let variance = |values: &[f64]| {

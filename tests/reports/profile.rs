@@ -3,7 +3,7 @@
 use crate::scenes::*;
 use echolume::low_level::baselines::Stored;
 use echolume::low_level::gpu::{Context, RendererOptions};
-use echolume::low_level::passes::{DispatchArgs, by_name};
+use echolume::low_level::passes::{DispatchArgs, Span, by_name};
 use echolume::low_level::profile::compare::{CompareOptions, Kind, Verdict, compare};
 use echolume::low_level::profile::timed_run::{ProfileOptions, ProfileRun};
 use echolume::low_level::profile::{Profile, export};
@@ -25,7 +25,7 @@ fn begun(context: &Arc<Context>, scene: &Scene, options: &ProfileOptions) -> Pro
     ProfileRun::new(context, scene, options, &RendererOptions::default().shaders).expect("run")
 }
 
-fn run(context: &Arc<Context>, scene: &Scene, options: &ProfileOptions) -> (Profile, Vec<export::Span>) {
+fn run(context: &Arc<Context>, scene: &Scene, options: &ProfileOptions) -> (Profile, Vec<(usize, Span)>) {
     let (frames, mut run) = (frames(), begun(context, scene, options));
     while run.needs_more() {
         run.repeat(&frames).expect("repeat");
@@ -152,7 +152,7 @@ fn a_profile_is_consistent_and_round_trips() {
     let trace: serde_json::Value = serde_json::from_str(&trace).expect("json");
     let events = trace["traceEvents"].as_array().expect("events");
     // A batch of frames is one event.
-    let batches = spans.iter().filter(|s| s.name == "scan_convert").count();
+    let batches = spans.iter().filter(|(_, s)| s.name == "scan_convert").count();
     assert!((6..=6 * 15).contains(&batches), "{batches}");
     assert_eq!(events.iter().filter(|e| e["name"] == "scan_convert").count(), batches);
 }

@@ -8,6 +8,7 @@ use echolume::low_level::exact_ray;
 use echolume::low_level::passes::{Arrays, Texels};
 use echolume::low_level::probe::{Advance, Array, Axis, Geometry, Motion, Probe};
 use echolume::low_level::scene::Scene;
+use echolume::low_level::statistics::mix;
 
 /// Numbers in 0..1, the same in every run (SplitMix64; Steele, Lea, Flood 2014).
 struct Draw(u64);
@@ -15,9 +16,7 @@ struct Draw(u64);
 impl Draw {
     fn unit(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let a = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let b = (a ^ (a >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((b ^ (b >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+        (mix(self.0) >> 11) as f64 / (1u64 << 53) as f64
     }
 
     fn between(&mut self, low: f64, high: f64) -> f64 {

@@ -1,6 +1,7 @@
 //! Error against run time without a device: the metrics, the Pareto front, the choice, the file, the plot.
 
 use crate::common::files::data;
+use echolume::low_level::baselines::Stored;
 use echolume::low_level::error_report::budget::{Budget, FLOOR, Share};
 use echolume::low_level::error_report::choose::{self, Bound, choose, contenders, proposals};
 use echolume::low_level::error_report::convergence::{Range, fit};
@@ -9,7 +10,7 @@ use echolume::low_level::error_report::metrics::{
 };
 use echolume::low_level::error_report::plot::Figure;
 use echolume::low_level::error_report::{
-    Combination, Dial, Errors, FORMAT, Kind, Measure, OwnError, Point, Reference, Report, Sizes, Time, Times, export,
+    Combination, Dial, Errors, Kind, Measure, OwnError, Point, Reference, Report, Sizes, Time, Times, export,
     pareto_front, plot,
 };
 use echolume::low_level::passes::{MISS, Texels};
@@ -69,7 +70,7 @@ fn dial(name: &str, unit: &str, default: usize, mut points: Vec<Point>) -> Dial 
 
 fn report(dials: Vec<Dial>) -> Report {
     Report {
-        format: FORMAT.into(),
+        format: Report::FORMAT.into(),
         device: "Device <1>, \"quoted\"".into(),
         driver: "driver & 2.0".into(),
         date: "2026-11-21T09:00:00Z".into(),
@@ -464,9 +465,9 @@ fn a_report_survives_its_file_and_others_are_refused() {
     whole.dials[0].points[2].times = None;
     let text = whole.to_json().expect("finite");
     assert_eq!(Report::from_json(&text).expect("its own"), whole);
-    let newer = text.replace(FORMAT, "echolume error report 4");
+    let newer = text.replace(Report::FORMAT, "echolume error report 4");
     let said = Report::from_json(&newer).expect_err("a newer version");
-    assert!(said.contains("echolume error report 4") && said.contains(FORMAT), "{said}");
+    assert!(said.contains("echolume error report 4") && said.contains(Report::FORMAT), "{said}");
     assert!(Report::from_json("{").is_err() && Report::from_json("{}").is_err());
     assert!(Report::from_json(&text.replace("\"repeats\"", "\"repeat\"")).is_err());
     whole.dials[0].points[1].errors.rmse = f64::NAN;

@@ -55,16 +55,12 @@ fn an_untouched_pose_does_not_move_or_blur_a_pixel() {
     let grid = grid([5, 4, 6], 0.1);
     let values: Vec<u16> = (0..20).map(|n| n * 3000 + 7).collect();
     let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
-    for splat in [Splat::Nearest, Splat::Trilinear] {
-        for overlap in [Overlap::Mean, Overlap::Latest, Overlap::Maximum] {
-            let mut compounder = compounder(grid, StoredType::U16, CompoundingOptions { splat, overlap, ..options() });
-            let pushed = compounder.push(&frame(straight(&grid, 3.0), [5, 4], StoredType::U16, &bytes));
-            assert_eq!(pushed, Ok(20));
-            for (n, value) in volume(&mut compounder).into_iter().enumerate() {
-                let expected = if n / 20 == 3 { values[n % 20] } else { 0 };
-                assert_eq!(value, f32::from(expected), "{splat:?}, {overlap:?}, voxel {n}");
-            }
-        }
+    let mut compounder = compounder(grid, StoredType::U16, options());
+    let pushed = compounder.push(&frame(straight(&grid, 3.0), [5, 4], StoredType::U16, &bytes));
+    assert_eq!(pushed, Ok(20));
+    for (n, value) in volume(&mut compounder).into_iter().enumerate() {
+        let expected = if n / 20 == 3 { values[n % 20] } else { 0 };
+        assert_eq!(value, f32::from(expected), "voxel {n}");
     }
 }
 
@@ -236,21 +232,13 @@ fn only_slices_near_a_frame_are_given_out_again() {
 }
 
 #[test]
-fn the_latest_and_the_largest_are_not_the_mean() {
+fn frames_at_one_place_become_their_mean() {
     let grid = grid([2, 2, 2], 1.0);
-    for (overlap, expected) in [(Overlap::Mean, 20.0), (Overlap::Latest, 10.0), (Overlap::Maximum, 30.0)] {
-        let mut compounder = compounder(grid, StoredType::U8, CompoundingOptions { overlap, ..options() });
-        for value in [20, 30, 10] {
-            compounder.push(&frame(straight(&grid, 0.0), [2, 2], StoredType::U8, &[value; 4])).unwrap();
-        }
-        assert_eq!(volume(&mut compounder)[..4], [expected; 4], "{overlap:?}");
+    let mut compounder = compounder(grid, StoredType::U8, options());
+    for value in [20, 30, 10] {
+        compounder.push(&frame(straight(&grid, 0.0), [2, 2], StoredType::U8, &[value; 4])).unwrap();
     }
-    // Halfway between two slices: within a frame it is still the mean.
-    let mut compounder = compounder(grid, StoredType::U8, CompoundingOptions { overlap: Overlap::Latest, ..options() });
-    for value in [80, 10] {
-        compounder.push(&frame(straight(&grid, 0.5), [2, 2], StoredType::U8, &[value; 4])).unwrap();
-    }
-    assert_eq!(volume(&mut compounder), [10.0; 8]);
+    assert_eq!(volume(&mut compounder)[..4], [20.0; 4]);
 }
 
 #[test]
@@ -453,26 +441,23 @@ fn a_volume_grows_around_pictures_that_leave_it() {
 /// With the same spacing nothing is computed again: the volume is that of one with the room from the beginning.
 #[test]
 fn growth_keeps_every_voxel() {
-    for overlap in [Overlap::Mean, Overlap::Latest, Overlap::Maximum] {
-        let swept = |extent: Option<f64>| {
-            let options = CompoundingOptions { overlap, extent, spacing: Some(0.5), margin: 1.0, ..options() };
-            let mut sweep = Sweep::new(options, Schedule { first: 3, ..Schedule::default() }, StoredType::F32);
-            let mut sizes = Vec::new();
-            for n in 0..30 {
-                let (pose, bytes) =
-                    picture(DQuat::IDENTITY, DVec3::new(0.0, 0.1 * f64::from(n % 3), -0.5 * f64::from(n)));
-                assert_eq!(sweep.push(pose, bytes), Ok(()));
-                sweep.update(n == 29, |refusal| panic!("{refusal:?}"));
-                sizes.extend(sweep.lattice().map(|lattice| lattice.grid.size));
-            }
-            sizes.dedup();
-            (off(&sweep), sizes.len(), sweep.lattice().expect("a place").grid)
-        };
-        let ((grown, sizes, _), (stated, one, grid)) = (swept(None), swept(Some(14.5)));
-        // In the direction of the sweep: 14.5 mm and 1 mm on either side, which nothing outgrows.
-        assert!(sizes > 2 && one == 1 && grid.size[2] == 34, "{sizes} {one} {grid:?}");
-        assert!(grown == stated && grown.len() > 6000, "{overlap:?}: {} {}", grown.len(), stated.len());
-    }
+    let swept = |extent: Option<f64>| {
+        let options = CompoundingOptions { extent, spacing: Some(0.5), margin: 1.0, ..options() };
+        let mut sweep = Sweep::new(options, Schedule { first: 3, ..Schedule::default() }, StoredType::F32);
+        let mut sizes = Vec::new();
+        for n in 0..30 {
+            let (pose, bytes) = picture(DQuat::IDENTITY, DVec3::new(0.0, 0.1 * f64::from(n % 3), -0.5 * f64::from(n)));
+            assert_eq!(sweep.push(pose, bytes), Ok(()));
+            sweep.update(n == 29, |refusal| panic!("{refusal:?}"));
+            sizes.extend(sweep.lattice().map(|lattice| lattice.grid.size));
+        }
+        sizes.dedup();
+        (off(&sweep), sizes.len(), sweep.lattice().expect("a place").grid)
+    };
+    let ((grown, sizes, _), (stated, one, grid)) = (swept(None), swept(Some(14.5)));
+    // In the direction of the sweep: 14.5 mm and 1 mm on either side, which nothing outgrows.
+    assert!(sizes > 2 && one == 1 && grid.size[2] == 34, "{sizes} {one} {grid:?}");
+    assert!(grown == stated && grown.len() > 6000, "{} {}", grown.len(), stated.len());
 }
 
 /// A sweep of fewer pictures than place a volume is placed when no more come.
@@ -518,12 +503,10 @@ proptest! {
         numbers in prop::collection::vec(prop_oneof![-20.0..20.0f64, any::<f64>()], 24),
         size in prop::array::uniform2(0usize..9),
         clip in prop::option::of(prop::array::uniform4(0usize..9)),
-        splat in prop_oneof![Just(Splat::Nearest), Just(Splat::Trilinear)],
-        overlap in prop_oneof![Just(Overlap::Mean), Just(Overlap::Latest), Just(Overlap::Maximum)],
         values in prop::collection::vec(any::<f32>(), 64),
     ) {
         let grid = Grid { size: [5, 6, 7], spacing: [1.0; 3], origin: [-2.0; 3] };
-        let options = CompoundingOptions { splat, overlap, clip, max_voxels: 20_000, ..CompoundingOptions::default() };
+        let options = CompoundingOptions { clip, max_voxels: 20_000, ..CompoundingOptions::default() };
         let mut compounder = compounder(grid, StoredType::F32, options.clone());
         let mut poses = Vec::new();
         for numbers in numbers.chunks(12) {

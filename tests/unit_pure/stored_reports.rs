@@ -1,5 +1,6 @@
 //! The error reports that the documents show: each is complete, and its errors go where theory says.
 
+use echolume::low_level::baselines::Stored;
 use echolume::low_level::error_report::{Kind, Report};
 use std::fs;
 use std::path::Path;

@@ -122,12 +122,7 @@ fn replace_file(file: &Path, bytes: &[u8], readers: Readers) -> Result<(), Strin
     }
     check_place(file)?;
     let mut unfinished = Unfinished::with(file, readers).map_err(|e| cannot(&e))?;
-    let readable = if readers == Readers::All { unfinished.make_readable() } else { Ok(()) };
-    readable
-        .and_then(|()| unfinished.write_all(bytes))
-        .and_then(|()| unfinished.finish())
-        .and_then(|()| unfinished.rename())
-        .map_err(|e| cannot(&e))
+    unfinished.write_all(bytes).and_then(|()| unfinished.complete()).map_err(|e| cannot(&e))
 }
 
 /// Checks, before any work is done, that a file of this name can be written.
@@ -205,6 +200,8 @@ impl Unfinished {
 
     #[cfg_attr(not(unix), expect(unused_variables, reason = "files have no mode"))]
     fn with(target: &Path, readers: Readers) -> io::Result<Unfinished> {
+        #[cfg(unix)]
+        use std::{fs::Permissions, os::unix::fs::PermissionsExt};
         // Resolve links, and use the target's folder, so that renaming is atomic within one file system.
         let target = target.canonicalize().unwrap_or_else(|_| target.to_path_buf());
         if metadata(&target).is_ok_and(|there| !there.is_file()) {
@@ -213,25 +210,16 @@ impl Unfinished {
         let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let mut named = tempfile::Builder::new();
         named.prefix(".echolume-").suffix(".part");
+        // The process' umask applies, too, as for any new file.
         #[cfg(unix)]
-        {
-            // The process' umask applies, too, as for any new file.
-            use std::os::unix::fs::PermissionsExt;
-            named.permissions(std::fs::Permissions::from_mode(readers.mode()));
-        }
+        named.permissions(Permissions::from_mode(readers.mode()));
         let signals = Writing::begin();
         let file = named.tempfile_in(folder)?;
-        Ok(Unfinished { file: BufWriter::new(Part { file, signals }), target })
-    }
-
-    /// Lets every user read the file.
-    fn make_readable(&self) -> io::Result<()> {
         #[cfg(unix)]
-        {
-            use std::os::unix::fs::PermissionsExt;
-            self.file.get_ref().file.as_file().set_permissions(std::fs::Permissions::from_mode(0o644))?;
+        if readers == Readers::All {
+            file.as_file().set_permissions(Permissions::from_mode(0o644))?;
         }
-        Ok(())
+        Ok(Unfinished { file: BufWriter::new(Part { file, signals }), target })
     }
 
     /// Overwrites bytes that were written before, from `at` bytes after the beginning of the file.
@@ -244,6 +232,15 @@ impl Unfinished {
         file.seek(SeekFrom::Start(at))?;
         file.write_all(bytes)?;
         file.seek(SeekFrom::End(0)).map(drop)
+    }
+
+    /// Flushes everything to the disk, and gives the file its name.
+    ///
+    /// # Errors
+    /// The disk is full, or a signal arrived.
+    pub fn complete(mut self) -> io::Result<()> {
+        self.finish()?;
+        self.rename()
     }
 
     /// Flushes everything to the disk. The file keeps its temporary name until [`Unfinished::rename`].

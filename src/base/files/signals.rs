@@ -1,11 +1,12 @@
 //! SIGINT, SIGTERM and SIGHUP for code that must finish something first: a moving motor, a recording without its index, an incomplete file.
 //! At other times the signals end the process. After [`hangups`] SIGHUP does neither.
 
+use crate::sync::locked;
 use signal_hook::SigId;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::{flag, low_level};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock};
 
 #[cfg(unix)]
 const SIGNALS: &[i32] = &[SIGINT, SIGTERM, signal_hook::consts::SIGHUP];
@@ -77,13 +78,9 @@ fn caught() -> impl Iterator<Item = i32> {
 }
 
 impl Handlers {
-    fn lock(&self) -> MutexGuard<'_, Holders> {
-        self.holders.lock().unwrap_or_else(|e| e.into_inner())
-    }
-
     /// Changes the counts of holders and updates the handlers.
     fn change(&self, how: impl FnOnce(&mut Holders)) {
-        let mut holders = self.lock();
+        let mut holders = locked(&self.holders);
         if holders.held + holders.writing == 0 {
             self.received.store(0, Ordering::SeqCst);
         }
@@ -185,7 +182,7 @@ impl Writing {
     pub fn signal(&self) -> Option<&'static str> {
         let handlers = handlers();
         let (_, name) = handlers.signal()?;
-        (handlers.lock().held == 0).then_some(name)
+        (locked(&handlers.holders).held == 0).then_some(name)
     }
 }
 

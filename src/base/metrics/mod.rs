@@ -7,8 +7,11 @@ pub mod table;
 pub mod text_format;
 pub mod textfile;
 
-/// Kind of a metric in the Prometheus sense.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+use crate::tree::Name;
+
+/// Kind of a metric in the Prometheus sense. Its name is the word of the line `# TYPE` of Prometheus' text format.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Name)]
+#[tree(rename_all = "lowercase")]
 pub enum Kind {
     /// A value that only grows until the program restarts.
     Counter,
@@ -18,18 +21,6 @@ pub enum Kind {
     Histogram,
     /// Sum and number of values.
     Summary,
-}
-
-impl Kind {
-    /// The word for this kind in the line `# TYPE` of Prometheus' text format.
-    pub fn word(self) -> &'static str {
-        match self {
-            Kind::Counter => "counter",
-            Kind::Gauge => "gauge",
-            Kind::Histogram => "histogram",
-            Kind::Summary => "summary",
-        }
-    }
 }
 
 /// Declaration of a Prometheus metric: its name, which includes the unit, its kind, its help text and the names of its labels.

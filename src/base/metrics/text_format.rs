@@ -55,7 +55,7 @@ impl Exposition {
     }
 
     fn head(&mut self, Metric { name, kind, help, .. }: &Metric) {
-        let _ = writeln!(self.0, "# HELP {name} {help}\n# TYPE {name} {}", kind.word());
+        let _ = writeln!(self.0, "# HELP {name} {help}\n# TYPE {name} {}", kind.name());
     }
 
     fn sample(&mut self, name: &str, labels: &[&str], values: &[String], value: f64) {

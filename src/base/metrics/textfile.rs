@@ -2,9 +2,10 @@
 //! nothing else.
 
 use crate::files;
+use crate::sync::locked;
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard};
+use std::sync::{Arc, Condvar, Mutex};
 use std::time::Duration;
 
 /// Longest wait for the last text at the end.
@@ -51,7 +52,7 @@ impl Textfile {
     /// Has the thread replace the content of the file by this text, and returns at once. A text that still waits to be written is discarded for a
     /// newer one. A write error is logged as a warning; further errors are only counted until a write succeeds again.
     pub fn put(&self, text: String) {
-        self.shared.lock().text = Some(text);
+        locked(&self.shared.slot).text = Some(text);
         self.shared.changed.notify_all();
     }
 
@@ -64,7 +65,7 @@ impl Textfile {
 impl Drop for Textfile {
     /// Waits until the last text is written, but not for a disk that hangs.
     fn drop(&mut self) {
-        let mut slot = self.shared.lock();
+        let mut slot = locked(&self.shared.slot);
         slot.is_closed = true;
         self.shared.changed.notify_all();
         let waited = self.shared.changed.wait_timeout_while(slot, PATIENCE, |slot| !slot.is_done);
@@ -75,13 +76,9 @@ impl Drop for Textfile {
 }
 
 impl Shared {
-    fn lock(&self) -> MutexGuard<'_, Slot> {
-        self.slot.lock().unwrap_or_else(|e| e.into_inner())
-    }
-
     /// Waits for the next text; none at the end.
     fn next(&self) -> Option<String> {
-        let slot = self.lock();
+        let slot = locked(&self.slot);
         let waited = self.changed.wait_while(slot, |slot| slot.text.is_none() && !slot.is_closed);
         waited.unwrap_or_else(|e| e.into_inner()).text.take()
     }
@@ -113,7 +110,7 @@ struct Ended<'a>(&'a Shared);
 
 impl Drop for Ended<'_> {
     fn drop(&mut self) {
-        self.0.lock().is_done = true;
+        locked(&self.0.slot).is_done = true;
         self.0.changed.notify_all();
     }
 }

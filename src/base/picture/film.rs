@@ -133,7 +133,7 @@ impl FilmWriter {
             .map_err(|e| e.to_string())?;
             self.length = self.length.max(at + bytes.len() as u64);
         }
-        self.file.finish().and_then(|()| self.file.rename()).map_err(|e| e.to_string())
+        self.file.complete().map_err(|e| e.to_string())
     }
 
     /// Writes the pictures that are encoded.

@@ -13,7 +13,7 @@ use serde::de::Unexpected;
 use std::fmt::{self, Display};
 use std::ops::Range;
 
-pub use echolume_derive::{FromNode, ToNode};
+pub use echolume_derive::{All, Defaults, FromNode, Name, ToNode};
 
 /// A value and, if it was parsed from a TOML text, the range of bytes of that text.
 #[derive(Clone, Debug)]

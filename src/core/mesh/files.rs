@@ -60,8 +60,7 @@ impl MeshFile {
         let write = || {
             let mut file = Unfinished::create(path)?;
             self.put(mesh, colours, &mut file)?;
-            file.finish()?;
-            file.rename()
+            file.complete()
         };
         write().map_err(|e: io::Error| InputError::unwritable(path, &e))
     }

@@ -48,7 +48,7 @@ impl Chain {
             Link::Filter(filter) => Some((pass, filter)),
             _ => None,
         });
-        filters.filter(move |(pass, filter)| filter.chain == self && (pass.needed)(scene).is_ok())
+        filters.filter(move |(pass, filter)| filter.chain == self && asked_for(pass, *filter, scene).is_ok())
     }
 
     /// True if the first of several filters is left out: the next reads what it would read.
@@ -121,6 +121,14 @@ fn stored_rectangle(scene: &Scene) -> Rectangle {
     Rectangle { first: [low[0], low[1]], size: [high[0] - low[0], high[1] - low[1]] }
 }
 
+/// Whether a scene asks for a filter, whatever else its chain holds.
+fn asked_for(pass: &Pass, filter: Filter, scene: &Scene) -> Need {
+    if filter.chain == Chain::Distances && !scene.has_distance() {
+        return Err("no distance map in this mode");
+    }
+    (pass.needed)(scene)
+}
+
 impl Pass {
     pub fn is_needed(&self, scene: &Scene) -> bool {
         self.needed(scene).is_ok()
@@ -129,7 +137,7 @@ impl Pass {
     /// Whether a scene needs the pass: `Ok` with the reason, or `Err` with the reason why not.
     pub fn needed(&self, scene: &Scene) -> Need {
         match self.link {
-            Link::Filter(filter) if filter.chain.is_of_frames() => match (self.needed)(scene) {
+            Link::Filter(filter) => match asked_for(self, filter, scene) {
                 Ok(_) if filter.chain == Chain::Slices && copied(scene).is_some() => {
                     Err("the volume stores a frame's values without loss: it is copied there")
                 }

@@ -7,6 +7,7 @@
 
 use super::lookup_tables;
 use super::pass::*;
+use super::raycast::ray;
 use crate::probe::{Geometry, Motion};
 use crate::scene::{Scene, start_curve};
 
@@ -43,16 +44,8 @@ pub(crate) const PASS: Pass = Pass {
             .i32("slice", t.slice)
     },
     constants: |s, _| {
-        let sweep = match &s.geometry {
-            Geometry::Cartesian(_) => 0,
-            Geometry::Sweep(probe) => match probe.motion {
-                Motion::Fan { .. } => 1,
-                Motion::Translated => 2,
-                Motion::Still { .. } => 3,
-            },
-        };
         vec![
-            ("SWEEP", sweep),
+            ("SWEEP", ray::sweep(s)),
             ("INTRA_FRAME_MOTION", (s.has_cuts() && s.moves_in_frames()) as i32),
             ("CUTS", s.has_cuts() as i32),
             ("UNVEILS", s.unveils() as i32),

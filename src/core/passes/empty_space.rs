@@ -4,7 +4,7 @@
 use crate::passes::lookup_tables::brick_reaches;
 use crate::passes::pass::*;
 use crate::probe::Geometry;
-use crate::scene::{Compositing, Mode, Scene, Side, TILE, View};
+use crate::scene::{Compositing, Mode, Scene, Side, TILE, View, windowed};
 
 /// Kinds of bricks, as in classify.comp. The samples of an active brick are needed.
 const ACTIVE: u32 = 0;
@@ -265,11 +265,9 @@ fn classify_reference(
 ) {
     let ranges = reads.get("brick_ranges");
     let target = writes.get_mut("kinds");
-    let [low, high] = view.window;
-    let windowed = |v: f64| ((v - low) / (high - low)).clamp(0.0, 1.0);
     for (n, reach) in brick_reaches(scene, &scene.bricks()).into_iter().enumerate() {
         let range = [ranges.values[2 * n] / beyond(scene), ranges.values[2 * n + 1] * beyond(scene)];
-        let kind = kind(reach.side, range.map(windowed));
+        let kind = kind(reach.side, range.map(|v| windowed(view.window, v)));
         target.values[n] = f64::from(kind * 64 + MAX_DISTANCE) / 255.0;
     }
 }

@@ -1,7 +1,7 @@
 //! Checks a pass's declaration against its shader: names, types, access and dimensions. Needs no GPU.
 
 use super::pass::{Bind, DispatchArgs, Params, Pass, Slot, Value};
-use super::slots::{Format, Shape};
+use super::slots::Shape;
 use crate::scene::Scene;
 use crate::spirv::hoist_uniforms::hoist_uniforms;
 use crate::spirv::storage_to_texel_buffer::storage_to_texel_buffer;
@@ -85,32 +85,13 @@ pub fn for_cpu(
         .reads(scene, args)
         .into_iter()
         .filter(|bind| !bind.filtered && stores(bind.slot) && is_texture(bind))
-        .filter_map(|bind| Some((bind.name, image_format(bind.slot.format(scene))?)))
+        .filter_map(|bind| Some((bind.name, ImageFormat::from_u32(bind.slot.format(scene) as u32)?)))
         .collect();
     let words =
         hoist_uniforms(words).and_then(|words| texture_to_storage(&words, &textures)).map_err(|e| e.to_string())?;
     let reads = pass.reads(scene, args);
     storage_to_texel_buffer(&words, |name| reads.iter().any(|b| b.name == name && stores(b.slot)))
         .map_err(|e| e.to_string())
-}
-
-fn image_format(format: Format) -> Option<ImageFormat> {
-    Some(match format {
-        Format::R8 => ImageFormat::R8,
-        Format::R16 => ImageFormat::R16,
-        Format::R16f => ImageFormat::R16f,
-        Format::R32f => ImageFormat::R32f,
-        Format::Rg16 => ImageFormat::Rg16,
-        Format::Rg16f => ImageFormat::Rg16f,
-        Format::Rg32f => ImageFormat::Rg32f,
-        Format::R32u => ImageFormat::R32ui,
-        Format::Rg32u => ImageFormat::Rg32ui,
-        Format::Rgba16f => ImageFormat::Rgba16f,
-        Format::Rgba32f => ImageFormat::Rgba32f,
-        Format::Rgba8 => ImageFormat::Rgba8,
-        // No shader declares the order of most windows, and none reads what is shown.
-        Format::Bgra8 | Format::Floats => return None,
-    })
 }
 
 /// Checks a pass's declaration against its shader's reflection: bindings, parameters and constants, and that the width of a workgroup is a multiple

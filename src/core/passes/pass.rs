@@ -6,6 +6,7 @@ pub(super) use super::slots::{composited_beside_surface, toned_slot};
 pub(super) use super::texels::pixels;
 pub use super::texels::{Arrays, Texels};
 use crate::scene::{MAX_DEVIATION, Scene};
+use crate::tree::Name;
 use glam::DVec3;
 use std::ops::Deref;
 
@@ -16,23 +17,13 @@ pub fn is_hit(distance: f64) -> bool {
     distance < 3e38
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Name)]
+#[tree(rename_all = "lowercase")]
 pub enum Stage {
     Preprocess,
     Raycast,
     Shade,
     Postprocess,
-}
-
-impl Stage {
-    pub fn name(self) -> &'static str {
-        match self {
-            Stage::Preprocess => "preprocess",
-            Stage::Raycast => "raycast",
-            Stage::Shade => "shade",
-            Stage::Postprocess => "postprocess",
-        }
-    }
 }
 
 /// How often a pass runs.

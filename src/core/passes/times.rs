@@ -14,6 +14,19 @@ pub struct PassTime {
     pub total: f64,
 }
 
+impl PassTime {
+    /// Adds this time to the one of the same name in `all`, or appends it.
+    pub fn add_to(&self, all: &mut Vec<PassTime>) {
+        match all.iter_mut().find(|time| time.name == self.name) {
+            Some(time) => {
+                time.runs += self.runs;
+                time.total += self.total;
+            }
+            None => all.push(self.clone()),
+        }
+    }
+}
+
 /// Formats pass times as a table: one line per pass, their sum and, for a volume of a probe, the time that sound needs ([`acquisition_floor`]). If
 /// `measured` is empty it says that the device has no time stamps.
 pub fn pass_time_table(measured: &[PassTime], scene: &Scene) -> String {

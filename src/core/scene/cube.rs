@@ -74,23 +74,29 @@ impl Scene {
 /// The mean of the corners of a convex solid, a point strictly inside it. None if the solid is flat or empty. `slack`: by how many mm
 /// rounding may put a corner beyond a face.
 fn middle_of(faces: &[HalfSpace], slack: f64) -> Option<DVec3> {
-    let (mut sum, mut count) = (DVec3::ZERO, 0.0);
-    for (i, a) in faces.iter().enumerate() {
-        for (j, b) in faces.iter().enumerate().skip(i + 1) {
-            for c in faces.iter().skip(j + 1) {
+    let corners = corners(faces, 1e-9, slack);
+    (!corners.is_empty()).then(|| corners.iter().sum::<DVec3>() / corners.len() as f64)
+}
+
+/// Corners of the intersection of half-spaces. Three planes have none if the determinant of their normals is below `least`. `slack`: by how many mm
+/// rounding may put a corner beyond a plane.
+pub(super) fn corners(planes: &[HalfSpace], least: f64, slack: f64) -> Vec<DVec3> {
+    let mut corners = Vec::new();
+    for (i, a) in planes.iter().enumerate() {
+        for (j, b) in planes.iter().enumerate().skip(i + 1) {
+            for c in planes.iter().skip(j + 1) {
                 let across = DMat3::from_cols(a.normal, b.normal, c.normal).transpose();
-                if across.determinant().abs() < 1e-9 {
+                if across.determinant().abs() < least {
                     continue;
                 }
                 let corner = across.inverse() * DVec3::new(a.limit, b.limit, c.limit);
-                if faces.iter().all(|f| f.room(corner) > -slack) {
-                    sum += corner;
-                    count += 1.0;
+                if planes.iter().all(|plane| plane.normal.dot(corner) <= plane.limit + slack) {
+                    corners.push(corner);
                 }
             }
         }
     }
-    (count > 0.0).then(|| sum / count)
+    corners
 }
 
 #[cfg(test)]

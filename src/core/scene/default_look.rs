@@ -13,12 +13,12 @@
 
 use super::echo_levels::EchoLevels;
 use super::load::{Layers, LoadError, preset_settings, rebase};
-use super::region::{insonified_box, slice_grid};
+use super::region::{self, insonified_box, slice_grid};
 use super::{
     Compositing, EchoHistogram, Elevation, Input, Layout, MAX_DEVIATION, Mode, Scene, SceneError, Settings, Transfer,
     TransferPoint, Volume, transfer,
 };
-use crate::probe::{Geometry, Motion};
+use crate::probe::Geometry;
 use crate::tree::ToNode;
 use std::path::Path;
 use toml::{Table, Value};
@@ -284,8 +284,7 @@ impl Found<'_> {
 
     fn mode(&mut self, geometry: &Geometry) -> Mode {
         let chosen = self.chosen;
-        let is_frame = geometry.slices() == 1
-            || matches!(geometry, Geometry::Sweep(probe) if matches!(probe.motion, Motion::Still { .. }));
+        let is_frame = geometry.slices() == 1 || region::is_still(geometry);
         // A pair is of mode surface; a single frame has no layout.
         let is_fixed = chosen.layout == Layout::Pair || (chosen.layout.has_planes() && is_frame);
         if self.layers.has("mode") || is_fixed || !self.layers.presets().is_empty() {

@@ -1,6 +1,6 @@
 //! Floating parts: small parts of a volume that touch no other drawn part.
 
-use super::{Scene, SceneError, Sign, refuse, transfer};
+use super::{Scene, SceneError, Sign, refuse, region, transfer};
 use crate::probe::{Geometry, Motion};
 
 /// Sizes of parts are integers, so that their sums are exact: of so many a texel, of a fan one at its end. 16 billion of them fit.
@@ -9,7 +9,7 @@ const PER_TEXEL: f64 = (1u64 << 30) as f64;
 impl Scene {
     /// True if floating parts are dropped: `floating` is set, the mode composites or detects a surface, and the volume has several slices.
     pub fn drops_floating(&self) -> bool {
-        let is_still = self.probe().is_some_and(|probe| matches!(probe.motion, Motion::Still { .. }));
+        let is_still = region::is_still(&self.geometry);
         self.settings.floating > 0.0 && (self.composites() || self.detects_surface()) && self.slices() > 1 && !is_still
     }
 

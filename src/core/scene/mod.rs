@@ -54,10 +54,12 @@ pub use settings::*;
 pub(crate) use smoothing::gaussian_radius;
 pub use still::{DistantLight, StillLights};
 pub use views::View;
+pub(crate) use views::windowed;
 pub use visible_bounds::{Rectangle, Shared, VisibleBounds};
 
 use crate::probe::StoredType;
 use crate::probe::{Geometry, Probe};
+use crate::tree::{FromNode, ToNode};
 use glam::DVec3;
 use region::{framed_low, is_still, slice_grid, visible_box};
 use sizes::{Pitches, ResolvedSize, Resolver};
@@ -157,6 +159,29 @@ pub enum WindowTexels {
     Bgra8,
     /// More than 8 bits a channel: the picture has 16-bit floats.
     Deep,
+}
+
+/// How pictures reach the screen: the present mode of the swapchain.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode, ToNode)]
+#[tree(rename_all = "lowercase")]
+pub enum PresentMode {
+    /// Each picture waits for a refresh of the monitor, without tearing.
+    #[default]
+    Fifo,
+    /// The newest picture at each refresh, if the driver supports it: less latency, but some pictures are never presented.
+    Mailbox,
+}
+
+impl std::str::FromStr for PresentMode {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<PresentMode, String> {
+        match text {
+            "fifo" => Ok(PresentMode::Fifo),
+            "mailbox" => Ok(PresentMode::Mailbox),
+            _ => Err("must be fifo or mailbox".into()),
+        }
+    }
 }
 
 #[derive(Clone, Debug)]

@@ -1,6 +1,6 @@
 //! Unveiling, resolved to the volume: the cells that fluid is looked for in, and which of their columns are in view.
 
-use super::{Scene, SceneError, cuts};
+use super::{Scene, SceneError, cuts, region};
 use crate::probe::{Geometry, Motion};
 
 // What is looked for is a pocket of fluid in a body and what is averaged out are the grains of ultrasound, both of a size in mm whatever the
@@ -28,7 +28,7 @@ pub(crate) struct FluidLattice {
 impl Scene {
     /// True if rendering starts at the start surface: `unveil` is enabled, and something is rendered from a volume of several slices.
     pub fn unveils(&self) -> bool {
-        let is_still = self.probe().is_some_and(|probe| matches!(probe.motion, Motion::Still { .. }));
+        let is_still = region::is_still(&self.geometry);
         self.settings.unveil.enabled && self.renders() && self.slices() > 1 && !is_still
     }
 

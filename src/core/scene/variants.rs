@@ -17,19 +17,6 @@ impl Variant {
     }
 }
 
-const MODES: [(Mode, &str); 10] = [
-    (Mode::Surface, "sr"),
-    (Mode::Volume, "vr"),
-    (Mode::Mixed, "mixed"),
-    (Mode::Mip, "mip"),
-    (Mode::MinIp, "minip"),
-    (Mode::Mean, "xray"),
-    (Mode::Plane, "mpr"),
-    (Mode::Orthogonal, "orthogonal"),
-    (Mode::Tomography, "tomography"),
-    (Mode::Cube, "cube"),
-];
-
 /// How rays may read the volume, each with another shader.
 const SAMPLINGS: [&str; 3] = ["hardware", "exact", "quads"];
 
@@ -95,7 +82,8 @@ const CHOICES: [&str; 53] = [
 /// presets do not go through it.
 pub fn switches(from: &Settings, follow: impl Fn(Settings) -> Settings) -> Vec<Variant> {
     let mut variants = vec![Variant::new("as it is", from.clone())];
-    for (mode, name) in MODES {
+    for mode in Mode::ALL {
+        let name = mode.name();
         let mut settings = from.clone();
         settings.set_mode(mode);
         settings.layout = Layout::Single;
@@ -134,12 +122,12 @@ pub fn all(from: &Settings) -> Vec<Variant> {
 }
 
 fn modes_of(from: &Settings, name: &str) -> Vec<Variant> {
-    let of = |(mode, mode_name): (Mode, &str)| {
+    let of = |mode: Mode| {
         let mut settings = from.clone();
         settings.set_mode(mode);
-        Variant::new(format!("{name}, mode {mode_name}"), settings)
+        Variant::new(format!("{name}, mode {}", mode.name()), settings)
     };
-    MODES.into_iter().map(of).collect()
+    Mode::ALL.into_iter().map(of).collect()
 }
 
 fn preset_over(from: &Settings, preset: &str) -> Option<Variant> {
@@ -166,8 +154,10 @@ mod tests {
     fn no_variant_is_lost_and_each_differs_from_the_start() {
         let from = Settings::default();
         let variants = all(&from);
-        let count =
-            switches(&from, |s| s).len() + SAMPLINGS.len() * MODES.len() + PRESETS.len() * MODES.len() + CHOICES.len();
+        let count = switches(&from, |s| s).len()
+            + SAMPLINGS.len() * Mode::ALL.len()
+            + PRESETS.len() * Mode::ALL.len()
+            + CHOICES.len();
         assert_eq!(variants.len(), count);
         let of_choices = &variants[count - CHOICES.len()..];
         for variant in of_choices {
@@ -182,7 +172,7 @@ mod tests {
         let from = Settings { layout: Layout::Pair, ..Settings::default() };
         let variants = switches(&from, |s| s);
         assert_eq!(variants[0].settings, from);
-        for (mode, _) in MODES {
+        for mode in Mode::ALL {
             let layouts: Vec<Layout> =
                 variants[1..].iter().filter(|v| v.settings.mode == mode).map(|v| v.settings.layout).collect();
             assert!(layouts.contains(&Layout::Single), "{mode:?}: {layouts:?}");

@@ -14,6 +14,11 @@ pub struct View {
     pub high: DVec3,
 }
 
+/// A sample after the grey window `low`..`high`, 0..1.
+pub(crate) fn windowed([low, high]: [f64; 2], sample: f64) -> f64 {
+    ((sample - low) / (high - low)).clamp(0.0, 1.0)
+}
+
 impl Scene {
     /// The box and grey window of the surface detector.
     pub fn surface_view(&self) -> View {

@@ -1,11 +1,12 @@
 //! Visible bounds: the texels of the volume that any sample of stage 2 may touch. Stage 1 computes only these (after Solteszova and
 //! others 2017, who filter only what a picture shows). They do not depend on the camera, which may move at any time.
 
+use super::cube::{self, HalfSpace};
 use super::planes::{Plane, Tile};
 use super::region::insonified_box;
 use super::{Mode, Scene, SliceGrid};
 use crate::probe::{Array, Geometry, Motion, Probe};
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 use std::ops::Range;
 
 /// Margin for rounding of positions in f32 and in the device's filter, texels.
@@ -385,24 +386,10 @@ fn corners(low: DVec3, high: DVec3, planes: &[(DVec3, f64)]) -> Vec<DVec3> {
         return Vec::new();
     }
     let sides = DVec3::AXES.iter().enumerate().flat_map(|(a, n)| [(-*n, -low[a]), (*n, high[a])]);
-    let all: Vec<(DVec3, f64)> = sides.chain(planes.iter().copied()).collect();
+    let all = sides.chain(planes.iter().copied()).map(|(normal, limit)| HalfSpace { normal, limit });
+    let all: Vec<HalfSpace> = all.collect();
     // A share of the box, and what f64 leaves of places that are far away.
     let tolerance = 1e-6 * (high - low).max_element() + 1e-14 * low.abs().max(high.abs()).max_element();
-    let mut corners = Vec::new();
-    for (i, a) in all.iter().enumerate() {
-        for (j, b) in all.iter().enumerate().skip(i + 1) {
-            for c in all.iter().skip(j + 1) {
-                let across = DMat3::from_cols(a.0, b.0, c.0).transpose();
-                // Nearly parallel planes add no corner that others do not give.
-                if across.determinant().abs() < 1e-6 {
-                    continue;
-                }
-                let corner = across.inverse() * DVec3::new(a.1, b.1, c.1);
-                if all.iter().all(|(normal, limit)| normal.dot(corner) <= limit + tolerance) {
-                    corners.push(corner);
-                }
-            }
-        }
-    }
-    corners
+    // Nearly parallel planes add no corner that others do not give.
+    cube::corners(&all, 1e-6, tolerance)
 }

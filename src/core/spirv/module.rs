@@ -41,6 +41,12 @@ pub(super) const MAX_BOUND: u32 = 0x3f_ffff;
 pub(super) const HEADER_WORDS: usize = 5;
 pub(super) const BOUND: usize = 3;
 
+/// A new identifier of the module that is being written. Its header has the bound.
+pub(super) fn next_id(out: &mut [u32]) -> u32 {
+    out[BOUND] += 1;
+    out[BOUND] - 1
+}
+
 /// One line for each shader: the SHA-256, in hexadecimal, of compiler options, macros and expanded source, then the shader's name in [`EMBEDDED`].
 pub const SOURCES: &str = include_str!("../../../spirv/SOURCES");
 

@@ -1,7 +1,7 @@
 //! Fault injection into shaders: modules that compute slightly different values, as the output of a faulty driver compiler
 //! would.
 
-use super::module::{BOUND, HEADER_WORDS, Instruction, Op, SpirvError, decode, encode, error, text};
+use super::module::{BOUND, HEADER_WORDS, Instruction, Op, SpirvError, decode, encode, error, next_id, text};
 use std::collections::HashSet;
 
 /// Number of the instruction FMin in the extended set GLSL.std.450: the smaller of two floats.
@@ -19,18 +19,8 @@ pub const F_SUB: Op = Op::FSub;
 /// # Errors
 /// The module is invalid or has no such instruction.
 pub fn replace_last(words: &[u32], from: u32, to: u32) -> Result<Vec<u32>, SpirvError> {
-    let instructions = decode(words)?;
-    let matches = |i: &Instruction| i.opcode == Op::ExtInst && i.operands.get(3) == Some(&from);
-    let Some(last) = instructions.iter().rposition(matches) else { return error("no such instruction") };
-    let mut out = words[..HEADER_WORDS].to_vec();
-    for (n, i) in instructions.iter().enumerate() {
-        let mut operands = i.operands.to_vec();
-        if n == last {
-            operands[3] = to;
-        }
-        out.extend(encode(i.opcode, &operands));
-    }
-    Ok(out)
+    let is_it = |i: &Instruction| i.opcode == Op::ExtInst && i.operands.get(3) == Some(&from);
+    with_last(words, is_it, |i| encode(i.opcode, &[&i.operands[..3], &[to], &i.operands[4..]].concat()))
 }
 
 /// Replaces the last instruction of opcode `from` by `to`, which takes the same operands.
@@ -38,11 +28,20 @@ pub fn replace_last(words: &[u32], from: u32, to: u32) -> Result<Vec<u32>, Spirv
 /// # Errors
 /// The module is invalid or has no such instruction.
 pub fn replace_last_opcode(words: &[u32], from: Op, to: Op) -> Result<Vec<u32>, SpirvError> {
+    with_last(words, |i| i.opcode == from, |i| encode(to, i.operands))
+}
+
+/// The module with another instruction in place of the last of those for which `is_it` is true.
+fn with_last(
+    words: &[u32],
+    is_it: impl Fn(&Instruction) -> bool,
+    other: impl Fn(&Instruction) -> Vec<u32>,
+) -> Result<Vec<u32>, SpirvError> {
     let instructions = decode(words)?;
-    let Some(last) = instructions.iter().rposition(|i| i.opcode == from) else { return error("no such instruction") };
+    let Some(last) = instructions.iter().rposition(is_it) else { return error("no such instruction") };
     let mut out = words[..HEADER_WORDS].to_vec();
     for (n, i) in instructions.iter().enumerate() {
-        out.extend(encode(if n == last { to } else { i.opcode }, i.operands));
+        out.extend(if n == last { other(i) } else { encode(i.opcode, i.operands) });
     }
     Ok(out)
 }
@@ -67,13 +66,8 @@ pub fn add_to_writes(words: &[u32], image: &str, amount: [f32; 4]) -> Result<Vec
         }
     }
     let (Some(float), Some(vector)) = (float, vector) else { return error("no vectors of four floats") };
-    let mut bound = words[BOUND];
-    let mut next = || {
-        bound += 1;
-        bound - 1
-    };
-    let (components, offset) = ([next(), next(), next(), next()], next());
     let mut out = words[..HEADER_WORDS].to_vec();
+    let (components, offset) = ([(); 4].map(|()| next_id(&mut out)), next_id(&mut out));
     let (mut is_declared, mut writes) = (false, 0);
     for i in &instructions {
         if i.opcode == Op::Function && !is_declared {
@@ -85,7 +79,7 @@ pub fn add_to_writes(words: &[u32], image: &str, amount: [f32; 4]) -> Result<Vec
         }
         match (i.opcode, i.operands) {
             (Op::ImageWrite, [to, at, texel, rest @ ..]) if images.contains(to) && vectors.contains(texel) => {
-                let sum = next();
+                let sum = next_id(&mut out);
                 out.extend(encode(Op::FAdd, &[vector, sum, *texel, offset]));
                 out.extend(encode(Op::ImageWrite, &[&[*to, *at, sum][..], rest].concat()));
                 writes += 1;
@@ -93,7 +87,6 @@ pub fn add_to_writes(words: &[u32], image: &str, amount: [f32; 4]) -> Result<Vec
             _ => out.extend(encode(i.opcode, i.operands)),
         }
     }
-    out[BOUND] = bound;
     if writes == 0 { error(format!("the module does not write to '{image}'")) } else { Ok(out) }
 }
 
@@ -104,20 +97,18 @@ pub fn add_to_writes(words: &[u32], image: &str, amount: [f32; 4]) -> Result<Vec
 /// The module is invalid or has no such instruction.
 pub fn round_to_half(words: &[u32]) -> Result<Vec<u32>, SpirvError> {
     let instructions = decode(words)?;
-    let mut bound = words[BOUND];
     let mut out = words[..HEADER_WORDS].to_vec();
     for i in &instructions {
         match (i.opcode, i.operands) {
             (Op::FAdd | Op::FSub | Op::FMul | Op::FDiv | Op::VectorTimesScalar, [of, id, a, b]) => {
-                out.extend(encode(i.opcode, &[*of, bound, *a, *b]));
-                out.extend(encode(Op::QuantizeToF16, &[*of, *id, bound]));
-                bound += 1;
+                let exact = next_id(&mut out);
+                out.extend(encode(i.opcode, &[*of, exact, *a, *b]));
+                out.extend(encode(Op::QuantizeToF16, &[*of, *id, exact]));
             }
             _ => out.extend(encode(i.opcode, i.operands)),
         }
     }
-    out[BOUND] = bound;
-    if bound == words[BOUND] { error("the module computes nothing with floats") } else { Ok(out) }
+    if out[BOUND] == words[BOUND] { error("the module computes nothing with floats") } else { Ok(out) }
 }
 
 #[cfg(test)]

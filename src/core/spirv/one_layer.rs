@@ -1,7 +1,7 @@
 //! Turns arrays of two-dimensional images that a module declares into single images, which hold one layer: for programs that run a shader and
 //! have no arrays of images.
 
-use super::module::{BOUND, HEADER_WORDS, Instruction, Op, SpirvError, decode, encode, error, is_of_images};
+use super::module::{BOUND, HEADER_WORDS, Instruction, Op, SpirvError, decode, encode, error, is_of_images, next_id};
 use std::collections::{HashMap, HashSet};
 
 /// Operand of an image type: whether it is an array.
@@ -20,22 +20,20 @@ pub fn one_layer(words: &[u32]) -> Result<Vec<u32>, SpirvError> {
     if words[BOUND] > 0xf_ffff || instructions.len() > 0xf_ffff {
         return error("no identifiers are left for new values");
     }
-    let mut rewrite = Rewrite { bound: words[BOUND], ..Rewrite::default() };
-    rewrite.find(&instructions);
+    let mut out = words[..HEADER_WORDS].to_vec();
+    let mut rewrite = Rewrite::default();
+    rewrite.find(&instructions, &mut out);
     if rewrite.layered.is_empty() {
         return Ok(words.to_vec());
     }
-    let mut out = words[..HEADER_WORDS].to_vec();
     for i in &instructions {
         rewrite.instruction(i.opcode, i.operands, &mut out)?;
     }
-    out[BOUND] = rewrite.bound;
     Ok(out)
 }
 
 #[derive(Default)]
 struct Rewrite {
-    bound: u32,
     /// Types of arrays, and of arrays with a sampler.
     layered: HashSet<u32>,
     /// Types that become equal to one before them, which takes their place.
@@ -55,7 +53,7 @@ struct Rewrite {
 }
 
 impl Rewrite {
-    fn find(&mut self, instructions: &[Instruction]) {
+    fn find(&mut self, instructions: &[Instruction], out: &mut [u32]) {
         let mut first = HashMap::new();
         for i in instructions {
             let a = i.operands;
@@ -77,7 +75,7 @@ impl Rewrite {
             }
         }
         if self.pair == 0 {
-            self.pair = self.next_id();
+            self.pair = next_id(out);
             self.declares_pair = true;
         }
     }
@@ -95,11 +93,6 @@ impl Rewrite {
 
     fn kept(&self, of: u32) -> u32 {
         self.same.get(&of).copied().unwrap_or(of)
-    }
-
-    fn next_id(&mut self) -> u32 {
-        self.bound += 1;
-        self.bound - 1
     }
 
     /// Appends the rewritten instruction, after whatever it needs.
@@ -135,7 +128,7 @@ impl Rewrite {
                 if *of != self.triple {
                     return error("the size of an array of images is no vector of three integers");
                 }
-                let size = self.next_id();
+                let size = next_id(out);
                 out.extend(encode(opcode, &[&[self.pair, size], rest].concat()));
                 encode(Op::CompositeConstruct, &[*of, *id, size, self.one])
             }
@@ -170,7 +163,7 @@ impl Rewrite {
         if self.declares_pair {
             out.extend(encode(Op::TypeVector, &[self.pair, self.int, 2]));
         }
-        self.one = self.next_id();
+        self.one = next_id(out);
         out.extend(encode(Op::Constant, &[self.int, self.one, 1]));
         Ok(())
     }
@@ -180,7 +173,7 @@ impl Rewrite {
         if !self.triples.contains(&at) {
             return error("a texel of an array of images has other than three integers as its place");
         }
-        let place = self.next_id();
+        let place = next_id(out);
         out.extend(encode(Op::VectorShuffle, &[self.pair, place, at, at, 0, 1]));
         Ok(place)
     }

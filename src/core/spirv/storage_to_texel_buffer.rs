@@ -3,15 +3,11 @@
 //! the pipeline is made, so that a shader needs no second variant.
 
 use super::module::{
-    BOUND, HEADER_WORDS, Instruction, Op, SpirvError, capability, decode, decoration, encode, error, storage_class,
-    text,
+    BOUND, HEADER_WORDS, Instruction, Op, SpirvError, capability, decode, decoration, encode, error, next_id,
+    storage_class, text,
 };
+use ::spirv::ImageFormat;
 use std::collections::HashMap;
-
-/// Image formats.
-const R32F: u32 = 3;
-const RG32F: u32 = 6;
-const RGBA32F: u32 = 1;
 
 /// An entry of a table.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
@@ -22,11 +18,11 @@ struct Entry {
 
 impl Entry {
     /// The image format of its texel.
-    fn format(self) -> u32 {
+    fn format(self) -> ImageFormat {
         match self.components {
-            1 => R32F,
-            2 => RG32F,
-            _ => RGBA32F,
+            1 => ImageFormat::R32f,
+            2 => ImageFormat::Rg32f,
+            _ => ImageFormat::Rgba32f,
         }
     }
 }
@@ -50,10 +46,10 @@ pub(crate) fn storage_to_texel_buffer(
     if words[BOUND] > 0x1f_ffff || instructions.len() > 0xf_ffff {
         return error("no identifiers are left for new types");
     }
-    let mut rewrite = Rewrite { bound: words[BOUND], tables, ..Rewrite::default() };
+    let mut rewrite = Rewrite { tables, ..Rewrite::default() };
     let mut out = words[..HEADER_WORDS].to_vec();
     let mut required = vec![capability::IMAGE_BUFFER];
-    if rewrite.tables.by_variable.values().any(|(_, entry)| entry.format() == RG32F) {
+    if rewrite.tables.by_variable.values().any(|(_, entry)| entry.format() == ImageFormat::Rg32f) {
         required.push(capability::STORAGE_IMAGE_EXTENDED_FORMATS);
     }
     for capability in required {
@@ -64,7 +60,6 @@ pub(crate) fn storage_to_texel_buffer(
     for i in &instructions {
         rewrite.instruction(i.opcode, i.operands, &mut out)?;
     }
-    out[BOUND] = rewrite.bound;
     Ok(out)
 }
 
@@ -130,26 +125,20 @@ struct Pointee {
 
 #[derive(Default)]
 struct Rewrite {
-    bound: u32,
     tables: Tables,
     /// By format: the new image type and the pointer type.
-    new_types: HashMap<u32, (u32, u32)>,
+    new_types: HashMap<ImageFormat, (u32, u32)>,
     /// By pointer.
     pointees: HashMap<u32, Pointee>,
 }
 
 impl Rewrite {
-    fn next_id(&mut self) -> u32 {
-        self.bound += 1;
-        self.bound - 1
-    }
-
     /// Appends the rewritten instruction, after whatever it needs declared.
     fn instruction(&mut self, opcode: Op, a: &[u32], out: &mut Vec<u32>) -> Result<(), SpirvError> {
         let table = |at: usize| a.get(at).and_then(|id| self.tables.by_variable.get(id)).map(|(_, entry)| *entry);
         match opcode {
-            Op::Variable if table(1).is_some() => {
-                let pointer = self.declare(table(1).map_or(0, Entry::format), out);
+            Op::Variable if let Some(entry) = table(1) => {
+                let pointer = self.declare(entry.format(), out);
                 out.extend(encode(opcode, &[pointer, a[1], 0]));
             }
             // Indices: the only member of the block, an entry, and possibly a component.
@@ -187,17 +176,17 @@ impl Rewrite {
 
     /// Declares the type of a texel buffer and its pointer type, once, and the vector of four floats that every texel is read
     /// as. Returns the pointer type.
-    fn declare(&mut self, format: u32, out: &mut Vec<u32>) -> u32 {
+    fn declare(&mut self, format: ImageFormat, out: &mut Vec<u32>) -> u32 {
         if self.tables.vec4 == 0 {
-            self.tables.vec4 = self.next_id();
+            self.tables.vec4 = next_id(out);
             out.extend(encode(Op::TypeVector, &[self.tables.vec4, self.tables.float, 4]));
         }
         if let Some((_, pointer)) = self.new_types.get(&format) {
             return *pointer;
         }
-        let (image, pointer) = (self.next_id(), self.next_id());
+        let (image, pointer) = (next_id(out), next_id(out));
         // Dimension Buffer (5), no depth, not arrayed, not multisampled, used as storage (2).
-        out.extend(encode(Op::TypeImage, &[image, self.tables.float, 5, 0, 0, 0, 2, format]));
+        out.extend(encode(Op::TypeImage, &[image, self.tables.float, 5, 0, 0, 0, 2, format as u32]));
         out.extend(encode(Op::TypePointer, &[pointer, 0, image]));
         self.new_types.insert(format, (image, pointer));
         pointer
@@ -207,7 +196,7 @@ impl Rewrite {
     fn image(&mut self, variable: u32, out: &mut Vec<u32>) -> u32 {
         let format = self.tables.by_variable[&variable].1.format();
         let image_type = self.new_types.get(&format).map_or(0, |types| types.0);
-        let image = self.next_id();
+        let image = next_id(out);
         out.extend(encode(Op::Load, &[image_type, image, variable]));
         image
     }
@@ -217,7 +206,7 @@ impl Rewrite {
         let entry = self.tables.by_variable[&variable].1;
         let image = self.image(variable, out);
         // A read returns four components; those that the format lacks are 0 and 1.
-        let texel = if entry.components == 4 && component.is_none() { result } else { self.next_id() };
+        let texel = if entry.components == 4 && component.is_none() { result } else { next_id(out) };
         out.extend(encode(Op::ImageRead, &[self.tables.vec4, texel, image, index]));
         match (component, entry.components) {
             (Some(component), _) => {

@@ -5,32 +5,14 @@
 
 use super::module::{
     BOUND, HEADER_WORDS, Instruction, MAX_BOUND, Op, SpirvError, capability, decode, decoration, encode, error,
-    is_of_images, text,
+    is_of_images, next_id, text,
 };
+pub use ::spirv::ImageFormat;
 use std::collections::HashMap;
 
-/// Formats of storage images, with their numbers in the SPIR-V specification.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum ImageFormat {
-    Rgba32f = 1,
-    Rgba16f = 2,
-    R32f = 3,
-    Rgba8 = 4,
-    Rg32f = 6,
-    Rg16f = 7,
-    R16f = 9,
-    Rg16 = 12,
-    R16 = 14,
-    R8 = 15,
-    R32ui = 33,
-    Rg32ui = 35,
-}
-
-impl ImageFormat {
-    /// True if it needs the capability StorageImageExtendedFormats.
-    fn is_extended(self) -> bool {
-        self as u32 > 5 && self != ImageFormat::R32ui
-    }
+/// True if a format needs the capability StorageImageExtendedFormats.
+fn is_extended(format: ImageFormat) -> bool {
+    format > ImageFormat::Rgba8Snorm && format != ImageFormat::R32ui
 }
 
 /// Image operand Lod.
@@ -51,10 +33,10 @@ pub(crate) fn texture_to_storage(words: &[u32], textures: &[(&str, ImageFormat)]
     if words[BOUND] > MAX_BOUND - 2 * textures.len() as u32 {
         return error("no identifiers are left for new types");
     }
-    let mut rewrite = Rewrite { bound: words[BOUND], ..Rewrite::default() };
+    let mut rewrite = Rewrite::default();
     rewrite.find(&instructions, textures)?;
     let mut out = words[..HEADER_WORDS].to_vec();
-    if textures.iter().any(|(_, format)| format.is_extended())
+    if textures.iter().any(|(_, format)| is_extended(*format))
         && !instructions
             .iter()
             .any(|i| i.opcode == Op::Capability && i.operands == [capability::STORAGE_IMAGE_EXTENDED_FORMATS])
@@ -64,13 +46,11 @@ pub(crate) fn texture_to_storage(words: &[u32], textures: &[(&str, ImageFormat)]
     for i in &instructions {
         rewrite.instruction(i.opcode, i.operands, &mut out)?;
     }
-    out[BOUND] = rewrite.bound;
     Ok(out)
 }
 
 #[derive(Default)]
 struct Rewrite {
-    bound: u32,
     /// The variables that become storage images.
     formats: HashMap<u32, ImageFormat>,
     /// By variable: the operands of its image type after the type's identifier, without usage and format.
@@ -114,11 +94,6 @@ impl Rewrite {
             Some((name, _)) => error(format!("'{name}' is not a texture")),
             None => Ok(()),
         }
-    }
-
-    fn next_id(&mut self) -> u32 {
-        self.bound += 1;
-        self.bound - 1
     }
 
     /// Appends the rewritten instruction, after whatever it needs declared.
@@ -177,7 +152,7 @@ impl Rewrite {
         let (image, pointer) = match self.new_types.get(&key) {
             Some(types) => *types,
             None => {
-                let (image, pointer) = (self.next_id(), self.next_id());
+                let (image, pointer) = (next_id(out), next_id(out));
                 let mut operands = vec![image];
                 operands.extend(&key.0);
                 operands.extend([2, format as u32]);

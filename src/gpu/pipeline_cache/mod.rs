@@ -5,6 +5,7 @@ mod stored;
 
 pub use stored::DriverIdentity;
 
+use crate::sync::locked;
 use ash::vk;
 use std::path::Path;
 use std::sync::Mutex;
@@ -13,7 +14,9 @@ use stored::{CacheFile, checksum};
 
 /// The Vulkan pipeline cache of a device. Without a folder the handle is null: pipelines are compiled without a cache.
 pub(crate) struct PipelineCache {
-    handle: vk::PipelineCache,
+    /// The handle for vkCreateComputePipelines; null without a folder, or if the driver could not create a cache. Several threads may use it at the
+    /// same time.
+    pub handle: vk::PipelineCache,
     file: Option<CacheFile>,
     /// What the file held when it was read or written last: bytes, and their checksum.
     stored: Mutex<(usize, u64)>,
@@ -33,7 +36,7 @@ impl PipelineCache {
         };
         let Some(file) = &cache.file else { return cache };
         let data = file.read().unwrap_or_else(|fault| {
-            tracing::debug!("pipeline cache {}: {fault}; it is replaced", file.path().display());
+            tracing::debug!("pipeline cache {}: {fault}; it is replaced", file.path.display());
             None
         });
         let data = data.unwrap_or_default();
@@ -41,7 +44,7 @@ impl PipelineCache {
         let made = create(device, &data).map(|handle| (handle, data.as_slice()));
         match made.or_else(|_| create(device, &[]).map(|handle| (handle, [].as_slice()))) {
             Ok((handle, data)) => {
-                tracing::debug!("pipeline cache {}: {} bytes", file.path().display(), data.len());
+                tracing::debug!("pipeline cache {}: {} bytes", file.path.display(), data.len());
                 cache.handle = handle;
                 cache.stored = Mutex::new((data.len(), checksum(data)));
             }
@@ -51,12 +54,6 @@ impl PipelineCache {
             }
         }
         cache
-    }
-
-    /// The handle for vkCreateComputePipelines; null without a folder, or if the driver could not create a cache. Several threads may use it at the
-    /// same time.
-    pub fn handle(&self) -> vk::PipelineCache {
-        self.handle
     }
 
     /// Notes that a pipeline was made with this cache. `hit`: the driver says that it took the pipeline from the cache; `None` if it does not say.
@@ -69,7 +66,7 @@ impl PipelineCache {
     /// Writes the cache to its file, if pipelines were compiled that the file lacks. What another program added since is kept.
     pub fn store(&self, device: &ash::Device) {
         let Some(file) = &self.file else { return };
-        let mut stored = self.stored.lock().unwrap_or_else(|e| e.into_inner());
+        let mut stored = locked(&self.stored);
         if !self.has_grown.swap(false, Ordering::Relaxed) {
             return;
         }
@@ -83,12 +80,12 @@ impl PipelineCache {
             Err(result) => return tracing::debug!("pipeline cache: {result:?}; it is not stored"),
         };
         let now = (data.len(), checksum(&data));
-        if now == *stored && file.path().exists() {
+        if now == *stored && file.path.exists() {
             return;
         }
         match file.write(&data) {
             Ok(()) => {
-                tracing::debug!("pipeline cache {}: {} bytes stored", file.path().display(), data.len());
+                tracing::debug!("pipeline cache {}: {} bytes stored", file.path.display(), data.len());
                 *stored = now;
             }
             Err(fault) => tracing::debug!("pipeline cache: {fault}; it is not stored"),

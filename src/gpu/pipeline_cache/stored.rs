@@ -51,7 +51,7 @@ impl DriverIdentity {
 /// The file of a driver's pipeline cache, in a folder that need not exist.
 #[derive(Clone, Debug)]
 pub(crate) struct CacheFile {
-    path: PathBuf,
+    pub path: PathBuf,
     identity: DriverIdentity,
     /// Of the embedded shaders. The pipelines of other ones would stay in the file for ever.
     shaders: u64,
@@ -61,10 +61,6 @@ impl CacheFile {
     pub fn new(folder: &Path, identity: &DriverIdentity) -> CacheFile {
         let shaders = checksum(spirv::SOURCES.as_bytes());
         CacheFile { path: folder.join(identity.file_name()), identity: identity.clone(), shaders }
-    }
-
-    pub fn path(&self) -> &Path {
-        &self.path
     }
 
     /// Reads the driver's data from the file. `None` if there is no file.
@@ -197,7 +193,7 @@ mod tests {
             file.write(&data(&identity(), &more)).unwrap();
             assert_eq!(file.read(), Ok(Some(data(&identity(), &more))));
         }
-        let name = file.path().file_name().unwrap().to_string_lossy().into_owned();
+        let name = file.path.file_name().unwrap().to_string_lossy().into_owned();
         assert_eq!(name, "10de-2684-06400007-30313233343536373839616263646566.pipelines");
     }
 
@@ -207,19 +203,19 @@ mod tests {
         let folder = folder();
         let file = CacheFile::new(folder.path(), &identity());
         file.write(&data(&identity(), &[1, 2, 3, 4, 5])).unwrap();
-        let good = std::fs::read(file.path()).unwrap();
+        let good = std::fs::read(&file.path).unwrap();
         assert_eq!(good.len(), HEADER + VULKAN_HEADER + 5);
         for at in 0..good.len() {
             for flipped in [1, 0x80, 0xff] {
                 let mut bad = good.clone();
                 bad[at] ^= flipped;
-                std::fs::write(file.path(), bad).unwrap();
+                std::fs::write(&file.path, bad).unwrap();
                 assert!(file.read().is_err(), "byte {at} ^ {flipped:#x}");
             }
-            std::fs::write(file.path(), &good[..at]).unwrap();
+            std::fs::write(&file.path, &good[..at]).unwrap();
             assert!(file.read().is_err(), "{at} bytes");
         }
-        std::fs::write(file.path(), [&good[..], &[0]].concat()).unwrap();
+        std::fs::write(&file.path, [&good[..], &[0]].concat()).unwrap();
         assert!(file.read().is_err(), "one byte more");
         file.write(&data(&identity(), &[9])).unwrap();
         assert_eq!(file.read(), Ok(Some(data(&identity(), &[9]))));
@@ -239,9 +235,9 @@ mod tests {
         let file = CacheFile::new(folder.path(), &ours);
         for other in &others {
             let theirs = CacheFile::new(folder.path(), other);
-            assert_ne!(file.path(), theirs.path());
+            assert_ne!(file.path, theirs.path);
             theirs.write(&data(other, &[1])).unwrap();
-            std::fs::copy(theirs.path(), file.path()).unwrap();
+            std::fs::copy(&theirs.path, &file.path).unwrap();
             assert!(file.read().unwrap_err().contains("another device or driver"), "{other:?}");
             if other.driver_version == ours.driver_version {
                 // The version is not in Vulkan's header.
@@ -271,7 +267,7 @@ mod tests {
         for version in 0..12 {
             let file = of(version);
             file.write(&data(&file.identity, &[])).unwrap();
-            old(file.path(), u64::from(100 - version));
+            old(&file.path, u64::from(100 - version));
         }
         let parts = [".echolume-old.part", ".echolume-new.part", "foreign.txt"].map(|name| folder.path().join(name));
         for part in &parts {
@@ -280,9 +276,9 @@ mod tests {
         old(&parts[0], 2);
         let last = of(99);
         last.write(&data(&last.identity, &[])).unwrap();
-        let left: Vec<bool> = (0..12).map(|version| of(version).path().exists()).collect();
+        let left: Vec<bool> = (0..12).map(|version| of(version).path.exists()).collect();
         assert_eq!(left, (0..12).map(|version| version >= 12 - (MAX_FILES as u32 - 1)).collect::<Vec<_>>());
-        assert!(last.path().exists());
+        assert!(last.path.exists());
         assert_eq!(parts.each_ref().map(|part| part.exists()), [false, true, true]);
     }
 

@@ -17,7 +17,7 @@ impl Renderer {
     pub fn show(&mut self, image: u32) -> Result<(), GpuError> {
         self.check(image)?;
         self.flush()?;
-        self.volumes.show(image);
+        self.volumes.shown = image;
         self.stale.fill(true);
         Ok(())
     }
@@ -37,7 +37,7 @@ impl Renderer {
     /// # Errors
     /// The device fails, or the last change of the scene failed.
     pub fn begin_picture(&mut self) -> Result<(), GpuError> {
-        self.check(self.volumes.shown())?;
+        self.check(self.volumes.shown)?;
         self.wait_drawn()?;
         match self.stale.iter().any(|stale| *stale) {
             true => self.draw(),
@@ -71,12 +71,12 @@ impl Renderer {
 
     /// The most expensive part of the rendering that ran for the last picture, which may still be in flight.
     pub fn drawn_work(&self) -> Work {
-        self.drawing.work()
+        self.drawing.work
     }
 
     /// True if there is a picture of the current size, done or in flight.
     pub fn has_drawn(&self) -> bool {
-        self.drawing.has_picture()
+        self.drawing.has_picture
     }
 
     /// Waits for the picture in flight and returns it; without one, returns the last picture. If pictures stay on the device, it is copied to the
@@ -93,7 +93,7 @@ impl Renderer {
             Format::Bgra8 => bytes.chunks_exact(4).flat_map(|c| [c[2], c[1], c[0], c[3]]).collect(),
             _ => Texels::decode([width as usize, height as usize, 1], format, bytes).encode(Format::Rgba8),
         };
-        let rgba = match self.drawing.readback() {
+        let rgba = match &self.drawing.readback {
             Some(readback) => in_8_bits(&readback.bytes()?, Slot::Screen.format(&self.program.scene)),
             None => match self.bring_back(Slot::Screen)? {
                 Some((readback, _, format)) => in_8_bits(&readback.bytes()?, format),
@@ -108,7 +108,7 @@ impl Renderer {
     /// # Errors
     /// The device fails.
     pub fn end_drawing(&mut self) -> Result<Option<Picture>, GpuError> {
-        match self.drawing.readback().is_some() {
+        match self.drawing.readback.is_some() {
             true => self.end_picture().map(Some),
             false => {
                 self.wait_drawn()?;
@@ -143,7 +143,7 @@ impl Renderer {
                 _ => std::iter::once(0..1).collect(),
             };
             if step.pass.frequency == Frequency::Volume && !runs.is_empty() {
-                self.volumes.set_filtered(self.program.scene.visible_bounds);
+                self.volumes.filtered = self.program.scene.visible_bounds;
                 for (slot, search) in self.volumes.due_searches(&step, &self.program.scene) {
                     searched.push(slot);
                     self.find(slot, &search)?;
@@ -151,7 +151,7 @@ impl Renderer {
             }
             for slices in runs {
                 let (slice, slices) = (slices.start, slices.end - slices.start);
-                let args = DispatchArgs { image: self.volumes.shown(), slice, slices, ..step.args() };
+                let args = DispatchArgs { image: self.volumes.shown, slice, slices, ..step.args() };
                 self.drawing.dispatch(&mut self.queues, &self.program.dispatch(i, &self.slots, &args))?;
             }
             // The slots count as written from here on. If the submission fails, all steps stay stale.
@@ -177,7 +177,7 @@ impl Renderer {
 
     /// Finds something in the volume that is shown, and uploads it to `target`. What was recorded before is done first; the recording goes on afterwards.
     fn find(&mut self, target: Slot, search: &Search) -> Result<(), GpuError> {
-        let (name, shown) = (search.name, self.volumes.shown());
+        let (name, shown) = (search.name, self.volumes.shown);
         let volume = self.drawing.fetch(&mut self.queues, &self.slots, name, (search.within, shown))?;
         let Some(volume) = volume else { return Ok(()) };
         let (scene, bytes) = (&self.program.scene, volume.bytes()?);
@@ -202,7 +202,7 @@ impl Renderer {
         at: [u32; 2],
         panels: Option<Panels>,
     ) -> Result<PresentOutcome, GpuError> {
-        self.check(self.volumes.shown())?;
+        self.check(self.volumes.shown)?;
         let is_kept = self.queues.timelines.is_paced();
         let Some(image) = self.slots.image(Slot::Screen, 0) else { return screen.show(panels) };
         let outcome = screen.show_picture(Drawn { image, queues: &mut self.queues, at, is_kept }, panels);

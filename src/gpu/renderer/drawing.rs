@@ -19,8 +19,8 @@ use std::sync::Arc;
 pub(super) struct Drawing {
     // Dropped first.
     recorder: CommandRecorder,
-    /// `None` if pictures stay on the device.
-    readback: Option<Readback>,
+    /// The buffers with the last picture on the host, once it was waited for. `None` if pictures stay on the device.
+    pub readback: Option<Readback>,
     /// Buffers of a single copy, kept until the device is done with them.
     uploads: Vec<Upload>,
     unread: Vec<Readback>,
@@ -28,11 +28,11 @@ pub(super) struct Drawing {
     /// `None` if no dispatch is divided.
     limit: Option<BandLimit>,
     /// A picture has been submitted and not waited for.
-    is_in_flight: bool,
-    /// The picture's image holds a picture, or will when the device is done.
-    has_picture: bool,
-    /// How much of the picture was drawn last.
-    work: Work,
+    pub is_in_flight: bool,
+    /// The picture's image holds a picture of the current size, or will when the device is done.
+    pub has_picture: bool,
+    /// The most expensive part of the rendering that ran for the last picture.
+    pub work: Work,
     /// The value of queue 0's timeline at which the last presentation is done.
     presented: u64,
 }
@@ -108,7 +108,7 @@ impl Drawing {
         self.recorder.upload(queues, &upload, there, place);
         self.uploads.push(upload);
         self.recorder.submit(queues)?;
-        queues.wait_all()?;
+        queues.timelines.wait_all()?;
         self.uploads.clear();
         Ok(())
     }
@@ -169,7 +169,7 @@ impl Drawing {
         submit: fn(&mut CommandRecorder, &mut DeviceQueues) -> Result<(), GpuError>,
     ) -> Result<Readback, GpuError> {
         self.recorder.copy_out(queues, there, slot, if slot.is_multibuffered() { image } else { 0 }, &buffer);
-        match submit(&mut self.recorder, queues).and_then(|()| queues.wait_all()) {
+        match submit(&mut self.recorder, queues).and_then(|()| queues.timelines.wait_all()) {
             Ok(()) => Ok(buffer),
             Err(error) => {
                 // The copy may still be running: the buffer must outlive it.
@@ -218,24 +218,9 @@ impl Drawing {
         Ok(())
     }
 
-    /// True if a picture has been submitted and was not waited for.
-    pub(crate) fn is_in_flight(&self) -> bool {
-        self.is_in_flight
-    }
-
-    /// True if there is a picture of the current size, done or in flight.
-    pub(crate) fn has_picture(&self) -> bool {
-        self.has_picture
-    }
-
     /// True if the device is at work on a picture. It also submits what is held back of the picture and due.
     pub fn is_drawing(&self, queues: &DeviceQueues) -> Result<bool, GpuError> {
         Ok(self.is_in_flight && (!self.recorder.is_done(queues)? || self.context.faults.holds_pictures()))
-    }
-
-    /// The most expensive part of the rendering that ran for the last picture.
-    pub fn work(&self) -> Work {
-        self.work
     }
 
     /// Waits for the picture in flight.
@@ -252,20 +237,15 @@ impl Drawing {
         self.recorder.collect(queues)
     }
 
-    /// The buffers with the last picture on the host, which must have been waited for. `None` if pictures stay on the device.
-    pub fn readback(&self) -> Option<&Readback> {
-        self.readback.as_ref()
-    }
-
     /// Notes that the last submission to queue 0 presents the picture.
     #[cfg(feature = "view")]
     pub fn presented(&mut self, queues: &DeviceQueues) {
-        self.presented = queues.timelines.of(0).submitted;
+        self.presented = queues.timelines.0[0].submitted;
     }
 
     /// Waits until the last presentation has read the picture's image.
     pub(crate) fn wait_presented(&self, queues: &DeviceQueues) -> Result<(), GpuError> {
-        queues.timelines.of(0).wait(self.presented)
+        queues.timelines.0[0].wait(self.presented)
     }
 }
 

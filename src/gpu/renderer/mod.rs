@@ -25,6 +25,7 @@ use crate::probe::Frame;
 use crate::queues::MAX_QUEUES;
 use crate::queues::oracle::SubmissionLog;
 use crate::scene::{Scene, VisibleBounds};
+use crate::tree::Defaults;
 use drawing::Drawing;
 use ingest::{Ring, frame_bytes};
 use std::collections::HashSet;
@@ -33,12 +34,14 @@ use std::time::Duration;
 use volumes::Volumes;
 
 /// How a [`Renderer`] works.
-#[derive(Clone)]
+#[derive(Clone, Defaults)]
 pub struct RendererOptions {
     /// Number of volume images, copies of the volume on the device: 1 for a still picture, 2 or 3 (double or triple buffering) while frames arrive
     /// during rendering.
+    #[value(1)]
     pub volume_images: u32,
     /// Source of the SPIR-V of a shader. The default is the embedded shaders.
+    #[value(embedded())]
     pub shaders: Arc<Shaders>,
     /// Records the span of time (begin and end) of each operation of host and device ([`Renderer::take_spans`]). If each pass is timed, shader
     /// invocations are counted, too.
@@ -61,31 +64,12 @@ pub struct RendererOptions {
     /// Number of queues, 1..=3. `None` uses all queues of the device. If the device has fewer queues, several roles share one.
     pub queues: Option<usize>,
     /// True: every picture is copied to the host. False: pictures stay on the device, for presentation.
+    #[value(true)]
     pub readback: bool,
     /// A function that is called after each pipeline that was compiled in the background for [`Renderer::prepare`].
     pub wake: Option<Wake>,
     /// Keeps a log of everything that is recorded and submitted ([`Renderer::log`]).
     pub log: bool,
-}
-
-impl Default for RendererOptions {
-    fn default() -> Self {
-        RendererOptions {
-            volume_images: 1,
-            shaders: embedded(),
-            spans: false,
-            cpu_times: false,
-            time_stamps: TimeStamps::default(),
-            bands: Bands::default(),
-            paced: false,
-            texel_access: None,
-            frames_at_once: None,
-            queues: None,
-            readback: true,
-            wake: None,
-            log: false,
-        }
-    }
 }
 
 impl RendererOptions {
@@ -178,7 +162,7 @@ impl Renderer {
 
     /// How single texels are read.
     pub fn texel_access(&self) -> TexelAccess {
-        self.compiler.texel_access()
+        self.compiler.texel_access
     }
 
     /// Size of a frame of the current scene, bytes.
@@ -206,7 +190,7 @@ impl Renderer {
         for (slot, _) in new {
             self.fill(slot)?;
         }
-        self.queues.wait_all()?;
+        self.queues.timelines.wait_all()?;
         // The next frame may write what was cleared here.
         self.context.show_layer_the_wait()
     }
@@ -235,7 +219,7 @@ impl Renderer {
     /// Waits until the device is idle, and adds up the measured times.
     fn collect(&mut self) -> Result<(), GpuError> {
         self.flush()?;
-        self.queues.wait_all()?;
+        self.queues.timelines.wait_all()?;
         self.ring.collect(&mut self.queues)?;
         self.drawing.collect(&mut self.queues)
     }
@@ -265,14 +249,14 @@ impl Renderer {
     pub fn frame(&mut self, slice: u32, bytes: &[u8], image: u32) -> Result<(), GpuError> {
         self.check(image)?;
         self.check_frame(slice as usize, bytes)?;
-        self.volumes.set_filtered(self.program.scene.visible_bounds);
+        self.volumes.filtered = self.program.scene.visible_bounds;
         if !self.program.scene.visible_frames().contains(&slice) {
             self.skipped += 1;
             return Ok(());
         }
         if !self.ring.continues(image, slice) {
             self.flush()?;
-            self.ring.wait(&mut self.queues, self.drawing.is_in_flight())?;
+            self.ring.wait(&mut self.queues, self.drawing.is_in_flight)?;
         }
         let bytes = self.context.faults.changed_frame(&self.program.scene, bytes);
         self.ring.write(&mut self.queues, image, slice, &bytes);
@@ -369,7 +353,7 @@ impl Renderer {
         let old = &self.program;
         let (mut scene, plan) = self.compiler.plan(scene.keeping(&old.scene));
         // After the visible region shrank, the volume still holds the larger one.
-        let before = Scene { visible_bounds: self.volumes.filtered(), ..old.scene.clone() };
+        let before = Scene { visible_bounds: self.volumes.filtered, ..old.scene.clone() };
         let rerun = if self.broken.is_some() { Rerun::Everything } else { plan.rerun(&before, &scene) };
         let sends_frames = !matches!(rerun, Rerun::Steps { .. });
         if sends_frames {
@@ -401,7 +385,7 @@ impl Renderer {
         self.stale = plan.steps.iter().map(|s| kept.contains(&s.id())).collect();
         // Of frames that were not sent, none may be counted on where smoothing across slices reaches further than it did for them.
         if sends_frames || scene.reach_across_slices() != old.scene.reach_across_slices() {
-            self.volumes.set_filtered(scene.visible_bounds);
+            self.volumes.filtered = scene.visible_bounds;
         }
         // Rays of smaller steps take longer than the last ones did, and so do cuts of more corners.
         for (step, pipeline) in plan.steps.iter().zip(&pipelines) {
@@ -482,7 +466,7 @@ impl Renderer {
 
     /// The current bytes of an image slot, its texels along x, y, z, and their format.
     fn bring_back(&mut self, slot: Slot) -> Result<Option<(Readback, [usize; 3], Format)>, GpuError> {
-        let shown = self.volumes.shown();
+        let shown = self.volumes.shown;
         self.check(shown)?;
         self.flush()?;
         self.drawing.bring_back(&mut self.queues, &self.slots, (slot, shown))

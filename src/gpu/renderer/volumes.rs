@@ -11,11 +11,12 @@ use std::ops::Range;
 /// Which slices of each volume image the passes over the volume have yet to process, and what the CPU has found in each volume image.
 pub(super) struct Volumes {
     count: u32,
-    shown: u32,
+    /// The index of the volume image that pictures show.
+    pub shown: u32,
     /// By volume image and slice: the passes over the volume have not processed it yet.
     unprocessed: Vec<Vec<bool>>,
-    /// The texels of every frame that stage 1 has filtered, as last noted.
-    filtered: VisibleBounds,
+    /// The texels of every frame that stage 1 filters, as last noted; at first those visible at the start.
+    pub filtered: VisibleBounds,
     /// What the CPU found and the device has: the slot that holds it, and the volume image that it was found in.
     found: Vec<(Slot, u32)>,
     /// By volume image: what the CPU found of its volume, where the render start follows the fluid.
@@ -45,15 +46,6 @@ impl Volumes {
         if image < self.count { Ok(()) } else { Err(GpuError::VolumeImage { image, images: self.count }) }
     }
 
-    /// The index of the volume image that pictures show.
-    pub fn shown(&self) -> u32 {
-        self.shown
-    }
-
-    pub fn show(&mut self, image: u32) {
-        self.shown = image;
-    }
-
     /// Marks every slice of every volume image as not processed.
     pub fn invalidate(&mut self, scene: &Scene) {
         self.unprocessed = vec![vec![true; scene.slices() as usize]; self.count as usize];
@@ -64,16 +56,6 @@ impl Volumes {
     pub fn replaced(&mut self, image: u32, slice: u32) {
         self.unprocessed[image as usize][slice as usize] = true;
         self.found.retain(|(_, of)| *of != image);
-    }
-
-    /// The region of the last [`Volumes::set_filtered`]; before the first call, the region visible at the start.
-    pub fn filtered(&self) -> VisibleBounds {
-        self.filtered
-    }
-
-    /// Notes that stage 1 filters this region from now on.
-    pub(crate) fn set_filtered(&mut self, bounds: VisibleBounds) {
-        self.filtered = bounds;
     }
 
     /// The ranges of visible slices of the shown volume image that a pass over the volume has to process.

@@ -1,16 +1,19 @@
 //! The composed window: picture and panels in an image of their own, which is copied to the window. While only the picture changes, as
 //! during a drag, the panels beside it stay as they are: drawing them takes a software device as long as a coarse picture.
 
-use super::flat_image::FlatImage;
 use crate::context::Context;
 use crate::error::GpuError;
+use crate::resources::RawImage;
 use ash::vk;
 use egui::ClippedPrimitive;
 use std::sync::Arc;
 
 /// The image in which picture and panels are composed for a window, and what was drawn into it last.
 pub(super) struct Composition {
-    pub image: FlatImage,
+    pub image: RawImage,
+    /// Those of the window; the size in pixels.
+    pub format: vk::Format,
+    pub size: [u32; 2],
     /// True if the image was drawn into, so that its layout is no longer UNDEFINED.
     pub is_laid_out: bool,
     /// What the image shows. None if that is not known.
@@ -35,12 +38,7 @@ impl Composition {
         let usage = vk::ImageUsageFlags::TRANSFER_DST
             | vk::ImageUsageFlags::TRANSFER_SRC
             | vk::ImageUsageFlags::COLOR_ATTACHMENT;
-        let image = FlatImage::new(context, "composed window", format, size, usage)?;
-        Ok(Composition { image, is_laid_out: false, content: None })
-    }
-
-    /// True if the image has this format and size, pixels, which are those of the window.
-    pub(super) fn fits(&self, format: vk::Format, size: [u32; 2]) -> bool {
-        (self.image.format, self.image.size) == (format, size)
+        let image = RawImage::flat(context, "composed window", format, size, usage)?;
+        Ok(Composition { image, format, size, is_laid_out: false, content: None })
     }
 }

@@ -1,14 +1,12 @@
 //! Presentation. `target` is a window, a monitor or a surface that nobody sees, and `swapchain` the images of its surface. `screen` copies the picture into
 //! `composition`, draws the panels over it, and copies the result into an image of the swapchain. `panel_textures` keeps the textures of
-//! the panels, and `flat_image` is the type of image of both. `present_wait` measures when a picture becomes visible. A build without the
+//! the panels. `present_wait` measures when a picture becomes visible. A build without the
 //! feature `view` has only a target that cannot exist.
 
 #[cfg(feature = "view")]
 mod composition;
 #[cfg(feature = "view")]
 mod damage;
-#[cfg(feature = "view")]
-mod flat_image;
 #[cfg(feature = "view")]
 mod panel_textures;
 #[cfg(feature = "view")]
@@ -23,9 +21,9 @@ pub(super) mod target;
 #[cfg(feature = "view")]
 pub use screen::{Panels, PresentOutcome, Screen, fixed_size};
 #[cfg(feature = "view")]
-pub use swapchain::PresentMode;
-#[cfg(feature = "view")]
 pub use target::{MonitorChoice, Target, WindowHandles};
+
+pub use crate::scene::PresentMode;
 
 /// The target of presentation in a build without the feature `view`. No value of it exists, so no function here is ever called.
 #[cfg(not(feature = "view"))]

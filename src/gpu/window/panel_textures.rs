@@ -1,11 +1,10 @@
 //! The textures of the panels: glyphs and pictures that egui reports as they change. They are copied by the command buffer that draws
 //! the panels, so that nothing waits for the queue: a picture may take long, and egui adds a glyph at any time.
 
-use super::flat_image::FlatImage;
 use crate::buffers::{Buffer, Purpose};
 use crate::context::Context;
 use crate::error::{ErrorContext, GpuError};
-use crate::resources::{COLOUR, image_barrier};
+use crate::resources::{self, COLOUR, RawImage, image_barrier};
 use ash::vk;
 use egui::epaint::{ImageData, ImageDelta, Primitive};
 use egui_ash_renderer::Renderer;
@@ -38,7 +37,7 @@ pub(super) struct PanelTextures {
 }
 
 struct Texture {
-    image: FlatImage,
+    image: RawImage,
     set: vk::DescriptorSet,
     /// The number under which the renderer draws it.
     drawn_as: egui::TextureId,
@@ -82,17 +81,10 @@ impl PanelTextures {
             .pool_sizes(&sizes)
             .max_sets(MAX_TEXTURES)
             .flags(vk::DescriptorPoolCreateFlags::FREE_DESCRIPTOR_SET);
-        let sampler = vk::SamplerCreateInfo::default()
-            .mag_filter(vk::Filter::LINEAR)
-            .min_filter(vk::Filter::LINEAR)
-            .address_mode_u(vk::SamplerAddressMode::CLAMP_TO_EDGE)
-            .address_mode_v(vk::SamplerAddressMode::CLAMP_TO_EDGE)
-            .address_mode_w(vk::SamplerAddressMode::CLAMP_TO_EDGE);
-        // SAFETY: the create structures are complete; a failure drops `textures`, which frees what is made (null is allowed).
-        unsafe {
-            textures.sets = device.create_descriptor_pool(&pool, None).context(|| "create a descriptor pool".into())?;
-            textures.sampler = device.create_sampler(&sampler, None).context(|| "create sampler".into())?;
-        }
+        // SAFETY: the create structure is complete; a failure drops `textures`, which frees what is made (null is allowed).
+        let sets = unsafe { device.create_descriptor_pool(&pool, None) };
+        textures.sets = sets.context(|| "create a descriptor pool".into())?;
+        textures.sampler = resources::sampler(context, vk::Filter::LINEAR)?;
         Ok(textures)
     }
 
@@ -148,10 +140,10 @@ impl PanelTextures {
 
     fn create(&self, renderer: &mut Renderer<DefaultAllocator>, size: [u32; 2]) -> Result<Texture, GpuError> {
         let usage = vk::ImageUsageFlags::TRANSFER_DST | vk::ImageUsageFlags::SAMPLED;
-        let image = FlatImage::new(&self.context, "panel texture", FORMAT, size, usage)?;
+        let image = RawImage::flat(&self.context, "panel texture", FORMAT, size, usage)?;
         let device = &self.context.device;
-        let set =
-            create_vulkan_descriptor_set(device, self.layout, self.sets, image.view, self.sampler).map_err(failed)?;
+        let set = create_vulkan_descriptor_set(device, self.layout, self.sets, image.views[0], self.sampler)
+            .map_err(failed)?;
         Ok(Texture { image, set, drawn_as: renderer.add_user_texture(set), is_filled: false })
     }
 
@@ -215,14 +207,11 @@ impl PanelTextures {
 impl Drop for PanelTextures {
     fn drop(&mut self) {
         self.textures.clear();
-        if self.context.is_given_up() {
-            return;
-        }
         // SAFETY: the owner waited for the device; null handles are allowed. The pool frees its sets.
-        unsafe {
-            self.context.device.destroy_descriptor_pool(self.sets, None);
-            self.context.device.destroy_descriptor_set_layout(self.layout, None);
-            self.context.device.destroy_sampler(self.sampler, None);
-        }
+        self.context.destroy(|device| unsafe {
+            device.destroy_descriptor_pool(self.sets, None);
+            device.destroy_descriptor_set_layout(self.layout, None);
+            device.destroy_sampler(self.sampler, None);
+        });
     }
 }

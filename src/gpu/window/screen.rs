@@ -1,9 +1,10 @@
 //! Presents a picture and panels: composes them, and copies them into the next image of the swapchain. One such drawing is in flight at a
 //! time, because a copy and a few triangles take little time compared with a picture.
 
+use super::PresentMode;
 use super::composition::{self, Composition};
 use super::panel_textures::{PanelTextures, failed};
-use super::swapchain::{PresentMode, Swapchain};
+use super::swapchain::Swapchain;
 use super::target::{Target, choose_monitor};
 use crate::barriers::{Access, PipelineStage};
 use crate::context::Context;
@@ -11,7 +12,7 @@ use crate::device_queues::DeviceQueues;
 use crate::error::{ErrorContext, GpuError};
 use crate::formats;
 use crate::passes::Slot;
-use crate::resources::{COLOUR, Image, WHOLE, image_barrier};
+use crate::resources::{COLOUR, Image, Side, WHOLE, image_barrier};
 use ash::vk;
 use egui_ash_renderer::allocator::DefaultAllocator;
 use egui_ash_renderer::{DynamicRendering, Options, RenderMode, Renderer};
@@ -287,7 +288,8 @@ impl Screen {
     fn fit_composition(&mut self, has_panels: bool) -> Result<Option<composition::Content>, GpuError> {
         let (format, size) = (self.chain.format, self.chain.size);
         // Its last drawing is done.
-        self.composition = self.composition.take().filter(|composition| has_panels && composition.fits(format, size));
+        let fits = |composition: &Composition| (composition.format, composition.size) == (format, size);
+        self.composition = self.composition.take().filter(|composition| has_panels && fits(composition));
         if has_panels && self.composition.is_none() {
             self.composition = Some(Composition::new(&self.context, format, size)?);
         }
@@ -381,7 +383,7 @@ impl Screen {
             go(Stage::Drawn);
             let area = vk::Rect2D { extent: vk::Extent2D { width: size[0], height: size[1] }, ..Default::default() };
             let colour = [vk::RenderingAttachmentInfo::default()
-                .image_view(composition.image.view)
+                .image_view(composition.image.views[0])
                 .image_layout(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)
                 .load_op(vk::AttachmentLoadOp::LOAD)
                 .store_op(vk::AttachmentStoreOp::STORE)];
@@ -437,11 +439,11 @@ impl Screen {
         if let Some(queues) = &queued {
             after = queues.tracker.waits(0);
             let wait = |w: &crate::queues::Wait| {
-                semaphore(queues.timelines.of(w.queue).semaphore).value(w.value).stage_mask(everything)
+                semaphore(queues.timelines.0[w.queue].semaphore).value(w.value).stage_mask(everything)
             };
             waits.extend(after.iter().map(wait));
             // Later work of the renderer waits for this too.
-            let timeline = queues.timelines.of(0);
+            let timeline = &queues.timelines.0[0];
             signals.push(semaphore(timeline.semaphore).value(timeline.submitted + 1).stage_mask(everything));
         }
         let submit = vk::SubmitInfo2::default()
@@ -458,8 +460,8 @@ impl Screen {
             return Err(error);
         }
         if let Some(queues) = queued {
-            queues.timelines.of_mut(0).advance("window");
-            queues.submitted(0, &after, queues.timelines.of(0).submitted);
+            queues.timelines.0[0].advance("window");
+            queues.submitted(0, &after, queues.timelines.0[0].submitted);
         }
         Ok(())
     }
@@ -580,42 +582,29 @@ enum Stage {
 }
 
 impl Stage {
-    fn layout(self) -> vk::ImageLayout {
+    /// Pipeline stages, accesses and layout of an image in this stage.
+    fn side(self) -> Side {
+        use vk::{AccessFlags2 as A, ImageLayout as L, PipelineStageFlags2 as P};
         match self {
-            Stage::New | Stage::Acquired => vk::ImageLayout::UNDEFINED,
-            Stage::Copied => vk::ImageLayout::TRANSFER_DST_OPTIMAL,
-            Stage::Drawn => vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
-            Stage::Composed => vk::ImageLayout::TRANSFER_SRC_OPTIMAL,
-            Stage::Shown => vk::ImageLayout::PRESENT_SRC_KHR,
-        }
-    }
-
-    fn stages(self) -> vk::PipelineStageFlags2 {
-        match self {
+            Stage::New => (P::ALL_COMMANDS, A::MEMORY_WRITE, L::UNDEFINED),
             // The stage of the wait for the semaphore of the acquired image.
-            Stage::Acquired | Stage::Copied | Stage::Composed => vk::PipelineStageFlags2::ALL_TRANSFER,
-            Stage::Drawn => vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT,
+            Stage::Acquired => (P::ALL_TRANSFER, A::NONE, L::UNDEFINED),
+            Stage::Copied => (P::ALL_TRANSFER, A::TRANSFER_WRITE, L::TRANSFER_DST_OPTIMAL),
+            Stage::Drawn => {
+                let accesses = A::COLOR_ATTACHMENT_WRITE | A::COLOR_ATTACHMENT_READ;
+                (P::COLOR_ATTACHMENT_OUTPUT, accesses, L::COLOR_ATTACHMENT_OPTIMAL)
+            }
+            Stage::Composed => (P::ALL_TRANSFER, A::TRANSFER_READ, L::TRANSFER_SRC_OPTIMAL),
             // The stage of the semaphore that presentation waits for.
-            Stage::New | Stage::Shown => vk::PipelineStageFlags2::ALL_COMMANDS,
-        }
-    }
-
-    fn accesses(self) -> vk::AccessFlags2 {
-        match self {
-            Stage::New => vk::AccessFlags2::MEMORY_WRITE,
-            Stage::Acquired | Stage::Shown => vk::AccessFlags2::NONE,
-            Stage::Copied => vk::AccessFlags2::TRANSFER_WRITE,
-            Stage::Composed => vk::AccessFlags2::TRANSFER_READ,
-            Stage::Drawn => vk::AccessFlags2::COLOR_ATTACHMENT_WRITE | vk::AccessFlags2::COLOR_ATTACHMENT_READ,
+            Stage::Shown => (P::ALL_COMMANDS, A::NONE, L::PRESENT_SRC_KHR),
         }
     }
 }
 
 /// Records the transition of a window's image from one stage to another.
 fn barrier(device: &ash::Device, commands: vk::CommandBuffer, image: vk::Image, from: Stage, to: Stage) {
-    let side = |of: Stage| (of.stages(), of.accesses(), of.layout());
     // SAFETY: the command buffer is being recorded, outside dynamic rendering; the image was acquired.
-    unsafe { image_barrier(device, commands, [image], side(from), side(to)) };
+    unsafe { image_barrier(device, commands, [image], from.side(), to.side()) };
 }
 
 /// The panels to draw, as egui lays them out.

@@ -1,36 +1,16 @@
 //! The swapchain: the images of a surface.
 
+use super::PresentMode;
 use super::present_wait::PresentWaiter;
 use super::target::Target;
 use crate::context::{Context, Presentation};
 use crate::error::{ErrorContext, GpuError};
 use crate::faults::InjectionPoint;
 use crate::scene::WindowTexels;
+use crate::sync::locked;
 use ash::vk;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-
-/// When a picture is presented.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum PresentMode {
-    /// Each picture waits for a refresh of the monitor, without tearing.
-    #[default]
-    Fifo,
-    /// The newest picture at each refresh, if the driver supports it: less latency, but some pictures are never presented.
-    Mailbox,
-}
-
-impl std::str::FromStr for PresentMode {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<PresentMode, String> {
-        match text {
-            "fifo" => Ok(PresentMode::Fifo),
-            "mailbox" => Ok(PresentMode::Mailbox),
-            _ => Err("must be fifo or mailbox".into()),
-        }
-    }
-}
 
 /// A surface with its swapchain images, which are made again when its size changes.
 pub(crate) struct Swapchain {
@@ -128,7 +108,7 @@ impl Swapchain {
             vk::Format::B8G8R8A8_UNORM => WindowTexels::Bgra8,
             _ => WindowTexels::Rgba8,
         };
-        *self.context.window_texels.lock().unwrap_or_else(|e| e.into_inner()) = of_pictures;
+        *locked(&self.context.window_texels) = of_pictures;
         Ok(found)
     }
 
@@ -204,19 +184,14 @@ impl Swapchain {
         let images = unsafe { self.presentation()?.swapchains.get_swapchain_images(self.handle) }
             .context(|| "list the images of the swapchain".into())?;
         for handle in images {
-            let image = self.image(handle)?;
-            self.images.push(image);
+            // SAFETY: the structure is complete.
+            let drawn = unsafe { self.context.device.create_semaphore(&vk::SemaphoreCreateInfo::default(), None) };
+            let drawn = drawn.context(|| "create a semaphore".into())?;
+            self.context.name(handle, "window");
+            self.images.push(SwapchainImage { handle, drawn });
         }
         self.size = [size.width, size.height];
         Ok(true)
-    }
-
-    fn image(&self, handle: vk::Image) -> Result<SwapchainImage, GpuError> {
-        // SAFETY: the structure is complete.
-        let drawn = unsafe { self.context.device.create_semaphore(&vk::SemaphoreCreateInfo::default(), None) };
-        let drawn = drawn.context(|| "create a semaphore".into())?;
-        self.context.name(handle, "window");
-        Ok(SwapchainImage { handle, drawn })
     }
 
     /// Acquires the next image; returns its index. It waits at most `nanoseconds`. `free` is signalled when the image may be written.

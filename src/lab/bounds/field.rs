@@ -13,39 +13,26 @@ use crate::passes::Texels;
 use crate::probe::{Advance, Array, Axis, Geometry, Motion, Probe};
 use std::f64::consts::FRAC_PI_2;
 
-/// What is proven of the samples on a part of a ray.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Content {
-    /// The whole part is outside the insonified region.
-    Outside,
-    /// Wherever the part is inside the insonified region, its windowed samples, clamped to 0..1, are within `values`. `surely_inside`: all of it is
-    /// inside.
-    Within { values: Interval, surely_inside: bool },
-}
-
 /// The samples of a volume along a line, as intervals.
 pub struct Field<'a> {
-    line: &'a Line<'a>,
-    volume: &'a Texels,
-    window: [f64; 2],
-    /// Smallest and largest texel.
-    range: [f64; 2],
+    pub line: &'a Line<'a>,
+    pub volume: &'a Texels,
+    /// The texel values that become 0 and 1.
+    pub window: [f64; 2],
+    /// Smallest and largest texel of the volume.
+    pub range: [f64; 2],
 }
 
-impl<'a> Field<'a> {
-    /// `range`: smallest and largest texel of the volume; `window`: the texel values that become 0 and 1.
-    pub fn new(line: &'a Line<'a>, volume: &'a Texels, window: [f64; 2], range: [f64; 2]) -> Field<'a> {
-        Field { line, volume, window, range }
-    }
-
-    /// What is proven of the part of the line between two positions on it, mm from its `base` along its direction; `from` is at most `to`.
-    pub fn content(&self, from: f64, to: f64) -> Content {
+impl Field<'_> {
+    /// What is proven of the part of the line between two positions on it, mm from its `base` along its direction; `from` is at most `to`. None if
+    /// the whole part is outside the insonified region. Otherwise wherever the part is inside, its windowed samples, clamped to 0..1, are within
+    /// the interval; true if all of it is surely inside.
+    pub fn content(&self, from: f64, to: f64) -> Option<(Interval, bool)> {
         match &self.line.scene.geometry {
-            Geometry::Cartesian(_) => Content::Within { values: self.along_a_line(from, to), surely_inside: true },
-            Geometry::Sweep(probe) => match self.sweep(probe, Interval::between(from, to)) {
-                None => Content::Outside,
-                Some((at, surely_inside)) => Content::Within { values: self.over_a_box(at), surely_inside },
-            },
+            Geometry::Cartesian(_) => Some((self.along_a_line(from, to), true)),
+            Geometry::Sweep(probe) => self
+                .sweep(probe, Interval::between(from, to))
+                .map(|(at, surely_inside)| (self.over_a_box(at), surely_inside)),
         }
     }
 

@@ -45,9 +45,7 @@ impl PictureBounds {
         let pairs = self.low.values.chunks_exact(4).zip(self.high.values.chunks_exact(4));
         pairs.map(|(low, high)| (0..4).map(|c| high[c] - low[c]).fold(0.0, f64::max)).collect()
     }
-}
 
-impl PictureBounds {
     /// The width, upper less lower bound, of the widest channel of each ray whose opacity may be above 0, row by row. Other rays have no entry.
     pub fn widths_of_hits(&self) -> Vec<f64> {
         let hits = self.high.values.chunks_exact(4).map(|high| high[3] > 0.0);
@@ -183,22 +181,20 @@ fn bounds_of(
     if path <= 0.0 {
         return ray::Bounds { rgba: [Interval::ZERO; 4], parts: 0 };
     }
-    let points = transfer::of(settings);
-    let absorption = Absorption::of(settings, reference_length(scene));
-    let mut medium = ray::Medium::new(points, settings.threshold, absorption).faded(ray::Fade::of(line));
-    if settings.shading == Shading::DepthCoded {
+    let tint = (settings.shading == Shading::DepthCoded).then(|| {
         let (axis, near) = depth_axis(scene);
         let dot = |a: DVec3, b: DVec3| {
             (0..3).map(|n| Interval::of(a[n]) * Interval::of(b[n])).fold(Interval::ZERO, |sum, v| sum + v)
         };
         let (start, rate) = (dot(line.base, axis) - Interval::of(near), dot(line.direction, axis));
         let apart = |c: usize| Interval::of(settings.far_tint[c]) - Interval::of(settings.near_tint[c]);
-        medium = medium.tinted(
-            std::array::from_fn(|c| Interval::of(settings.near_tint[c]) + apart(c) * start),
-            std::array::from_fn(|c| apart(c) * rate),
-        );
-    }
-    let field = field::Field::new(line, volume, view.window, range);
+        let at_start = |c: usize| Interval::of(settings.near_tint[c]) + apart(c) * start;
+        [std::array::from_fn(at_start), std::array::from_fn(|c| apart(c) * rate)]
+    });
+    let absorption = Absorption::of(settings, reference_length(scene));
+    let (points, threshold, fade) = (transfer::of(settings), settings.threshold, ray::Fade::of(line));
+    let medium = ray::Medium { points, threshold, absorption, tint, fade };
+    let field = field::Field { line, volume, window: view.window, range };
     ray::bounds(&field, &medium, &hints(line, volume, path), effort.width, effort.parts, enough)
 }
 

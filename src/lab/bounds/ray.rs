@@ -1,7 +1,7 @@
 //! Bounds of the light of a ray. The opacity and colours of each part are ranges, which are composited from back to front with both ends of
 //! the opacity. Parts are halved where that narrows the result most.
 
-use super::field::{Content, Field};
+use super::field::Field;
 use super::interval::Interval;
 use crate::exact_ray::Line;
 use crate::scene::TransferPoint;
@@ -11,36 +11,23 @@ use glam::DVec3;
 /// The transfer function, evaluated on intervals of sample values.
 #[derive(Clone, Debug)]
 pub struct Medium {
-    points: Vec<TransferPoint>,
-    threshold: f64,
-    absorption: Absorption,
-    /// Factors of the colours at 0 mm along the ray, and their growth per mm.
-    tint: Option<[[Interval; 3]; 2]>,
-    fade: Option<Fade>,
+    /// The control points of the transfer function by ascending sample value ([`transfer::of`]).
+    pub points: Vec<TransferPoint>,
+    /// Samples below it are transparent.
+    pub threshold: f64,
+    pub absorption: Absorption,
+    /// Factors of the colours at 0 mm along the ray, and their growth per mm. None: the colours are as they are.
+    pub tint: Option<[[Interval; 3]; 2]>,
+    /// Scales the absorption. None: it is not scaled.
+    pub fade: Option<Fade>,
 }
 
 impl Medium {
-    /// `points`: the control points of the transfer function by ascending sample value ([`transfer::of`]). Samples below `threshold` are transparent.
-    pub fn new(points: Vec<TransferPoint>, threshold: f64, absorption: Absorption) -> Medium {
-        Medium { points, threshold, absorption, tint: None, fade: None }
-    }
-
-    /// The medium with a tint: at s mm from the start of the ray its colours are multiplied by `start + rate * s`.
-    pub fn tinted(self, start: [Interval; 3], rate: [Interval; 3]) -> Medium {
-        Medium { tint: Some([start, rate]), ..self }
-    }
-
-    /// The medium whose absorption is scaled by `region.fade`. With None it is not scaled.
-    pub fn faded(self, fade: Option<Fade>) -> Medium {
-        Medium { fade, ..self }
-    }
-
     /// Red, green, blue and absorption per mm over a range of values in 0..1.
     fn over(&self, values: Interval) -> ([Interval; 3], Interval) {
         let mut all = self.at(values.low);
         let ends = self.points.iter().filter(|p| values.low < p.at && p.at < values.high);
-        let inner = ends.map(|p| [p.colour[0], p.colour[1], p.colour[2], p.opacity].map(Interval::of));
-        for rgba in inner.chain([self.at(values.high)]) {
+        for rgba in ends.map(rgba).chain([self.at(values.high)]) {
             all = std::array::from_fn(|c| all[c].hull(rgba[c]));
         }
         let per_mm = |opacity: Interval| {
@@ -66,7 +53,6 @@ impl Medium {
 
     fn at(&self, value: f64) -> [Interval; 4] {
         let after = self.points.partition_point(|p| p.at <= value);
-        let rgba = |p: &TransferPoint| [p.colour[0], p.colour[1], p.colour[2], p.opacity].map(Interval::of);
         let before = after.checked_sub(1).and_then(|n| self.points.get(n));
         match (before, self.points.get(after)) {
             (Some(low), Some(high)) => {
@@ -79,6 +65,11 @@ impl Medium {
             (None, None) => [Interval::ZERO; 4],
         }
     }
+}
+
+/// Red, green, blue and opacity of a control point.
+fn rgba(TransferPoint { colour: [r, g, b], opacity, .. }: &TransferPoint) -> [Interval; 4] {
+    [*r, *g, *b, *opacity].map(Interval::of)
 }
 
 /// The factor 0..1 by which `region.fade` scales the matter along a ray ([`Scene::faded`](crate::scene::Scene::faded)), as intervals.
@@ -201,7 +192,7 @@ fn divisible(part: &Part) -> bool {
 
 /// None where nothing is, or all is transparent.
 fn part(field: &Field, medium: &Medium, from: f64, to: f64) -> Option<Part> {
-    let Content::Within { values, surely_inside } = field.content(from, to) else { return None };
+    let (values, surely_inside) = field.content(from, to)?;
     let (mut colour, mut absorption) = medium.over(values);
     if absorption.high <= 0.0 {
         return None;

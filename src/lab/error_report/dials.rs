@@ -105,6 +105,7 @@ pub const NAMES: &[&str] = &[
 /// # Errors
 /// The scene has no such dial, or the name is unknown. The text is the end of a sentence that begins with "this scene".
 pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
+    let name = NAMES.iter().copied().find(|known| *known == name).unwrap_or_default();
     let s = &scene.settings;
     let step = scene.step;
     let [finest_step, next_step] = fineness(scene).map(f64::recip);
@@ -115,7 +116,7 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
         Some(why) => Err(format!("has another picture at another step: {why}")),
         None => Ok(()),
     };
-    let made = |name, unit, default: DialSetting, others: Vec<DialSetting>, best: &[String], nearly: &[String]| Dial {
+    let made = |unit, default: DialSetting, others: Vec<DialSetting>, best: &[String], nearly: &[String]| Dial {
         name,
         unit,
         settings: std::iter::once(default).chain(others).collect(),
@@ -128,9 +129,9 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
         best: best.to_vec(),
         nearly: nearly.to_vec(),
     };
-    let look = |name, unit, others: Vec<DialSetting>| {
+    let look = |unit, others: Vec<DialSetting>| {
         let as_it_is = DialSetting { label: "as it is".into(), set: Vec::new(), value: 0.0 };
-        Dial { kind: Kind::Look, is_ordered: false, ..made(name, unit, as_it_is, others, &[], &[]) }
+        Dial { kind: Kind::Look, is_ordered: false, ..made(unit, as_it_is, others, &[], &[]) }
     };
     let is = |label: String, value: f64| DialSetting { label, set: Vec::new(), value };
     let at = |label: String, set: &[String], value: f64| DialSetting { label, set: set.to_vec(), value };
@@ -157,7 +158,7 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
                 .map(|f| at(format!("{:.3} mm", f * step), &[format!("ray.step={}", f * step)], f * step))
                 .collect();
             let fine = |f: f64| [format!("ray.step={}", step * f)];
-            made("step", "mm", is(format!("{step:.3} mm"), step), others, &fine(finest_step), &fine(next_step))
+            made("mm", is(format!("{step:.3} mm"), step), others, &fine(finest_step), &fine(next_step))
         }
         "tolerance" => {
             let alone = s.mode == Mode::Volume && !scene.lights_volume() && scene.still().is_none();
@@ -173,7 +174,7 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
             };
             let others = [0.0, 8.0, 4.0, 2.0, 1.0, 0.5, 0.25].into_iter().filter(|n| *n != now);
             let others = others.map(|n| at(label(n), &[format!("ray.tolerance={n}")], n)).collect();
-            made("tolerance", "levels", is(label(now), now), others, &fine(finest_step), &fine(next_step))
+            made("levels", is(label(now), now), others, &fine(finest_step), &fine(next_step))
         }
         "compositing" => {
             need(composites, "composites nothing")?;
@@ -196,7 +197,7 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
             let others = others.map(|(n, k)| at(k.to_string(), &[format!("volume.compositing={k}")], n as f64));
             let best = |f: f64| [format!("volume.compositing={finest}"), format!("ray.step={}", step * f)];
             let value = kinds.iter().position(|k| *k == now).unwrap_or(0) as f64;
-            made("compositing", "", is(now.clone(), value), others.collect(), &best(finest_step), &best(next_step))
+            made("", is(now.clone(), value), others.collect(), &best(finest_step), &best(next_step))
         }
         "format" => {
             let bits = |f: VolumeFormat| match f {
@@ -211,7 +212,7 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
             let others = others.map(|f| at(word(&f), &[format!("slices.format={}", word(&f))], bits(f)));
             let best = ["slices.format=r32f".to_string(), "ray.sampling=exact".into()];
             let nearly = ["slices.format=r16".to_string(), "ray.sampling=exact".into()];
-            made("format", "bits", is(word(&now), bits(now)), others.collect(), &best, &nearly)
+            made("bits", is(word(&now), bits(now)), others.collect(), &best, &nearly)
         }
         "sampling" => {
             let all = [Sampling::Hardware, Sampling::Exact, Sampling::PackedNeighbours];
@@ -221,7 +222,7 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
             // `auto` is resolved to one of them.
             let value = all.iter().position(|w| *w == scene.sampling).unwrap_or(0) as f64;
             let exact = set(&Sampling::Exact);
-            made("sampling", "", is(word(&s.ray.sampling), value), others.collect(), &exact, &exact)
+            made("", is(word(&s.ray.sampling), value), others.collect(), &exact, &exact)
         }
         "filter3d" => {
             need(marches, "casts no ray")?;
@@ -234,7 +235,7 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
                 at("sliding 3".into(), &sliding(3), 3.0),
                 at("sliding 5".into(), &sliding(5), 5.0),
             ];
-            look("filter3d", "samples", others)
+            look("samples", others)
         }
         "termination" => {
             need(composites, "composites nothing")?;
@@ -242,15 +243,8 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
             let others =
                 [0.0, 1e-4, 1.0 / 2048.0, 1.0 / 512.0, 1.0 / 128.0, 0.03, 0.1].into_iter().filter(|v| *v != now);
             let others = others.map(|v| at(format!("{v:.4}"), &[format!("ray.early_end={v:.9}")], v));
-            let best = ["ray.early_end=0.0".to_string()];
-            made(
-                "termination",
-                "light left",
-                is(format!("{now:.4}"), now),
-                others.collect(),
-                &best,
-                &["ray.early_end=0.0001".into()],
-            )
+            let fine = |left: &str| [format!("ray.early_end={left}")];
+            made("light left", is(format!("{now:.4}"), now), others.collect(), &fine("0.0"), &fine("0.0001"))
         }
         "sigma" => {
             let fixed = |n: u32| {
@@ -281,7 +275,7 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
                 grown(5, 19),
                 grown(7, 19),
             ];
-            look("sigma", "pixels", others)
+            look("pixels", others)
         }
         "perona-malik" => {
             // The same equation and diffusion time in different numbers of steps: those of the scene, or T = 2 if it has no diffusion. That is
@@ -309,12 +303,12 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
             let stepped = [1, 2, 4, 8].into_iter().filter(|n| time / f64::from(*n) <= 200.0);
             others.extend(stepped.map(|n| place(Scheme::Rkl1, n)));
             match now {
-                None => look("perona-malik", "step", others),
+                None => look("step", others),
                 Some(_) => {
                     let label = format!("{} {}", word(&p.scheme), p.repeat);
                     others.retain(|other| other.label != label);
                     let fine = |f: u32| diffused(Scheme::Explicit, least * f);
-                    made("perona-malik", "step", is(label, p.step), others, &fine(10), &fine(5))
+                    made("step", is(label, p.step), others, &fine(10), &fine(5))
                 }
             }
         }
@@ -329,14 +323,7 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
             let others = [0.0, 0.25, 0.5, 0.75, 1.0].into_iter().filter(|v| *v != now);
             let others = others.map(|v| at(format!("{v:.2}"), &[format!("ray.spread={v:.2}")], v));
             let best = |f: f64| ["ray.spread=0.0".to_string(), format!("ray.step={}", step * f)];
-            made(
-                "adaptive",
-                "share",
-                is(format!("{now:.2}"), now),
-                others.collect(),
-                &best(finest_step),
-                &best(next_step),
-            )
+            made("share", is(format!("{now:.2}"), now), others.collect(), &best(finest_step), &best(next_step))
         }
         "resolution" => {
             let [w, h] = scene.picture_size();
@@ -348,20 +335,15 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
                 at(format!("{x} x {y}"), &[format!("picture.size=[{x},{y}]")], f)
             });
             let best = ["ray.rays=3".to_string()];
-            made("resolution", "share", is(format!("{w} x {h}"), 1.0), others.into(), &best, &["ray.rays=2".into()])
+            made("share", is(format!("{w} x {h}"), 1.0), others.into(), &best, &["ray.rays=2".into()])
         }
         "rays" => {
             let now = s.ray.rays;
             let others = [1, 2, 3].into_iter().filter(|n| *n != now);
             let others = others.map(|n| at(format!("{n} x {n}"), &[format!("ray.rays={n}")], f64::from(n)));
-            made(
-                "rays",
-                "along an edge",
-                is(format!("{now} x {now}"), f64::from(now)),
-                others.collect(),
-                &["ray.rays=4".into()],
-                &["ray.rays=3".into()],
-            )
+            let fine = |n: u32| [format!("ray.rays={n}")];
+            let now = is(format!("{now} x {now}"), f64::from(now));
+            made("along an edge", now, others.collect(), &fine(4), &fine(3))
         }
         "lut" => {
             need(scene.probe().is_some(), "has no sweep")?;
@@ -375,7 +357,7 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
                 0 => is(now.to_string(), f64::from(now)),
                 terms => is(format!("polynomial of {terms} terms"), 0.0),
             };
-            made("lut", "entries", default, others.collect(), &with(65536), &with(16385))
+            made("entries", default, others.collect(), &with(65536), &with(16385))
         }
         "brick" => {
             need(marches, "leaps over nothing")?;
@@ -385,7 +367,7 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
             let others = others.map(|n| at(word(n), &[format!("ray.brick={n}")], f64::from(n)));
             // The reference takes every sample.
             let all = ["ray.brick=0".to_string()];
-            made("brick", "texels", is(word(now), f64::from(now)), others.collect(), &all, &all)
+            made("texels", is(word(now), f64::from(now)), others.collect(), &all, &all)
         }
         "transfer" => {
             need(composites, "composites nothing")?;
@@ -402,7 +384,7 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
             };
             let others = [16, 32, 64, 128, 256, 512, 1024, 2048, 4096].into_iter().filter(|n| *n != now && allowed(n));
             let others = others.map(|n| at(n.to_string(), &set(n), n as f64)).collect();
-            made("transfer", "entries", is(now.to_string(), now as f64), others, &set(most), &set(most - most / 4))
+            made("entries", is(now.to_string(), now as f64), others, &set(most), &set(most - most / 4))
         }
         "half" => {
             need(!scene.is_flat(), "casts no ray")?;
@@ -416,7 +398,7 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
                 _ => at("half".into(), &apart(2), 0.25),
             };
             let best = |n: u32| ["ray.subsampling=1".to_string(), format!("ray.rays={n}")];
-            made("half", "rays a pixel", is(word.into(), value), vec![other], &best(3), &best(2))
+            made("rays a pixel", is(word.into(), value), vec![other], &best(3), &best(2))
         }
         "light-cell" => {
             need(scene.lit_by_volume().is_some(), "has no light volume")?;
@@ -440,7 +422,7 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
             let others =
                 [4.0, 2.83, 2.0, 1.41, 0.707, 0.5].map(|f| f * now).into_iter().filter(|cell| *cell > 1.99 * finest);
             let others = others.map(|cell| at(format!("{cell:.3} mm"), &set(cell), cell)).collect();
-            made("light-cell", "mm", is(format!("{now:.3} mm"), now), others, &set(finest), &set(finest * 2.0))
+            made("mm", is(format!("{now:.3} mm"), now), others, &set(finest), &set(finest * 2.0))
         }
         "light-taps" => {
             let Some(light) = scene.lit_by_volume() else { return Err("has no light volume".into()) };
@@ -448,13 +430,13 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
             let others = [1, 2, 3].into_iter().filter(|taps| *taps != light.taps);
             let others = others.map(|taps| at(taps.to_string(), &set(taps), f64::from(taps))).collect();
             let now = is(light.taps.to_string(), f64::from(light.taps));
-            made("light-taps", "samples along the edge of a cell", now, others, &set(4), &set(3))
+            made("samples along the edge of a cell", now, others, &set(4), &set(3))
         }
         "light-widening" => {
             let Some(light) = scene.lit_by_volume() else { return Err("has no light volume".into()) };
             let others = [0.0, 0.2, 0.35, 0.5, 0.7, 1.0].into_iter().filter(|w| (*w - light.widening).abs() > 1e-9);
             let others = others.map(|w| at(format!("{w} mm"), &[format!("light.volume.widening={w}")], w));
-            look("light-widening", "mm after 1 mm", others.collect())
+            look("mm after 1 mm", others.collect())
         }
         "pipeline" => {
             need(marches, "casts no ray")?;
@@ -478,7 +460,7 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
             let others = [8.0, 4.0, 2.0, 0.5, 0.25, 0.125].into_iter().filter(|f| *f >= 4.0 * finest_step);
             let others = others.map(|f| at(format!("x {f}"), &set(f), f)).collect();
             let fine = |f: f64| set(f);
-            made("pipeline", "times step and cell", is("x 1".into(), 1.0), others, &fine(finest_step), &fine(next_step))
+            made("times step and cell", is("x 1".into(), 1.0), others, &fine(finest_step), &fine(next_step))
         }
         _ => return Err(format!("is unknown; there are: {}, all", NAMES.join(", "))),
     };

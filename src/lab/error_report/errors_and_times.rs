@@ -6,11 +6,12 @@ use super::budget::{self, Budget, FLOOR, Share};
 use super::choose::{self, Bound, Changes};
 use super::dials::Dial;
 use super::running::{Rendering, Running, Runs, in_floats};
+use crate::baselines::Stored;
 use crate::error_report::convergence::{self, Range};
 use crate::error_report::metrics;
 use crate::error_report::richardson;
 use crate::error_report::{
-    self, Combination, Errors, FORMAT, Kind as DialKind, Measure, OwnError, Point, Reference, Report, Sizes, Times,
+    self, Combination, Errors, Kind as DialKind, Measure, OwnError, Point, Reference, Report, Sizes, Times,
 };
 use crate::exact_ray::picture::{self, Effort};
 use crate::gpu::{Context, GpuError};
@@ -134,7 +135,7 @@ impl ErrorMeasurement<'_> {
         let budget = self.budget(finest)?;
         let machine = machine::device(self.context);
         Ok(Report {
-            format: FORMAT.into(),
+            format: Report::FORMAT.into(),
             device: machine.name,
             driver: machine.driver,
             date: machine::date(),
@@ -157,38 +158,52 @@ impl ErrorMeasurement<'_> {
         let all = |of: fn(&budget::Source) -> &[String]| sources.iter().flat_map(of).cloned().collect::<Vec<String>>();
         let (finest, nearly) = (all(|s| &s.finest), all(|s| &s.nearly));
         let best = self.scene_with("combination", &finest)?;
-        match self.kind("combination", false, true, &best)?.0 {
-            Kind::Exact => {
-                let (rendering, effort) = self.by_exact_rays(&best);
-                let reference = Reference::Exact { estimate: effort.estimate, pieces: effort.pieces };
-                let error = OwnError { rmse: effort.estimate, levels: 255.0 * effort.estimate };
-                return Ok(Finest { rendering, reference, error });
+        let (kind, _) = self.kind("combination", false, true, &best)?;
+        self.reference("combination", kind, &best, &finest, &nearly)
+    }
+
+    /// The reference of a kind. `best`: the scene with the settings `finest`.
+    fn reference(
+        &self,
+        dial: &'static str,
+        kind: Kind,
+        best: &Scene,
+        finest: &[String],
+        nearly: &[String],
+    ) -> Result<Finest, MeasureError> {
+        Ok(match kind {
+            Kind::Look => {
+                Finest { rendering: self.rendered(best)?, reference: Reference::AsItIs, error: OwnError::default() }
             }
             Kind::F64 => {
-                let rendering = Rendering::in_f64(&best, self.frames, &mut |_, _, _| false);
-                return Ok(Finest { rendering, reference: Reference::F64, error: OwnError::default() });
+                let rendering = Rendering::in_f64(best, self.frames, &mut |_, _, _| false);
+                Finest { rendering, reference: Reference::F64, error: OwnError::default() }
             }
-            Kind::Look | Kind::Converged => {}
-        }
-        let (rendering, reference, error) = self.converged("combination", &finest, &nearly)?;
-        Ok(Finest { rendering, reference, error })
+            Kind::Exact => {
+                let (mut effort, scene) = (Effort::default(), in_floats(best));
+                // Exact rays in place of stage 2.
+                let rendering = Rendering::in_f64(&scene, self.frames, &mut |pass, reads, writes| {
+                    picture::replace(&scene, pass, reads, writes, &mut effort)
+                });
+                let Effort { estimate, pieces, .. } = effort;
+                let error = OwnError { rmse: estimate, levels: 255.0 * estimate };
+                Finest { rendering, reference: Reference::Exact { estimate, pieces }, error }
+            }
+            Kind::Converged => self.converged(dial, finest, nearly)?,
+        })
     }
 
     /// The picture that settings converge to, and its own error: the finest one by its difference from the next, or, of a scene that a light volume
     /// lights, what three lattices of it converge to.
-    fn converged(
-        &self,
-        dial: &'static str,
-        finest: &[String],
-        nearly: &[String],
-    ) -> Result<(Rendering, Reference, OwnError), MeasureError> {
+    fn converged(&self, dial: &'static str, finest: &[String], nearly: &[String]) -> Result<Finest, MeasureError> {
         let (best, next) = (self.scene_with(dial, finest)?, self.scene_with(dial, nearly)?);
         let mut rendering = self.rendered(&best)?;
         let is_lit = best.lit_by_volume().is_some() && next.lit_by_volume().is_some();
         let cells = [&next, &best].map(|scene| scene.light_lattice().cell);
         if !is_lit || cells[0] <= cells[1] {
             let error = OwnError::of(&compare(dial, &[], &self.rendered(&next)?, &rendering)?);
-            return Ok((rendering, Reference::Converged { set: finest.to_vec(), rmse: error.rmse }, error));
+            let reference = Reference::Converged { set: finest.to_vec(), rmse: error.rmse };
+            return Ok(Finest { rendering, reference, error });
         }
         // What is finest but for its light, with cells whose edges have one ratio, and the converse. A ratio of two leaves all cones of ambient light as wide as
         // cells of the pyramid, or as far between two.
@@ -215,12 +230,13 @@ impl ErrorMeasurement<'_> {
                 let error = both(OwnError::of(&compare(dial, &[], &before, &rendering)?));
                 let set = finest.to_vec();
                 let reference = Reference::Extrapolated { set, cells: edges, order: found.order, rmse: error.rmse };
-                Ok((rendering, reference, error))
+                Ok(Finest { rendering, reference, error })
             }
             // The same light in both, or differences that are no power of the cell: the last of them bounds what is left.
             _ => {
                 let error = both(OwnError::of(&compare(dial, &[], &middle, &rendering)?));
-                Ok((rendering, Reference::Converged { set: finest.to_vec(), rmse: error.rmse }, error))
+                let reference = Reference::Converged { set: finest.to_vec(), rmse: error.rmse };
+                Ok(Finest { rendering, reference, error })
             }
         }
     }
@@ -252,22 +268,6 @@ impl ErrorMeasurement<'_> {
         })
     }
 
-    /// Renders and times a combination anew. Returns it with the new measurement, and the times of the scene with its own settings, measured
-    /// alternately with it.
-    ///
-    /// # Errors
-    /// As [`ErrorMeasurement::report`].
-    fn measure_again(
-        &self,
-        finest: &Finest,
-        choice: &Combination,
-        runs: u32,
-    ) -> Result<(Combination, Option<Times>), MeasureError> {
-        let (errors, runs) = self.measure_set(finest, &choice.set, runs)?;
-        let times = Times::of(&runs.own);
-        Ok((Combination { errors, times, reference_error: finest.error, ..choice.clone() }, Times::of(&runs.default)))
-    }
-
     /// Chooses a combination of the report, and measures it again `runs` times. A combination that does not keep the bound then is discarded, and the
     /// next best is tried. A time bound is kept if the 95th percentile, increased by the share [`choose::TIME_MARGIN`], is within it. With an error
     /// bound, combinations that may be the fastest are first run alternately, `runs` times each.
@@ -290,7 +290,10 @@ impl ErrorMeasurement<'_> {
                 let contenders = choose::contenders(report, measure, error, &refused);
                 found = self.fastest(report, &contenders, runs)?.unwrap_or(found);
             }
-            let (again, unchanged) = self.measure_again(finest, &report.choices[found], runs)?;
+            let choice = &report.choices[found];
+            let (errors, measured) = self.measure_set(finest, &choice.set, runs)?;
+            let (times, unchanged) = (Times::of(&measured.own), Times::of(&measured.default));
+            let again = Combination { errors, times, reference_error: finest.error, ..choice.clone() };
             let kept = match bound {
                 Bound::Error(error) => again.error_limit(measure).is_some_and(|limit| limit <= error),
                 Bound::Time(time) => again.times.is_some_and(|t| t.total.p95 * (1.0 + choose::TIME_MARGIN) <= time),
@@ -354,20 +357,10 @@ impl ErrorMeasurement<'_> {
         progress: &mut impl FnMut(&str, &str),
     ) -> Result<error_report::Dial, MeasureError> {
         progress(dial.name, "its reference");
-        let best = self.scene_at(dial, &dial.best)?;
+        let best = self.scene_with(dial.name, &dial.best)?;
         let (kind, note) = self.kind(dial.name, dial.kind == DialKind::Look, dial.samples_rays(), &best)?;
-        let (expected, reference) = match kind {
-            Kind::Look => (self.rendered(&best)?, Reference::AsItIs),
-            Kind::F64 => (Rendering::in_f64(&best, self.frames, &mut |_, _, _| false), Reference::F64),
-            Kind::Exact => {
-                let (expected, effort) = self.by_exact_rays(&best);
-                (expected, Reference::Exact { estimate: effort.estimate, pieces: effort.pieces })
-            }
-            Kind::Converged => {
-                let (rendering, reference, _) = self.converged(dial.name, &dial.best, &dial.nearly)?;
-                (rendering, reference)
-            }
-        };
+        let Finest { rendering: expected, reference, .. } =
+            self.reference(dial.name, kind, &best, &dial.best, &dial.nearly)?;
         if let Some(fault) = nothing_in(&expected) {
             return Err(MeasureError::Reference { dial: dial.name, fault });
         }
@@ -375,7 +368,8 @@ impl ErrorMeasurement<'_> {
         let (mut default, mut default_runs) = (self.running(self.scene)?, Vec::new());
         for (n, setting) in dial.settings.iter().enumerate() {
             progress(dial.name, &setting.label);
-            let (rendering, runs) = self.in_turn(&self.scene_at(dial, &setting.set)?, &mut default, self.repeats)?;
+            let (rendering, runs) =
+                self.in_turn(&self.scene_with(dial.name, &setting.set)?, &mut default, self.repeats)?;
             default_runs.extend(&runs.default);
             // What a choice may take is compared with the picture that all choices are compared with, too.
             if n > 0 && matches!(dial.kind, DialKind::Numerical | DialKind::Several) {
@@ -438,16 +432,6 @@ impl ErrorMeasurement<'_> {
         })
     }
 
-    /// The scene in f64, with exact rays in place of stage 2.
-    fn by_exact_rays(&self, scene: &Scene) -> (Rendering, Effort) {
-        let mut effort = Effort::default();
-        let scene = &in_floats(scene);
-        let rendering = Rendering::in_f64(scene, self.frames, &mut |pass, reads, writes| {
-            picture::replace(scene, pass, reads, writes, &mut effort)
-        });
-        (rendering, effort)
-    }
-
     /// The reference of a dial, and why it is not the exact one if the dial is of rays.
     fn kind(
         &self,
@@ -481,10 +465,6 @@ impl ErrorMeasurement<'_> {
                 }
             },
         }
-    }
-
-    fn scene_at(&self, dial: &Dial, set: &[String]) -> Result<Scene, MeasureError> {
-        self.scene_with(dial.name, set)
     }
 
     fn scene_with(&self, dial: &'static str, set: &[String]) -> Result<Scene, MeasureError> {

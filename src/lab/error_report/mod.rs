@@ -13,21 +13,20 @@ pub mod plot;
 pub mod richardson;
 mod running;
 
-use crate::baselines::stated_format;
+use crate::baselines::Stored;
+use crate::profile::LEVEL;
+use crate::profile::statistics::{Interval, Sample};
 use crate::scene::Scene;
-use crate::tree::{self, FromNode, NodeError, ToNode};
+use crate::tree::{FromNode, ToNode};
 use budget::Budget;
 use convergence::Fit;
 use metrics::{Levels, SurfaceError};
-
-/// Name and version of the format of a stored report; other versions are refused.
-pub const FORMAT: &str = "echolume error report 3";
 
 /// The measured errors and times of one scene on one device.
 #[derive(Clone, Debug, PartialEq, ToNode, FromNode)]
 #[tree(deny_unknown_fields)]
 pub struct Report {
-    /// The name of the format: [`FORMAT`].
+    /// The name of the format: [`Stored::FORMAT`].
     pub format: String,
     pub device: String,
     pub driver: String,
@@ -227,24 +226,14 @@ pub struct Time {
 }
 
 impl Time {
-    /// The statistics of the values of several runs. None without runs.
+    /// The statistics of the values of several runs. None without runs, or if a value is not finite.
     pub fn of(runs: &[f64]) -> Option<Time> {
-        let mut sorted = runs.to_vec();
-        sorted.sort_by(f64::total_cmp);
-        sorted.first()?;
-        let n = sorted.len();
-        // The most runs that may be left out at either end: as many heads of n coins have a probability of at most 0.025.
-        let (mut out, mut below, mut heads) = (0, 0.0, 0.5f64.powi(n.min(1000) as i32));
-        while below + heads <= 0.025 && out < (n - 1) / 2 {
-            below += heads;
-            heads *= (n - out) as f64 / (out + 1) as f64;
-            out += 1;
-        }
-        let p95 = sorted[(n * 95).div_ceil(100).max(1) - 1];
+        let sample = Sample::new(runs).ok()?;
+        let (sorted, n) = (sample.sorted(), sample.count());
+        let Interval { low, high, .. } = sample.median_interval(LEVEL);
+        let p95 = sorted[(n * 95).div_ceil(100) - 1];
         let median = (sorted[(n - 1) / 2] + sorted[n / 2]) / 2.0;
-        // `out` runs at either end lie outside; the interval begins at the one after them, as the first is outside with `out` - 1.
-        let edge = out.saturating_sub(1);
-        Some(Time { median, low: sorted[edge], high: sorted[n - 1 - edge], p95 })
+        Some(Time { median, low, high, p95 })
     }
 }
 
@@ -329,70 +318,6 @@ impl Report {
         self.sizes == sizes && scene.settings.to_toml().is_ok_and(|own| own == settings)
     }
 
-    /// The report as JSON.
-    ///
-    /// # Errors
-    /// One line: an error, a time or the value of a point is not finite, or an error or time is negative.
-    pub fn to_json(&self) -> Result<String, String> {
-        self.check()?;
-        tree::to_json_lines(self).map_err(|e| format!("error report: {e}"))
-    }
-
-    /// Reads a report.
-    ///
-    /// # Errors
-    /// One line: the text is not JSON, has another format or version, lacks a field or has an unknown one, or has numbers that no measurement gives.
-    pub fn from_json(text: &str) -> Result<Report, String> {
-        Report::read(text).map_err(|e| crate::text::single_line(&e))
-    }
-
-    fn read(text: &str) -> Result<Report, String> {
-        let unread = |e: NodeError| format!("error report: cannot be read: {e}");
-        // The version first: a newer report would otherwise fail by its fields, with a less clear message.
-        let format = stated_format(text).map_err(unread)?;
-        if format != FORMAT {
-            return Err(format!("error report: format is '{format}', this program reads '{FORMAT}'"));
-        }
-        let report: Report = tree::from_json(text.as_bytes()).map_err(unread)?;
-        report.check()?;
-        Ok(report)
-    }
-
-    fn check(&self) -> Result<(), String> {
-        for dial in &self.dials {
-            let reference_rmse = match &dial.reference {
-                Reference::F64 | Reference::AsItIs => 0.0,
-                Reference::Converged { rmse, .. } | Reference::Extrapolated { rmse, .. } => *rmse,
-                Reference::Exact { estimate, .. } => *estimate,
-            };
-            if !(reference_rmse.is_finite() && reference_rmse >= 0.0) {
-                return Err(format!("error report: dial '{}': its reference's error is {reference_rmse}", dial.name));
-            }
-            for point in &dial.points {
-                let wrong = wrong_result(&point.errors, &[point.times, point.ratios], 0.0);
-                if let Some(v) = wrong.or(Some(point.value).filter(|v| !v.is_finite())) {
-                    return Err(format!(
-                        "error report: dial '{}', point '{}': {v} is not a possible result",
-                        dial.name, point.label
-                    ));
-                }
-            }
-        }
-        for choice in &self.choices {
-            if let Some(v) = wrong_result(&choice.errors, &[choice.times], choice.reference_error.rmse) {
-                return Err(format!("error report: choice '{}': {v} is not a possible result", choice.set.join(" ")));
-            }
-        }
-        let sums = self.budget.shares.iter().map(|share| (share.source.as_str(), &share.errors));
-        let own = self.budget.reference_error.rmse;
-        for (source, errors) in sums.chain([("total", &self.budget.total)]) {
-            if let Some(v) = wrong_result(errors, &[], own) {
-                return Err(format!("error report: budget, '{source}': {v} is not a possible result"));
-            }
-        }
-        Ok(())
-    }
-
     /// The Pareto front over the points of all dials by median time and error: indices of dial and point, from the fastest to the most accurate.
     /// Points without a time or without this error are not on it, nor are points of looks.
     pub fn pareto_front(&self, measure: Measure) -> Vec<(usize, usize)> {
@@ -407,6 +332,44 @@ impl Report {
             }
         }
         pareto_front(&pairs).into_iter().map(|i| indices[i]).collect()
+    }
+}
+
+impl Stored for Report {
+    const FORMAT: &'static str = "echolume error report 3";
+    const WHAT: &'static str = "an error report";
+    const AGAIN: &'static str = "measure again with it";
+    const KIND: &'static str = "report";
+    const MAX_BYTES: u64 = 64 << 20;
+
+    /// All numbers are finite, and no error or time is negative.
+    fn fault(&self) -> Option<(String, String)> {
+        let impossible = |of: String, v: f64| Some((of, format!("{v} is not a possible result")));
+        for dial in &self.dials {
+            let reference_rmse = match &dial.reference {
+                Reference::F64 | Reference::AsItIs => 0.0,
+                Reference::Converged { rmse, .. } | Reference::Extrapolated { rmse, .. } => *rmse,
+                Reference::Exact { estimate, .. } => *estimate,
+            };
+            if !(reference_rmse.is_finite() && reference_rmse >= 0.0) {
+                return Some((format!("dial '{}'", dial.name), format!("its reference's error is {reference_rmse}")));
+            }
+            for point in &dial.points {
+                let wrong = wrong_result(&point.errors, &[point.times, point.ratios], 0.0);
+                if let Some(v) = wrong.or(Some(point.value).filter(|v| !v.is_finite())) {
+                    return impossible(format!("dial '{}', point '{}'", dial.name, point.label), v);
+                }
+            }
+        }
+        for choice in &self.choices {
+            if let Some(v) = wrong_result(&choice.errors, &[choice.times], choice.reference_error.rmse) {
+                return impossible(format!("choice '{}'", choice.set.join(" ")), v);
+            }
+        }
+        let sums = self.budget.shares.iter().map(|share| (share.source.as_str(), &share.errors));
+        let own = self.budget.reference_error.rmse;
+        let mut sums = sums.chain([("total", &self.budget.total)]);
+        sums.find_map(|(source, errors)| impossible(format!("budget, '{source}'"), wrong_result(errors, &[], own)?))
     }
 }
 

@@ -133,7 +133,7 @@ fn combinations(report: &Report, measure: Measure) -> Panel {
                 choice.changed.iter().map(|(dial, label)| format!("{dial} {label}")).collect::<Vec<_>>().join(", ")
             }
         };
-        let (error, time) = (measure.of(&choice.errors)?, of_total(&choice.times?));
+        let (error, time) = (measure.of(&choice.errors)?, milliseconds(&choice.times?.total));
         let (is_default, on_front) = (choice.changed.is_empty(), front.contains(&i));
         Some(PlottedPoint { name, time, error, is_default, is_joined: on_front, on_front })
     });
@@ -159,10 +159,6 @@ fn combinations(report: &Report, measure: Measure) -> Panel {
         colour: 6,
         points,
     }
-}
-
-fn of_total(times: &Times) -> [f64; 3] {
-    milliseconds(&times.total)
 }
 
 fn milliseconds(time: &Time) -> [f64; 3] {

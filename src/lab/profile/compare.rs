@@ -183,22 +183,13 @@ fn excused(lines: &[Line], options: &CompareOptions) -> Option<String> {
 /// Most lines that [`Comparison::cannot_tell`] names.
 const MAX_NAMED: usize = 4;
 
-/// How the repeats of two runs belong together.
-#[derive(Clone, Copy, PartialEq)]
-enum Repeats {
-    /// One run after the other.
-    Apart,
-    /// The n-th of both are neighbours in time.
-    InTurn,
-}
-
 /// Compares two profiles. The lines are in this order: passes of the new profile, passes that only the old one has, host spans, wall time,
 /// and CPU time if it is compared.
 ///
 /// # Errors
 /// An option is out of range, a profile is inconsistent, or the profiles are of different work and `force` is not set.
 pub fn compare(old: &Profile, new: &Profile, options: &CompareOptions) -> Result<Comparison, CompareError> {
-    compare_repeats(old, new, options, Repeats::Apart)
+    compare_repeats(old, new, options, false)
 }
 
 /// Compares two profiles that were measured alternately in blocks. Each slice has one profile for each block. The times of repeat i of block n of
@@ -210,7 +201,7 @@ pub fn compare(old: &Profile, new: &Profile, options: &CompareOptions) -> Result
 pub fn in_turn(old: &[Profile], new: &[Profile], options: &CompareOptions) -> Result<Comparison, CompareError> {
     let [old, new] = [("old", old), ("new", new)]
         .map(|(which, blocks)| blocks_as_repeats(blocks, old).map_err(|fault| CompareError::Profile { which, fault }));
-    compare_repeats(&old?, &new?, options, Repeats::InTurn)
+    compare_repeats(&old?, &new?, options, true)
 }
 
 /// The number of blocks of each profile that [`in_turn`] needs to detect differences of `passes` passes if all blocks agree, plus two; 10 to 100.
@@ -260,11 +251,12 @@ fn blocks_as_repeats(blocks: &[Profile], neighbours: &[Profile]) -> Result<Profi
     })
 }
 
+/// `in_turn`: the n-th repeats of both runs are neighbours in time; otherwise one run came after the other.
 fn compare_repeats(
     old: &Profile,
     new: &Profile,
     options: &CompareOptions,
-    repeats: Repeats,
+    in_turn: bool,
 ) -> Result<Comparison, CompareError> {
     if !(options.alpha > 0.0 && options.alpha < 1.0) {
         return Err(CompareError::Alpha(options.alpha));
@@ -282,11 +274,11 @@ fn compare_repeats(
     }
     let counted = [old, new].map(counts_cpu);
     let cpu = counted == [true; 2];
-    let pairs = pairs(old, new, cpu, repeats);
+    let pairs = pairs(old, new, cpu, in_turn);
     let both = pairs.iter().filter(|p| p.old.is_some() && p.new.is_some()).count();
-    let method = match repeats {
-        Repeats::Apart => Method::Apart { blocks: blocks_needed(both, options.alpha) },
-        Repeats::InTurn => Method::InTurn,
+    let method = match in_turn {
+        true => Method::InTurn,
+        false => Method::Apart { blocks: blocks_needed(both, options.alpha) },
     };
     let tick = old.device.timestamp_period_ns.max(new.device.timestamp_period_ns);
     let lines = judge(pairs, method, tick, options).map_err(|fault| CompareError::Times { fault })?;
@@ -338,7 +330,7 @@ pub struct Pair<'a> {
     pub new: Option<Series<'a>>,
 }
 
-fn pairs<'a>(old: &'a Profile, new: &'a Profile, cpu: bool, repeats: Repeats) -> Vec<Pair<'a>> {
+fn pairs<'a>(old: &'a Profile, new: &'a Profile, cpu: bool, in_turn: bool) -> Vec<Pair<'a>> {
     let series = |p: &'a PassProfile| {
         let times = if cpu && p.runs_per_picture > 0 && p.stage != "host" { &p.cpu_ns } else { &p.samples_ns };
         Series { stage: &p.stage, runs: p.runs_per_picture, times }
@@ -351,7 +343,7 @@ fn pairs<'a>(old: &'a Profile, new: &'a Profile, cpu: bool, repeats: Repeats) ->
         }
     }
     let whole = |times: &'a [f64]| Some(Series { stage: "", runs: 1, times });
-    if !cpu || repeats == Repeats::Apart {
+    if !cpu || !in_turn {
         // Beside the CPU time it is told, but not judged.
         let kind = if cpu { Kind::Host } else { Kind::Wall };
         pairs.push(Pair { kind, name: "wall", old: whole(&old.wall_ns), new: whole(&new.wall_ns) });

@@ -4,6 +4,7 @@
 use super::compare::{Comparison, Kind, Line, Verdict};
 use super::statistics::{Interval, Sample, drift};
 use super::{Ceiling, LEVEL, PassProfile, Profile};
+use crate::passes::Span;
 use crate::passes::times::acquisition_floor;
 use crate::text::csv_field;
 use serde_json::{Value, json};
@@ -90,7 +91,7 @@ fn optional(value: Option<f64>) -> String {
 const MAX_DRIFT: f64 = 1.05;
 
 /// A table as text, each column as wide as its widest cell: the first `left` columns are left-aligned, the others right-aligned.
-pub(super) fn aligned(rows: &[Vec<String>], left: usize) -> String {
+pub(crate) fn aligned(rows: &[Vec<String>], left: usize) -> String {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let width = |c: usize| rows.iter().filter_map(|r| r.get(c)).map(|cell| cell.chars().count()).max().unwrap_or(0);
     let widths: Vec<usize> = (0..columns).map(width).collect();
@@ -104,6 +105,11 @@ pub(super) fn aligned(rows: &[Vec<String>], left: usize) -> String {
         text.push('\n');
     }
     text
+}
+
+/// The cells of a row of which none has a `|`, which separates them here.
+fn cells(row: &str) -> Vec<String> {
+    row.split('|').map(String::from).collect()
 }
 
 fn ms(ns: f64) -> String {
@@ -192,21 +198,8 @@ fn conditions(profile: &Profile) -> String {
 
 /// A header and one row per pass; columns that are empty for all passes are omitted.
 fn pass_rows(profile: &Profile) -> Vec<Vec<String>> {
-    let head = [
-        "stage",
-        "pass",
-        "runs",
-        "ms",
-        "p5",
-        "p95",
-        "95 % interval",
-        "drift %",
-        "GB/s",
-        "% of ceiling",
-        "M invocations",
-        "share %",
-    ];
-    let mut rows = vec![head.map(String::from).to_vec()];
+    let head = "stage|pass|runs|ms|p5|p95|95 % interval|drift %|GB/s|% of ceiling|M invocations|share %";
+    let mut rows = vec![cells(head)];
     let sum: f64 = medians(&profile.passes).sum();
     for pass in &profile.passes {
         let Some(sample) = pass.sample() else { continue };
@@ -228,13 +221,13 @@ fn pass_rows(profile: &Profile) -> Vec<Vec<String>> {
         ]);
     }
     let filled = |c: usize| rows.iter().skip(1).any(|row| !row[c].is_empty());
-    let kept: Vec<usize> = (0..head.len()).filter(|c| filled(*c)).collect();
+    let kept: Vec<usize> = (0..rows[0].len()).filter(|c| filled(*c)).collect();
     rows.iter().map(|row| kept.iter().map(|c| row[*c].clone()).collect()).collect()
 }
 
 /// Times that are not of one pass: totals of the device, and the host.
 fn total_rows(profile: &Profile) -> Vec<Vec<String>> {
-    let mut rows = vec![["a picture", "ms", "p5", "p95", "95 % interval", "% of wall"].map(String::from).to_vec()];
+    let mut rows = vec![cells("a picture|ms|p5|p95|95 % interval|% of wall")];
     let wall = Sample::new(&profile.wall_ns).ok().map(|s| s.median()).filter(|w| *w > 0.0);
     let mut add = |name: &str, times: &[f64]| {
         let Ok(sample) = Sample::new(times) else { return };
@@ -292,20 +285,7 @@ fn notes(profile: &Profile) -> Vec<String> {
 /// A comparison as a table for a terminal: notes such as differing conditions, one row for each [`Line`], the test, and the regressions or what may
 /// have been overlooked.
 pub fn comparison_table(comparison: &Comparison) -> String {
-    let head = [
-        "stage",
-        "pass",
-        "old ms",
-        "new ms",
-        "ratio",
-        "95 % interval",
-        "p (Holm)",
-        "noise",
-        "sees from",
-        "verdict",
-        "",
-    ];
-    let mut rows = vec![head.map(String::from).to_vec()];
+    let mut rows = vec![cells("stage|pass|old ms|new ms|ratio|95 % interval|p (Holm)|noise|sees from|verdict|")];
     rows.extend(comparison.lines.iter().map(comparison_row));
     let mut text = String::new();
     for note in &comparison.notes {
@@ -354,29 +334,11 @@ fn comparison_row(line: &Line) -> Vec<String> {
     row
 }
 
-/// On which processor a span ran; its clock timed the span.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Track {
-    Device,
-    Host,
-}
-
-/// A timed span; `begin` and `end` in ns since the run began.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Span {
-    pub name: String,
-    pub track: Track,
-    /// Index, from 0, of the measured repeat that the span belongs to.
-    pub repeat: usize,
-    pub begin_ns: f64,
-    pub end_ns: f64,
-}
-
 /// Why a trace cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub enum TraceError {
     #[error("span {name:?} of repeat {repeat}: from {begin_ns} to {end_ns} ns is not an interval of time")]
-    Interval { name: String, repeat: usize, begin_ns: f64, end_ns: f64 },
+    Interval { name: &'static str, repeat: usize, begin_ns: f64, end_ns: f64 },
     #[error("trace: {0}")]
     Json(String),
 }
@@ -384,33 +346,33 @@ pub enum TraceError {
 /// Maximum time that the numbers of the format resolve to the nanosecond: 2^53 ns, 104 days.
 const MAX_NS: f64 = 9_007_199_254_740_992.0;
 
-/// Spans as a Chrome trace, those of host and device on one time axis. Host spans may nest; other overlapping spans get threads of their own, so that
-/// no viewer drops them. Without calibration the device's spans are consistent only among themselves, and the trace states that.
+/// Spans as a Chrome trace, those of host and device on one time axis. Each is given with the index, from 0, of its measured repeat. Host spans may
+/// nest; other overlapping spans get threads of their own, so that no viewer drops them. Without calibration the device's spans are consistent only
+/// among themselves, and the trace states that.
 ///
 /// # Errors
 /// A span ends before it begins, or a time is not finite or beyond 2^53 ns (104 days).
-pub fn chrome_trace(profile: &Profile, spans: &[Span]) -> Result<String, TraceError> {
-    for span in spans {
-        let fits = |ns: f64| ns.is_finite() && ns.abs() < MAX_NS;
-        if !(fits(span.begin_ns) && fits(span.end_ns) && span.begin_ns <= span.end_ns) {
-            let (name, repeat) = (span.name.clone(), span.repeat);
-            return Err(TraceError::Interval { name, repeat, begin_ns: span.begin_ns, end_ns: span.end_ns });
+pub fn chrome_trace(profile: &Profile, spans: &[(usize, Span)]) -> Result<String, TraceError> {
+    for (repeat, Span { name, begin, end, .. }) in spans {
+        let fits = |ns: &f64| ns.is_finite() && ns.abs() < MAX_NS;
+        if !(fits(begin) && fits(end) && begin <= end) {
+            return Err(TraceError::Interval { name, repeat: *repeat, begin_ns: *begin, end_ns: *end });
         }
     }
     // Calibration is not exact to the nanosecond: the first time stamp may be before the begin of the run.
-    let origin = spans.iter().map(|s| s.begin_ns.round() as i64).min().unwrap_or(0).min(0);
+    let origin = spans.iter().map(|(_, s)| s.begin.round() as i64).min().unwrap_or(0).min(0);
     let tied = if profile.device.calibrated { "" } else { " (clock not tied to the host's)" };
-    let names = [(Track::Host, "host".to_string()), (Track::Device, format!("device {}{tied}", profile.device.name))];
+    let names = [(false, "host".to_string()), (true, format!("device {}{tied}", profile.device.name))];
     let mut events = Vec::new();
-    for (track, name) in names {
-        let process = process(track);
+    for (on_device, name) in names {
+        let process = process(on_device);
         events.push(json!({"ph": "M", "name": "process_name", "pid": process, "args": {"name": name}}));
         events.push(json!({"ph": "M", "name": "process_sort_index", "pid": process, "args": {"sort_index": process}}));
-        let placed = lanes(spans, track);
+        let placed = lanes(spans, on_device);
         for lane in 0..placed.iter().map(|(lane, ..)| lane + 1).max().unwrap_or(0) {
-            let name = match (track, lane) {
-                (Track::Host, 0) => "calls".into(),
-                (Track::Device, 0) => "passes".into(),
+            let name = match (on_device, lane) {
+                (false, 0) => "calls".into(),
+                (true, 0) => "passes".into(),
                 (_, lane) => format!("overlapping {lane}"),
             };
             events.push(
@@ -440,38 +402,32 @@ pub fn chrome_trace(profile: &Profile, spans: &[Span]) -> Result<String, TraceEr
     serde_json::to_string(&trace).map_err(|e| TraceError::Json(e.to_string()))
 }
 
-fn process(track: Track) -> u32 {
-    match track {
-        Track::Host => 1,
-        Track::Device => 2,
-    }
+fn process(on_device: bool) -> u32 {
+    1 + u32::from(on_device)
 }
 
 /// `between`: begin and end, ns from the start of the trace. The format counts microseconds; three decimals resolve 1 ns.
-fn event(profile: &Profile, span: &Span, lane: usize, between: [i64; 2]) -> Value {
+fn event(profile: &Profile, (repeat, span): &(usize, Span), lane: usize, between: [i64; 2]) -> Value {
     let us = |ns: i64| ns as f64 / 1e3;
-    let (list, category) = match span.track {
-        Track::Device => (&profile.passes, "pass"),
-        Track::Host => (&profile.host, "host"),
-    };
+    let (list, category) = if span.on_device { (&profile.passes, "pass") } else { (&profile.host, "host") };
     let stage = list.iter().find(|p| p.name == span.name).map_or("", |p| p.stage.as_str());
     json!({
         "ph": "X",
         "name": span.name,
         "cat": category,
-        "pid": process(span.track),
+        "pid": process(span.on_device),
         "tid": lane + 1,
         "ts": us(between[0]),
         "dur": us(between[1] - between[0]),
-        "args": {"repeat": span.repeat, "stage": stage},
+        "args": {"repeat": repeat, "stage": stage},
     })
 }
 
-/// The spans of a track in order of begin: lane, begin, end (integer ns) and the span. In a lane of the device spans do not
-/// overlap; on the host they may nest.
-fn lanes(spans: &[Span], track: Track) -> Vec<(usize, i64, i64, &Span)> {
-    let rounded = |span: &Span| [span.begin_ns.round() as i64, span.end_ns.round() as i64];
-    let mut ordered: Vec<&Span> = spans.iter().filter(|s| s.track == track).collect();
+/// The spans of the device or the host in order of begin: lane, begin, end (integer ns) and the span with its repeat. In a lane of the device
+/// spans do not overlap; on the host they may nest.
+fn lanes(spans: &[(usize, Span)], on_device: bool) -> Vec<(usize, i64, i64, &(usize, Span))> {
+    let rounded = |(_, span): &(usize, Span)| [span.begin.round() as i64, span.end.round() as i64];
+    let mut ordered: Vec<_> = spans.iter().filter(|(_, s)| s.on_device == on_device).collect();
     // Of two that begin together, the longer encloses the shorter.
     ordered.sort_by_key(|s| (rounded(s)[0], -rounded(s)[1]));
     // Ends of the open spans of each lane, innermost last.
@@ -484,7 +440,7 @@ fn lanes(spans: &[Span], track: Track) -> Vec<(usize, i64, i64, &Span)> {
                 lane.pop();
             }
         }
-        let fits = |lane: &Vec<i64>| lane.last().is_none_or(|last| track == Track::Host && end <= *last);
+        let fits = |lane: &Vec<i64>| lane.last().is_none_or(|last| !on_device && end <= *last);
         let at = open.iter().position(fits).unwrap_or(open.len());
         if at == open.len() {
             open.push(Vec::new());

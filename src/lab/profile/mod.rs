@@ -89,7 +89,7 @@ pub struct Acquisition {
 }
 
 /// Times and work of a pass on the device, or times of a span of the host.
-#[derive(Clone, Debug, PartialEq, ToNode, FromNode)]
+#[derive(Clone, Debug, Default, PartialEq, ToNode, FromNode)]
 #[tree(deny_unknown_fields)]
 pub struct PassProfile {
     /// Name, unique among the passes or the host spans.

@@ -7,7 +7,6 @@ use crate::passes::device_limits as loops;
 use crate::passes::slots::Shape;
 use crate::passes::{Bind, DispatchArgs, GROUP, Part, Pass, RUN, Slot, Span, chain, filter, layers, slices};
 use crate::plan::{Plan, Rerun, Step};
-use crate::profile::export::{self, Track};
 use crate::profile::statistics::Sample;
 use crate::profile::{Acquisition, Ceiling, Ceilings, PassProfile, Profile, Sizes, settings_hash};
 use crate::scene::Scene;
@@ -124,8 +123,8 @@ impl ProfileRun {
         self.renderer.change(scene).map(Some)
     }
 
-    /// The profile of the measured repeats, and their spans.
-    pub fn finish(self) -> (Profile, Vec<export::Span>) {
+    /// The profile of the measured repeats, and their spans, each with the index of its repeat, from 0.
+    pub fn finish(self) -> (Profile, Vec<(usize, Span)>) {
         let device = machine::device(&self.context);
         let (scene, plan, repeats) = (&self.scene, self.renderer.plan(), self.repeats);
         // What the device resolves decides what an invocation makes and reads.
@@ -160,7 +159,7 @@ impl ProfileRun {
             sampling: Some(format!("{}; {}", resolved.sampling.words(), self.renderer.texel_access().describe())),
             clock_deviation_ns: self.renderer.clock_deviation(),
         };
-        let spans = repeats.into_iter().enumerate().flat_map(|(n, r)| r.spans.into_iter().map(move |s| traced(n, s)));
+        let spans = repeats.into_iter().enumerate().flat_map(|(n, r)| r.spans.into_iter().map(move |s| (n, s)));
         (profile, spans.collect())
     }
 }
@@ -202,16 +201,6 @@ impl Repeat {
 fn settings(scene: &Scene) -> String {
     // Settings come from TOML, so writing them cannot fail; if it did, only the description would be lost.
     scene.settings.to_toml().unwrap_or_default()
-}
-
-fn traced(repeat: usize, span: Span) -> export::Span {
-    export::Span {
-        name: span.name.into(),
-        track: if span.on_device { Track::Device } else { Track::Host },
-        repeat,
-        begin_ns: span.begin,
-        end_ns: span.end,
-    }
 }
 
 /// Names of spans in order of first appearance.
@@ -272,13 +261,7 @@ fn hosts(repeats: &[Repeat]) -> Vec<PassProfile> {
         stage: "host".into(),
         runs_per_picture: repeats.first().map_or(0, |r| r.of(name, false).count() as u32),
         samples_ns: repeats.iter().map(|r| r.sum(name, false)).collect(),
-        cpu_ns: Vec::new(),
-        bytes_read: 0,
-        bytes_written: 0,
-        fetches: None,
-        filtered: None,
-        dispatched: None,
-        invocations: None,
+        ..PassProfile::default()
     };
     names(repeats, false).into_iter().map(host).collect()
 }

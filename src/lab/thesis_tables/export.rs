@@ -140,18 +140,8 @@ fn conditions(text: &mut String, report: &Report) {
 }
 
 fn rows(table: &Table) -> Vec<Vec<String>> {
-    let head = [
-        table.varied,
-        "stages 2-4, ms",
-        "least..most",
-        "ratio",
-        "thesis, ms",
-        "ratio",
-        "stage 1, ms",
-        "least..most",
-        "surface",
-    ];
-    let mut rows = vec![head.map(String::from).to_vec()];
+    let head = "stages 2-4, ms|least..most|ratio|thesis, ms|ratio|stage 1, ms|least..most|surface";
+    let mut rows = vec![[table.varied].into_iter().chain(head.split('|')).map(String::from).collect()];
     for (n, row) in table.rows.iter().enumerate() {
         let mark = if n == table.usual { " *" } else { "" };
         let ratio = |ratio: Option<f64>| ratio.map_or("-".into(), |r| format!("{r:.2}"));

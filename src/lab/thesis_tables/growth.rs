@@ -5,9 +5,9 @@ use crate::gpu::{Context, GpuError, Renderer, RendererOptions};
 use crate::passes::Slot;
 use crate::picture::Grey;
 use crate::probe::{Geometry, Grid};
+use crate::profile::export::aligned;
 use crate::scene::{EnhancedSigma, Estimator, Input, Mode, Scene, SceneError, Settings, VolumeFormat};
 use crate::source::StoredType;
-use std::fmt::Write as _;
 use std::sync::Arc;
 
 /// Starting and largest windows of Tables 7-9, pixels, up to the last columns of the tables: a window of 7x7 grows to 19 in Tables 7 and 9, and to 21
@@ -57,44 +57,30 @@ impl Growth {
     }
 }
 
-fn columns(rows: &[Growth]) -> usize {
-    rows.iter().map(|r| r.counts.len()).max().unwrap_or(0)
+/// A header and the cells of each row: its settings, then the shares by how far the edge of a window grew, each in words. The header of a share is
+/// `grew` and the pixels.
+fn cells(rows: &[Growth], grew: &str, in_words: fn(f64) -> String) -> Vec<Vec<String>> {
+    let columns = rows.iter().map(|r| r.counts.len()).max().unwrap_or(0);
+    let mut head = ["centre", "sigma", "window", "largest"].map(String::from).to_vec();
+    head.extend((0..columns).map(|n| format!("{grew}{}", 2 * n)));
+    let row = |row: &Growth| {
+        let [window, largest] = row.windows.map(|n| n.to_string());
+        let mut cells = vec![row.centre.name().into(), row.sigma.to_string(), window, largest];
+        cells.extend((0..columns).map(|n| row.share(n).map_or(String::new(), in_words)));
+        cells
+    };
+    [head].into_iter().chain(rows.iter().map(row)).collect()
 }
 
 /// A table of text, one line per row, with the share of the pixels whose window's edge grew by 0, 2, 4 ... pixels, in per cent.
 pub fn table(rows: &[Growth]) -> String {
-    let mut text = format!("{:<11} {:>6} {:>7} {:>7}", "centre", "sigma", "window", "largest");
-    for n in 0..columns(rows) {
-        let _ = write!(text, " {:>7}", format!("+{}", 2 * n));
-    }
-    text.push('\n');
-    for row in rows {
-        let _ = write!(text, "{:<11} {:>6} {:>7} {:>7}", row.centre.name(), row.sigma, row.windows[0], row.windows[1]);
-        for n in 0..columns(rows) {
-            let share = row.share(n).map_or(String::new(), |s| format!("{:.2} %", 100.0 * s));
-            let _ = write!(text, " {share:>7}");
-        }
-        let kept = text.trim_end().len();
-        text.truncate(kept);
-        text.push('\n');
-    }
-    text
+    aligned(&cells(rows, "+", |share| format!("{:.2} %", 100.0 * share)), 1)
 }
 
 /// Shares (0..1) of the pixels whose window's edge grew by 0, 2, 4 ... pixels as CSV: a header, and one line per row. A window that cannot grow that
 /// far has an empty field.
 pub fn csv(rows: &[Growth]) -> String {
-    let mut text = "centre,sigma,window,largest".to_string();
-    (0..columns(rows)).for_each(|n| text.push_str(&format!(",grew {}", 2 * n)));
-    text.push('\n');
-    for row in rows {
-        let _ = write!(text, "{},{},{},{}", row.centre.name(), row.sigma, row.windows[0], row.windows[1]);
-        for n in 0..columns(rows) {
-            let _ = write!(text, ",{}", row.share(n).map_or(String::new(), |s| format!("{s:.6}")));
-        }
-        text.push('\n');
-    }
-    text
+    cells(rows, "grew ", |share| format!("{share:.6}")).iter().map(|row| row.join(",") + "\n").collect()
 }
 
 /// How far the windows of the enhanced sigma filter grew on one picture, with all settings of Tables 7-9.

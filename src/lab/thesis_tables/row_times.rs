@@ -13,6 +13,7 @@ use crate::scene::{
     SurfaceColour,
 };
 use crate::source::{Frame, Geometry, StoredType};
+use crate::statistics::mix;
 use crate::thesis_tables::{
     Conditions, DEPTH, FAN_ANGLE, Filter3d, Reached, Report, Row, SAMPLES, SECTOR_ANGLE, SOUND_SPEED, Table, tables,
 };
@@ -236,11 +237,8 @@ fn echo(place: DVec3) -> f64 {
 /// Noise of mean 0 and standard deviation 1, nearly normal: the sum of four uniform values, which are bytes of a mixed number (Steele,
 /// Lea and Flood, Fast splittable pseudorandom number generators, OOPSLA 2014).
 fn grain(number: u64) -> f64 {
-    let mut z = number.wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^= z >> 31;
-    let sum: f64 = z.to_le_bytes()[..4].iter().map(|b| f64::from(*b) / 255.0 - 0.5).sum();
+    let mixed = mix(number.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+    let sum: f64 = mixed.to_le_bytes()[..4].iter().map(|b| f64::from(*b) / 255.0 - 0.5).sum();
     sum * 3f64.sqrt()
 }
 

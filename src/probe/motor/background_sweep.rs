@@ -4,7 +4,8 @@ use super::drive::Drive;
 use super::guard::Interrupter;
 use super::sweep::{ArrayState, Position, Sweep, Track};
 use super::{Fault, MotorError, Stopped};
-use std::sync::{Arc, Mutex, MutexGuard};
+use crate::sync::locked;
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
@@ -117,22 +118,18 @@ impl Drop for BackgroundSweep {
 }
 
 impl PositionLog {
-    fn lock(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(|e| e.into_inner())
-    }
-
     fn run(&self, mut drive: Drive, sweep: &Sweep, homed: bool) {
         let found = if homed { Ok(()) } else { drive.home() };
         let ended = found.and_then(|()| {
             drive.sweep(sweep, self.start, &mut |position| {
-                let track = &mut self.lock().track;
+                let track = &mut locked(&self.state).track;
                 track.push(position);
                 track.forget_all_but(MIN_POSITIONS);
             })
         });
         // Dropped first: who sees the end may open the port.
         drop(drive);
-        self.lock().ended = ended.err();
+        locked(&self.state).ended = ended.err();
     }
 
     /// Converts an instant to the clock of the positions, s.
@@ -158,18 +155,18 @@ impl PositionLog {
 
     /// The position of the array at a time in s on the clock of the positions, interpolated as [`Track::at`] does.
     pub fn at(&self, time: f64) -> ArrayState {
-        self.lock().track.at(time)
+        locked(&self.state).track.at(time)
     }
 
     /// The oldest and the newest position that are stored; None before the sweep has begun.
     pub fn span(&self) -> Option<(Position, Position)> {
-        let state = self.lock();
+        let state = locked(&self.state);
         let positions = state.track.positions();
         Some((*positions.first()?, *positions.last()?))
     }
 
     /// Why the sweep has ended.
     fn ended(&self) -> Option<MotorError> {
-        self.lock().ended.clone()
+        locked(&self.state).ended.clone()
     }
 }

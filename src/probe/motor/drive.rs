@@ -303,14 +303,6 @@ const SEARCH_STALL_TIME: Duration = Duration::from_millis(1500);
 /// Speed of the last, exact approach to the switch, as a fraction of that of the first.
 const SLOW_APPROACH: f64 = 0.1;
 
-/// What ended a rotation.
-enum RotationEnd {
-    /// The home switch reached the requested state, at this position.
-    Switch(i32),
-    /// The limit switch ahead is closed.
-    Limit,
-}
-
 impl Drive {
     fn find_home(&mut self) -> Result<(), Fault> {
         self.set(axis::MAX_ACCELERATION, self.table.acceleration(self.table.acceleration_deg_per_s2))?;
@@ -354,25 +346,13 @@ impl Drive {
     /// approached from the same side, so that the backlash of the gear has no effect.
     fn search_by_switch(&mut self) -> Result<(), Fault> {
         let (towards, speed) = (self.table.home_direction, self.table.search_speed());
-        if !self.at_home_switch()? && matches!(self.rotate(towards, speed, true)?, RotationEnd::Limit) {
-            self.rest()?;
-            if let RotationEnd::Limit = self.rotate(towards.other(), speed, true)? {
-                return Err(Fault::HomeNotFound);
-            }
+        if !self.at_home_switch()? && self.rotate(towards, speed, true)?.is_none() {
+            self.find_edge(towards.other(), speed, true)?;
         }
-        self.rest()?;
         // Fast off the switch and onto it again, so that the slow approach below is short wherever the search began.
-        if let RotationEnd::Limit = self.rotate(towards.other(), speed, false)? {
-            return Err(Fault::HomeNotFound);
-        }
-        self.rest()?;
-        if let RotationEnd::Limit = self.rotate(towards, speed * SLOW_APPROACH.sqrt(), true)? {
-            return Err(Fault::HomeNotFound);
-        }
-        self.rest()?;
-        let RotationEnd::Switch(edge) = self.rotate(towards.other(), speed * SLOW_APPROACH, false)? else {
-            return Err(Fault::HomeNotFound);
-        };
+        self.find_edge(towards.other(), speed, false)?;
+        self.find_edge(towards, speed * SLOW_APPROACH.sqrt(), true)?;
+        let edge = self.find_edge(towards.other(), speed * SLOW_APPROACH, false)?;
         self.rest()?;
         // Position and target are set together, at rest, so that the motor does not move.
         let position = self.get(axis::POSITION)?.saturating_sub(edge);
@@ -385,12 +365,21 @@ impl Drive {
         self.wait_still()
     }
 
-    /// Rotates until the home switch is closed (or open), or the limit switch ahead is closed.
-    fn rotate(&mut self, side: Side, speed: f64, until_closed: bool) -> Result<RotationEnd, Fault> {
+    /// Rotates from rest until the home switch is closed (or open). Returns the position of its edge.
+    ///
+    /// # Errors
+    /// Among others [`Fault::HomeNotFound`]: the limit switch ahead was closed first.
+    fn find_edge(&mut self, side: Side, speed: f64, until_closed: bool) -> Result<i32, Fault> {
+        self.rest()?;
+        self.rotate(side, speed, until_closed)?.ok_or(Fault::HomeNotFound)
+    }
+
+    /// Rotates until the home switch is closed (or open), and returns the position of its edge; None if the limit switch ahead is closed first.
+    fn rotate(&mut self, side: Side, speed: f64, until_closed: bool) -> Result<Option<i32>, Fault> {
         let (velocity, limit) = (self.table.velocity(speed), self.longest_search().mul_f64(1.0 / SLOW_APPROACH));
         let request = if side == Side::Left { Request::rotate_left } else { Request::rotate_right };
         if self.limit_closed(side)? {
-            return Ok(RotationEnd::Limit);
+            return Ok(None);
         }
         let first = self.get(axis::POSITION)?;
         let travel = 1.5 * self.table.largest_angle_deg * self.table.steps_per_degree();
@@ -401,10 +390,10 @@ impl Drive {
             let before = self.get(axis::POSITION)?;
             if self.at_home_switch()? == until_closed {
                 let after = self.get(axis::POSITION)?;
-                return Ok(RotationEnd::Switch(((i64::from(before) + i64::from(after)) / 2) as i32));
+                return Ok(Some(((i64::from(before) + i64::from(after)) / 2) as i32));
             }
             if self.limit_closed(side)? {
-                return Ok(RotationEnd::Limit);
+                return Ok(None);
             }
             if last != Some(before) {
                 (last, moved) = (Some(before), Instant::now());

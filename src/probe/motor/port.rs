@@ -17,8 +17,7 @@ pub(super) const PERIOD: Duration = Duration::from_millis(5);
 /// Most attempts of a repeatable request.
 const MAX_TRIES: usize = 3;
 
-/// Settings of the serial port. [`PortSettings::new`] makes the default ones of TMCL modules (9600 baud, no parity, one stop bit) with a time-out of
-/// 500 ms.
+/// Settings of the serial port. TMCL modules have 9600 baud, no parity and one stop bit unless they were set to others.
 #[derive(Clone, Debug)]
 pub struct PortSettings {
     /// Name of the serial port, for example `/dev/ttyUSB0` or `COM3`.
@@ -32,16 +31,6 @@ pub struct PortSettings {
 }
 
 impl PortSettings {
-    pub fn new(path: impl Into<String>) -> PortSettings {
-        PortSettings {
-            path: path.into(),
-            baud: 9600,
-            parity: Parity::None,
-            stop_bits: StopBits::One,
-            timeout: Duration::from_millis(500),
-        }
-    }
-
     /// Time that the transmission of a request and its reply takes at this baud rate.
     pub fn round_trip(&self) -> Duration {
         let parity = u32::from(self.parity != Parity::None);

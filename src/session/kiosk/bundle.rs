@@ -3,6 +3,7 @@
 use super::config::{self, Config};
 use super::log_rotation::{is_log_file, rotated_name};
 use super::redaction::Redactor;
+use crate::machine;
 use crate::scene::load;
 use flate2::Compression;
 use flate2::write::GzEncoder;
@@ -213,9 +214,8 @@ fn system_information() -> String {
         // Writing to a String does not fail.
         let _ = writeln!(report, "{name}: {}", value.unwrap_or_else(|| "unknown".into()));
     };
-    let build = if cfg!(debug_assertions) { "debug" } else { "release" };
-    item("program", Some(format!("echolume {} ({build})", env!("CARGO_PKG_VERSION"))));
-    item("time", Some(humantime::format_rfc3339_seconds(std::time::SystemTime::now()).to_string()));
+    item("program", Some(machine::program()));
+    item("time", Some(machine::date()));
     item("built for", Some(format!("{} on {}", std::env::consts::OS, std::env::consts::ARCH)));
     let kernel = ["ostype", "osrelease", "version"].map(|name| text(&format!("/proc/sys/kernel/{name}")));
     let kernel = kernel.map(|part| part.unwrap_or_default().trim().to_string()).join(" ");

@@ -1,7 +1,6 @@
 //! Key combinations as text, such as `ctrl+alt+q`.
 
 use std::fmt;
-use std::str::FromStr;
 
 /// Names of keys. The first name of a key is the one that is displayed. Function keys and characters need no entry.
 const NAMES: &[(&str, Key)] = &[
@@ -140,14 +139,6 @@ impl fmt::Display for Chord {
             // Every other key has a name; a test checks this.
             (other, None) => write!(f, "{other:?}"),
         }
-    }
-}
-
-impl FromStr for Chord {
-    type Err = ChordError;
-
-    fn from_str(text: &str) -> Result<Chord, ChordError> {
-        Chord::parse(text)
     }
 }
 

@@ -16,39 +16,11 @@ use std::path::Path;
 
 /// Endings of pictures and films that are not read here, but stand in logs.
 const OTHER_PICTURES: [&str; 7] = ["tif", "tiff", "gif", "avi", "mp4", "mov", "mkv"];
-/// System folders: paths inside of them are kept.
-const SYSTEM_FOLDERS: &[&str] = &[
-    "/bin",
-    "/dev",
-    "/etc",
-    "/lib",
-    "/lib32",
-    "/lib64",
-    "/proc",
-    "/sbin",
-    "/sys",
-    "/usr",
-    "/var/lib/echolume",
-    "/var/log",
-];
-/// Names in paths that identify nobody.
-const PUBLIC_NAMES: &[&str] = &[
-    "data",
-    "echolume",
-    "home",
-    "media",
-    "phantom",
-    "pictures",
-    "recordings",
-    "root",
-    "srv",
-    "sweep",
-    "sweeps",
-    "users",
-    "tests",
-    "volume",
-    "volumes",
-];
+/// System folders, divided by blanks: paths inside of them are kept.
+const SYSTEM_FOLDERS: &str = "/bin /dev /etc /lib /lib32 /lib64 /proc /sbin /sys /usr /var/lib/echolume /var/log";
+/// Names in paths that identify nobody, divided by blanks.
+const PUBLIC_NAMES: &str =
+    "data echolume home media phantom pictures recordings root srv sweep sweeps users tests volume volumes";
 const LEVELS: &[&str] = &["ERROR", "WARN", "INFO", "DEBUG", "TRACE"];
 
 /// Longest line that is searched, bytes. Longer ones are removed completely.
@@ -88,11 +60,11 @@ impl Redactor {
         let parts = path.iter().map(|part| part.to_string_lossy().to_ascii_lowercase());
         let stem = path.file_stem().map(|stem| stem.to_string_lossy().to_ascii_lowercase());
         for name in parts.chain(stem) {
-            let system = SYSTEM_FOLDERS.iter().any(|folder| folder.split('/').any(|part| part == name));
+            let system = SYSTEM_FOLDERS.split(' ').any(|folder| folder.split('/').any(|part| part == name));
             // Long numbers are dates of birth and numbers of patients; short ones are counts too.
             let least = if name.chars().any(char::is_alphabetic) { 3 } else { 5 };
             let is_identifying = name.len() >= least;
-            if is_identifying && !system && !PUBLIC_NAMES.contains(&name.as_str()) {
+            if is_identifying && !system && !PUBLIC_NAMES.split(' ').any(|public| public == name) {
                 self.names.push(name);
             }
         }
@@ -176,7 +148,7 @@ impl Redactor {
         let below = |folder: &str| path.strip_prefix(folder);
         let private = self.private.iter().any(|f| below(f).is_some_and(|rest| rest.starts_with(['/', '\\'])));
         let ends = |rest: &str| !rest.starts_with(|c: char| c.is_alphanumeric() || c == '-' || c == '_');
-        !private && SYSTEM_FOLDERS.iter().any(|f| below(f).is_some_and(ends))
+        !private && SYSTEM_FOLDERS.split(' ').any(|f| below(f).is_some_and(ends))
     }
 
     fn without_names(&mut self, mut line: String) -> String {

@@ -54,11 +54,6 @@ impl Cine {
         &self.volumes
     }
 
-    /// Memory of the samples of all complete volumes, bytes.
-    pub fn bytes(&self) -> usize {
-        self.bytes
-    }
-
     /// True if the next complete volume, if it is as large as the newest, will remove the oldest.
     pub(crate) fn is_full(&self) -> bool {
         let next = self.volumes.back().map_or(0, |newest| newest.bytes);
@@ -126,7 +121,7 @@ mod tests {
             assert_eq!(cine.is_full(), volume >= 3);
         }
         assert_eq!(numbers(&cine), [3, 4, 5]);
-        assert_eq!(cine.bytes(), 120);
+        assert_eq!(cine.bytes, 120);
         assert!(cine.volumes().iter().all(|k| k.frames.iter().enumerate().all(|(s, f)| f.slice == s)));
     }
 
@@ -135,7 +130,7 @@ mod tests {
         let mut cine = Cine::new(CineLimits { volumes: 9, bytes: 100 }, 2);
         for (volume, bytes) in [(0, 30), (1, 30), (2, 10), (3, 200)] {
             assert!(!cine.frame(frame(volume, 0, vec![0; bytes])) && cine.frame(frame(volume, 1, vec![0; bytes])));
-            assert!(cine.bytes() <= 100 || cine.volumes().len() == 1);
+            assert!(cine.bytes <= 100 || cine.volumes().len() == 1);
         }
         assert_eq!(numbers(&cine), [3]);
     }
@@ -153,6 +148,6 @@ mod tests {
     fn a_loop_of_size_zero_keeps_nothing() {
         let mut cine = Cine::new(CineLimits::default(), 1);
         cine.frame(frame(0, 0, vec![1]));
-        assert!(cine.volumes().is_empty() && cine.bytes() == 0 && cine.is_full());
+        assert!(cine.volumes().is_empty() && cine.bytes == 0 && cine.is_full());
     }
 }

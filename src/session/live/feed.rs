@@ -7,11 +7,12 @@ use crate::source::live::{Event, Live};
 use crate::source::parts::WholeFrames;
 use crate::source::posed::Posed;
 use crate::source::recorder::{Header, Writer};
+use crate::sync::locked;
 use std::collections::VecDeque;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard};
+use std::sync::{Arc, Condvar, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -115,12 +116,8 @@ fn bytes_of(event: &Event) -> usize {
 }
 
 impl Shared {
-    fn lock(&self) -> MutexGuard<'_, Queue> {
-        self.queue.lock().unwrap_or_else(|e| e.into_inner())
-    }
-
     fn set_disconnected(&self, why: Option<String>) {
-        let mut queue = self.lock();
+        let mut queue = locked(&self.queue);
         if queue.disconnected != why {
             if queue.disconnected.is_none() {
                 self.disconnections.fetch_add(1, Ordering::Relaxed);
@@ -135,7 +132,7 @@ impl Shared {
     /// volume. Other events are never lost.
     fn put(&self, arrived: Arrived, can_wait: bool) {
         let bytes = bytes_of(&arrived.event);
-        let mut queue = self.lock();
+        let mut queue = locked(&self.queue);
         let is_full = |q: &Queue| !q.events.is_empty() && (q.bytes + bytes > MAX_BYTES || q.events.len() >= MAX_EVENTS);
         if let Event::Frame(frame) = &arrived.event {
             while can_wait && is_full(&queue) && !self.stop.load(Ordering::Relaxed) {
@@ -168,7 +165,7 @@ impl Feed {
     /// # Errors
     /// The thread cannot be started.
     pub fn new(source: Box<dyn Live>, record: Option<&Path>) -> io::Result<Feed> {
-        Feed::waking(source, record, None)
+        Feed::observed(source, record, None, None)
     }
 
     /// A feed without a source: no event ever arrives.
@@ -177,15 +174,7 @@ impl Feed {
     }
 
     /// Reads a source and records it as [`Feed::new`] does. `wake` is called after each event that was queued, and when the connection to the source
-    /// is lost or found.
-    ///
-    /// # Errors
-    /// The thread cannot be started.
-    pub fn waking(source: Box<dyn Live>, record: Option<&Path>, wake: Option<Wake>) -> io::Result<Feed> {
-        Feed::observed(source, record, wake, None)
-    }
-
-    /// Reads a source as [`Feed::waking`] does. `observer` is called with every event of the source except [`Event::Idle`] before it is queued, on
+    /// is lost or found. `observer` is called with every event of the source except [`Event::Idle`] before it is queued, on
     /// the thread of the source. It also gets frames that are then lost because the queue is full. It does not get faults of the recording.
     ///
     /// # Errors
@@ -207,7 +196,7 @@ impl Feed {
 
     /// Takes the oldest event from the queue. If there is none, waits at most `patience` for one; None if none arrives.
     pub fn next(&self, patience: Duration) -> Option<Arrived> {
-        let mut queue = self.shared.lock();
+        let mut queue = locked(&self.shared.queue);
         if queue.events.is_empty() && !patience.is_zero() {
             let woken = self.shared.changed.wait_timeout_while(queue, patience, |q| q.events.is_empty());
             queue = woken.map_or_else(|e| e.into_inner().0, |w| w.0);
@@ -231,18 +220,18 @@ impl Feed {
 
     /// Number of queued events.
     pub fn waiting(&self) -> usize {
-        self.shared.lock().events.len()
+        locked(&self.shared.queue).events.len()
     }
 
     /// The reason on one line why the source is not connected at present. None while it is connected.
     pub fn disconnected(&self) -> Option<String> {
-        self.shared.lock().disconnected.clone()
+        locked(&self.shared.queue).disconnected.clone()
     }
 
     /// True if the source cannot wait and the volume after `volume` is over too, because a frame of a still newer one has arrived. Then `volume` need
     /// not be drawn.
     pub fn is_behind(&self, volume: u32) -> bool {
-        !self.can_wait && self.shared.lock().newest.is_some_and(|newest| newest > volume.saturating_add(1))
+        !self.can_wait && locked(&self.shared.queue).newest.is_some_and(|newest| newest > volume.saturating_add(1))
     }
 
     /// The counts so far.
@@ -454,11 +443,11 @@ mod tests {
         let feed = Feed::new(Box::new(source), None).expect("thread");
         let begun = Instant::now();
         while feed.counts().lost == 0 {
-            assert!(feed.shared.lock().bytes <= MAX_BYTES);
+            assert!(locked(&feed.shared.queue).bytes <= MAX_BYTES);
             assert!(begun.elapsed() < Duration::from_secs(60), "nothing is lost");
             std::thread::sleep(Duration::from_millis(1));
         }
-        assert!(feed.shared.lock().bytes <= MAX_BYTES);
+        assert!(locked(&feed.shared.queue).bytes <= MAX_BYTES);
         let came = all(&feed, Duration::ZERO);
         assert_eq!(came.len() as u64 + feed.counts().lost, 30);
         for pair in came.windows(2).filter(|w| w[0] + 1 != w[1]) {
@@ -471,7 +460,7 @@ mod tests {
         let source = FastSource { next: 0, frames: 30, bytes: MAX_BYTES / 8, waits: false };
         let feed = Feed::new(Box::new(source), None).expect("thread");
         let begun = Instant::now();
-        while !feed.shared.lock().events.back().is_some_and(|last| matches!(last.event, Event::End(_))) {
+        while !locked(&feed.shared.queue).events.back().is_some_and(|last| matches!(last.event, Event::End(_))) {
             assert!(begun.elapsed() < Duration::from_secs(60), "the source does not end");
             std::thread::sleep(Duration::from_millis(1));
         }

@@ -6,17 +6,20 @@ use crate::gpu::shader_reload::ShaderFolder;
 use crate::gpu::{TimeStamps, Wake};
 use crate::scene::load::Layers;
 use crate::scene::{Scene, Settings};
+use crate::tree::Defaults;
 use std::sync::Arc;
 
 /// Options of a [`Stream`](super::Stream).
-#[derive(Clone)]
+#[derive(Clone, Defaults)]
 pub struct StreamOptions {
     pub update: Update,
     /// Number of volume images in rotation with [`Update::Whole`]: 2, or 3 so that a volume need not wait for a picture.
+    #[value(3)]
     pub images: u32,
     /// Number of device queues to use. None: all queues of the device.
     pub queues: Option<usize>,
     /// True: every picture is copied to host memory (readback). False: it stays on the device, for a window.
+    #[value(true)]
     pub readback: bool,
     /// Limits of the cine loop; by default there is none.
     pub cine: CineLimits,
@@ -47,23 +50,3 @@ pub struct StreamOptions {
 /// A function that returns, for a scene at full quality, the settings of lower quality of which any one may replace its own while the view moves.
 /// Their order does not matter. [`StreamOptions::lowered`] says what they are for.
 pub type Lowered = Arc<dyn Fn(&Scene) -> Vec<Settings> + Send + Sync>;
-
-impl Default for StreamOptions {
-    fn default() -> StreamOptions {
-        StreamOptions {
-            update: Update::Whole,
-            images: 3,
-            queues: None,
-            readback: true,
-            cine: CineLimits::default(),
-            wake: None,
-            time_stamps: TimeStamps::default(),
-            shaders: None,
-            chosen: None,
-            lowered: None,
-            prepares: false,
-            coarse_first: false,
-            paced: false,
-        }
-    }
-}

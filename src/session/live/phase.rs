@@ -1,5 +1,4 @@
-//! The states of a stream: what its next step does ([`Phase`]), which settings wait ([`Pending`]) and what is on display ([`Display`]). It
-//! has no side effects. The transition diagram is in docs/streaming.md.
+//! The states of a stream: what its next step does ([`Phase`]) and what is on display ([`Display`]). It has no side effects. The transition diagram is in docs/streaming.md.
 
 use super::cine::CineVolume;
 use std::time::Instant;
@@ -7,16 +6,15 @@ use std::time::Instant;
 /// What the next step of a stream has to do.
 #[derive(Debug, Default)]
 pub(super) enum Phase {
-    /// Begin a picture if anything changed, otherwise take an event of the source.
+    /// Begin a picture if anything changed. Otherwise send frames of the replay, while events wait until all are sent; without a replay take an
+    /// event of the source.
     #[default]
     Idle,
     /// A picture is being drawn. Until it is done, each step sends frames of the replay or takes an event.
-    Drawing { picture: InFlight, replay: Option<Replay> },
+    Drawing(InFlight),
     /// Take this number of queued events before the next picture begins. Used with rolling volumes and sources that do not wait: a picture after
     /// the first event would show a state that the others already replace.
-    Draining { events: usize, replay: Option<Replay> },
-    /// Begin a picture if anything changed, otherwise send frames of a volume of the cine loop to the device. Events wait until all are sent.
-    Replaying(Replay),
+    Draining(usize),
 }
 
 /// A picture that is being drawn.
@@ -28,7 +26,7 @@ pub(super) struct InFlight {
     pub arrived: Vec<Instant>,
 }
 
-/// A volume of the cine loop that is being sent to the device.
+/// A volume of the cine loop that is being sent to the device, in any phase.
 #[derive(Debug)]
 pub(super) struct Replay {
     pub volume: CineVolume,
@@ -39,119 +37,28 @@ pub(super) struct Replay {
 }
 
 impl Phase {
-    /// The phase between pictures.
-    fn between_pictures(replay: Option<Replay>) -> Phase {
-        replay.map_or(Phase::Idle, Phase::Replaying)
-    }
-
-    /// Notes that a picture begins. A replay continues while it is drawn.
-    pub fn begin(&mut self, picture: InFlight) {
-        let replay = self.take_replay();
-        *self = Phase::Drawing { picture, replay };
-    }
-
     /// Notes that the picture is done, and returns it, or a default one if none was being drawn. `queued`: number of events to take from the feed
     /// before the next picture.
     pub fn finish(&mut self, queued: usize) -> InFlight {
-        match std::mem::take(self) {
-            Phase::Drawing { picture, replay } => {
-                *self = match queued {
-                    0 => Phase::between_pictures(replay),
-                    events => Phase::Draining { events, replay },
-                };
-                picture
-            }
-            other => {
-                *self = other;
-                InFlight::default()
-            }
+        let next = if queued == 0 { Phase::Idle } else { Phase::Draining(queued) };
+        match std::mem::replace(self, next) {
+            Phase::Drawing(picture) => picture,
+            Phase::Idle | Phase::Draining(_) => InFlight::default(),
         }
     }
 
     /// Notes that one of the queued events was taken. `is_empty`: the queue had none left.
     pub(crate) fn drained(&mut self, is_empty: bool) {
-        if let Phase::Draining { events, replay } = self {
+        if let Phase::Draining(events) = self {
             *events = if is_empty { 0 } else { events.saturating_sub(1) };
             if *events == 0 {
-                *self = Phase::between_pictures(replay.take());
+                *self = Phase::Idle;
             }
         }
     }
 
-    /// Starts a replay, in place of one that has not finished.
-    pub(crate) fn start_replay(&mut self, new: Replay) {
-        match self {
-            Phase::Idle | Phase::Replaying(_) => *self = Phase::Replaying(new),
-            Phase::Drawing { replay, .. } | Phase::Draining { replay, .. } => *replay = Some(new),
-        }
-    }
-
-    /// Removes the current replay, finished or not, and returns it; None if there is none.
-    pub(crate) fn take_replay(&mut self) -> Option<Replay> {
-        match self {
-            Phase::Idle => None,
-            Phase::Drawing { replay, .. } | Phase::Draining { replay, .. } => replay.take(),
-            Phase::Replaying(_) => match std::mem::take(self) {
-                Phase::Replaying(replay) => Some(replay),
-                _ => None,
-            },
-        }
-    }
-
-    pub fn replay(&self) -> Option<&Replay> {
-        match self {
-            Phase::Idle => None,
-            Phase::Drawing { replay, .. } | Phase::Draining { replay, .. } => replay.as_ref(),
-            Phase::Replaying(replay) => Some(replay),
-        }
-    }
-
-    pub(crate) fn replay_mut(&mut self) -> Option<&mut Replay> {
-        match self {
-            Phase::Idle => None,
-            Phase::Drawing { replay, .. } | Phase::Draining { replay, .. } => replay.as_mut(),
-            Phase::Replaying(replay) => Some(replay),
-        }
-    }
-
     pub fn is_drawing(&self) -> bool {
-        matches!(self, Phase::Drawing { .. })
-    }
-}
-
-/// Changed settings, made into `T`, that pictures do not use yet.
-#[derive(Default)]
-pub(super) enum Pending<T> {
-    #[default]
-    None,
-    /// Their pipelines are being compiled in the background. Each step between pictures checks this; the end of a compilation wakes the caller.
-    Compiling(T),
-    /// The next step that may begin a picture applies them or starts to compile their pipelines.
-    Ready(T),
-}
-
-impl<T> Pending<T> {
-    pub fn take(&mut self) -> Option<T> {
-        match std::mem::take(self) {
-            Pending::None => None,
-            Pending::Compiling(next) | Pending::Ready(next) => Some(next),
-        }
-    }
-
-    /// Makes the next step that may begin a picture check whether the pipelines are compiled.
-    pub(crate) fn ask_again(&mut self) {
-        *self = match std::mem::take(self) {
-            Pending::Compiling(next) => Pending::Ready(next),
-            other => other,
-        };
-    }
-
-    pub fn is_none(&self) -> bool {
-        matches!(self, Pending::None)
-    }
-
-    pub fn is_ready(&self) -> bool {
-        matches!(self, Pending::Ready(_))
+        matches!(self, Phase::Drawing(_))
     }
 }
 
@@ -184,49 +91,33 @@ impl Display {
 
 #[cfg(test)]
 mod tests {
-    use super::super::cine::{Cine, CineLimits};
     use super::*;
-    use crate::source::Frame;
-    use proptest::prelude::*;
-
-    fn replay(volume: u32) -> Replay {
-        let mut cine = Cine::new(CineLimits { volumes: 1, bytes: 100 }, 1);
-        cine.frame(Frame { volume, number: 0, slice: 0, backward: false, time: None, pose: None, bytes: vec![0] });
-        Replay { volume: cine.volumes()[0].clone(), sent: 0, image: 1 }
-    }
 
     fn name(phase: &Phase) -> &'static str {
         match phase {
             Phase::Idle => "idle",
-            Phase::Drawing { .. } => "drawing",
-            Phase::Draining { .. } => "draining",
-            Phase::Replaying(_) => "replaying",
+            Phase::Drawing(_) => "drawing",
+            Phase::Draining(_) => "draining",
         }
     }
 
     #[test]
     fn a_picture_passes_through_drawing_and_draining() {
-        let mut phase = Phase::default();
-        phase.begin(InFlight { volume: 3, arrived: Vec::new() });
-        assert_eq!(name(&phase), "drawing");
+        let mut phase = Phase::Drawing(InFlight { volume: 3, arrived: Vec::new() });
+        assert!(phase.is_drawing());
         assert_eq!(phase.finish(2).volume, 3);
         assert_eq!(name(&phase), "draining");
         phase.drained(false);
         assert_eq!(name(&phase), "draining");
         phase.drained(false);
         assert_eq!(name(&phase), "idle");
-        phase.begin(InFlight::default());
+        phase = Phase::Drawing(InFlight::default());
         phase.finish(5);
         phase.drained(true);
         assert_eq!(name(&phase), "idle", "nothing was queued any more");
-    }
-
-    #[test]
-    fn settings_that_compile_are_not_ready() {
-        let mut pending = Pending::Compiling(1);
-        assert!(!pending.is_none() && !pending.is_ready());
-        assert_eq!((pending.take(), pending.take()), (Some(1), None));
-        assert!(Pending::Ready(2).is_ready() && pending.is_none());
+        phase = Phase::Drawing(InFlight::default());
+        phase.finish(0);
+        assert_eq!(name(&phase), "idle", "nothing was queued");
     }
 
     #[test]
@@ -238,31 +129,6 @@ mod tests {
         ] {
             display.invalidate();
             assert_eq!(display, stale);
-        }
-    }
-
-    proptest! {
-        /// A replay ends only when it is taken or another one takes its place, and `Replaying` never lacks one.
-        #[test]
-        fn no_transition_loses_a_replay(steps in prop::collection::vec((0u8..5, 0u32..4), 1..60)) {
-            let (mut phase, mut expected) = (Phase::default(), None);
-            for (step, n) in steps {
-                match step {
-                    0 => phase.begin(InFlight::default()),
-                    1 => drop(phase.finish(n as usize)),
-                    2 => phase.drained(n == 0),
-                    3 => {
-                        phase.start_replay(replay(n));
-                        expected = Some(n);
-                    }
-                    _ => prop_assert_eq!(phase.take_replay().map(|r| r.volume.volume), expected.take()),
-                }
-                prop_assert_eq!(phase.replay().map(|r| r.volume.volume), expected);
-                let is_done = matches!(phase, Phase::Draining { events: 0, .. });
-                prop_assert!(!is_done);
-                let is_replaying = matches!(phase, Phase::Replaying(_));
-                prop_assert!(expected.is_some() || !is_replaying);
-            }
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Everything that depends on the geometry of the frames: the scenes, the renderer with its volume images, and the state of the picture.
 
 use super::cine::{Cine, CineVolume};
-use super::phase::{Display, InFlight, Pending, Phase, Replay};
+use super::phase::{Display, InFlight, Phase, Replay};
 use super::statistics::Statistics;
 use super::volume_pool::{Update, VolumePool};
 use crate::gpu::{GpuError, Renderer, SceneMaker};
@@ -117,21 +117,38 @@ pub(super) enum Begun {
     Nothing,
 }
 
+/// Scenes of changed settings, which pictures do not use yet.
+pub(super) struct Pending {
+    pub views: Views,
+    /// Their pipelines are being compiled in the background. Each step between pictures checks this; the end of a compilation wakes the caller.
+    /// Otherwise the next step that may begin a picture applies them or starts to compile their pipelines.
+    pub is_compiling: bool,
+}
+
+impl Pending {
+    /// Scenes to apply or compile in the next step that may begin a picture.
+    pub fn ready(views: Views) -> Option<Pending> {
+        Some(Pending { views, is_compiling: false })
+    }
+}
+
 /// The part of a stream's state that depends on the geometry of the frames, and is created anew with each geometry.
 pub(super) struct Session {
     pub views: Views,
     pub renderer: Renderer,
     pub pool: VolumePool,
     pub phase: Phase,
-    pub pending: Pending<Views>,
+    pub replay: Option<Replay>,
+    pub pending: Option<Pending>,
     pub display: Display,
     /// Time at which the last picture was begun.
     pub begun: Instant,
-    drawn: Option<u32>,
+    /// Number of the volume of the last picture, even if that is still being drawn; None before the first.
+    pub drawn: Option<u32>,
     /// By volume image: the volume of its last frame, and when those frames arrived that no picture shows yet.
     arrived: Vec<(u32, Vec<Instant>)>,
     /// By slice of the volume on display: swept backwards.
-    backward: Vec<bool>,
+    pub backward: Vec<bool>,
     /// Pipelines of changed settings are compiled in the background; the settings wait for them.
     compiles_async: bool,
     /// Why changed settings were not applied; not reported yet.
@@ -159,7 +176,8 @@ impl Session {
             renderer,
             pool,
             phase: Phase::Idle,
-            pending: Pending::None,
+            replay: None,
+            pending: None,
             display: Display::Empty,
             begun: Instant::now(),
             drawn: None,
@@ -184,7 +202,7 @@ impl Session {
     /// Applies the pending settings when all their pipelines are compiled. If stage 1 must run again, whole volumes that were filtered
     /// before are discarded, so that slices of both settings are never mixed. A rolling volume fills again by itself.
     fn apply_pending(&mut self) -> Result<(), GpuError> {
-        let Some(next) = self.pending.take() else { return Ok(()) };
+        let Some(Pending { views: next, .. }) = self.pending.take() else { return Ok(()) };
         let scene = next.of(&self.backward);
         if !self.renderer.differs_from(&scene) {
             drop(scene);
@@ -197,9 +215,9 @@ impl Session {
             if !matches!(prepared, Ok(true)) {
                 drop(scene);
                 match prepared {
-                    Ok(_) => self.pending = Pending::Compiling(next),
+                    Ok(_) => self.pending = Some(Pending { views: next, is_compiling: true }),
                     Err(error) if error.is_device_lost() => {
-                        self.pending = Pending::Ready(next);
+                        self.pending = Pending::ready(next);
                         return Err(error);
                     }
                     // The previous settings remain.
@@ -214,7 +232,7 @@ impl Session {
                 rerun
             }
             Err(error) if error.is_device_lost() => {
-                self.pending = Pending::Ready(next);
+                self.pending = Pending::ready(next);
                 return Err(error);
             }
             // Memory may have run out half-way. It was enough for the previous settings.
@@ -237,11 +255,6 @@ impl Session {
         Ok(())
     }
 
-    /// For each slice of the volume on display: true if it was swept backwards.
-    pub(crate) fn swept_backward(&self) -> &[bool] {
-        &self.backward
-    }
-
     /// Compiles the pipelines of scenes that may follow, if pipelines are compiled in the background.
     pub fn warm(&mut self, scenes: Vec<SceneMaker>) {
         self.has_warmed = true;
@@ -256,7 +269,7 @@ impl Session {
         self.display.invalidate();
         if !matches!(rerun, Rerun::Steps { .. }) {
             // A replay is interrupted: its first frames went through the previous stage 1.
-            let interrupted = self.phase.take_replay().map(|replay| replay.volume.volume);
+            let interrupted = self.replay.take().map(|replay| replay.volume.volume);
             self.to_restore = interrupted.or(self.current_volume());
             if !self.pool.is_rolling() {
                 self.pool.forget();
@@ -271,20 +284,15 @@ impl Session {
         self.pool.waiting().or(self.display.volume()).or(self.to_restore)
     }
 
-    /// Number of the volume of the last picture, even if that is still being drawn; None before the first.
-    pub(crate) fn drawn_volume(&self) -> Option<u32> {
-        self.drawn
-    }
-
     /// Number of the volume that is being sent to the device again; None if none is.
     pub(crate) fn replayed_volume(&self) -> Option<u32> {
-        self.phase.replay().map(|replay| replay.volume.volume)
+        self.replay.as_ref().map(|replay| replay.volume.volume)
     }
 
     /// True if a step has work to do without any event of the source. A replay does not count.
     pub fn is_busy(&self) -> bool {
-        matches!(self.phase, Phase::Drawing { .. } | Phase::Draining { .. })
-            || self.pending.is_ready()
+        matches!(self.phase, Phase::Drawing(_) | Phase::Draining(_))
+            || self.pending.as_ref().is_some_and(|pending| !pending.is_compiling)
             || self.refused.is_some()
             || self.to_restore.is_some()
             || self.pool.has_new()
@@ -312,7 +320,7 @@ impl Session {
             self.renderer.change(scene.into_owned())?;
         }
         self.renderer.begin_picture()?;
-        self.phase.begin(InFlight { volume, arrived });
+        self.phase = Phase::Drawing(InFlight { volume, arrived });
         (self.display, self.begun, self.drawn) = (Display::Current(volume), Instant::now(), Some(volume));
         Ok(Begun::Picture)
     }
@@ -325,7 +333,7 @@ impl Session {
         let picture = self.renderer.end_drawing()?;
         let InFlight { volume, arrived } = self.phase.finish(queued);
         // Their pipelines may have been compiled meanwhile, and nothing would ask again.
-        self.pending.ask_again();
+        self.pending.iter_mut().for_each(|pending| pending.is_compiling = false);
         let now = Instant::now();
         arrived.iter().for_each(|at| statistics.record_latency(now.saturating_duration_since(*at)));
         statistics.pictures += 1;
@@ -336,12 +344,12 @@ impl Session {
 
     /// Starts to send a volume of the cine loop to the device, in place of one that is being sent. Does nothing if no volume image is free.
     pub(crate) fn start_replay(&mut self, volume: CineVolume) {
-        let image = match self.phase.replay() {
+        let image = match &self.replay {
             Some(replay) => Some(replay.image),
             None => self.pool.spare(),
         };
         if let Some(image) = image {
-            self.phase.start_replay(Replay { volume, sent: 0, image });
+            self.replay = Some(Replay { volume, sent: 0, image });
         }
     }
 
@@ -359,7 +367,7 @@ impl Session {
     /// # Errors
     /// The device fails.
     pub(crate) fn continue_replay(&mut self) -> Result<(), GpuError> {
-        let Some(replay) = self.phase.replay_mut() else { return Ok(()) };
+        let Some(replay) = &mut self.replay else { return Ok(()) };
         let (frames, image) = (&replay.volume.frames, replay.image);
         for frame in frames.iter().skip(replay.sent).take(REPLAY_FRAMES) {
             self.renderer.frame(frame.slice as u32, &frame.bytes, image)?;
@@ -368,7 +376,7 @@ impl Session {
         if replay.sent >= frames.len() {
             let backward = frames.iter().map(|frame| frame.backward).collect();
             self.pool.put(image, replay.volume.volume, backward);
-            self.phase.take_replay();
+            self.replay = None;
         }
         Ok(())
     }

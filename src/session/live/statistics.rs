@@ -3,6 +3,7 @@
 use super::volume_pool::VolumeCounts;
 use crate::metrics::histogram;
 use crate::passes::PassTime;
+use crate::tree::Defaults;
 use hdrhistogram::Histogram;
 use std::fmt::Write as _;
 use std::time::Duration;
@@ -26,7 +27,7 @@ pub struct SourceFaults {
 }
 
 /// Statistics of a stream over a period: since it began, or since they were last taken.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Defaults)]
 pub struct Statistics {
     /// Length of the period.
     pub time: Duration,
@@ -44,34 +45,15 @@ pub struct Statistics {
     pub pictures: u64,
     pub volumes: VolumeCounts,
     /// Latency from the arrival of each frame until the host finds the first picture that shows it finished, us.
+    // Never fails with these constants.
+    #[value(Histogram::new_with_bounds(1, MAX_LATENCY, 3).unwrap_or_else(|_| unreachable!()))]
     pub latency: Histogram<u64>,
     /// The latencies of `latency`, but in s and in bins with fixed limits.
+    #[value(histogram::Histogram::new(LATENCY_LIMITS))]
     pub latencies: histogram::Histogram,
     pub passes: Vec<PassTime>,
     /// Number of passes and copies that could not be timed.
     pub untimed: u64,
-}
-
-impl Default for Statistics {
-    fn default() -> Statistics {
-        // Never fails with these constants.
-        let latency = Histogram::new_with_bounds(1, MAX_LATENCY, 3).unwrap_or_else(|_| unreachable!());
-        Statistics {
-            time: Duration::ZERO,
-            frames: 0,
-            lost: 0,
-            refused: 0,
-            frozen: 0,
-            unrecorded: 0,
-            faults: SourceFaults::default(),
-            pictures: 0,
-            volumes: VolumeCounts::default(),
-            latency,
-            latencies: histogram::Histogram::new(LATENCY_LIMITS),
-            passes: Vec::new(),
-            untimed: 0,
-        }
-    }
 }
 
 impl Statistics {
@@ -91,62 +73,38 @@ impl Statistics {
         self.latency.value_at_quantile(share) as f64 / 1e3
     }
 
+    /// Everything that is counted but the number of passes that could not be timed.
+    fn counts(&mut self) -> [&mut u64; 13] {
+        let Statistics { frames, lost, refused, frozen, unrecorded, pictures, faults, volumes, .. } = self;
+        let SourceFaults { reported, ended, disconnected: gone } = faults;
+        let VolumeCounts { shown, dropped, incomplete, left_out } = volumes;
+        [
+            frames, lost, refused, frozen, unrecorded, pictures, reported, ended, gone, shown, dropped, incomplete,
+            left_out,
+        ]
+    }
+
     /// These statistics minus the earlier ones. Latencies, times of passes and the number of untimed ones are not subtracted, because they are reset
     /// whenever statistics are taken.
     pub fn since(&self, before: &Statistics) -> Statistics {
-        let counts = |now: VolumeCounts, then: VolumeCounts| VolumeCounts {
-            shown: now.shown.saturating_sub(then.shown),
-            dropped: now.dropped.saturating_sub(then.dropped),
-            incomplete: now.incomplete.saturating_sub(then.incomplete),
-            left_out: now.left_out.saturating_sub(then.left_out),
-        };
-        Statistics {
-            time: self.time.saturating_sub(before.time),
-            frames: self.frames.saturating_sub(before.frames),
-            lost: self.lost.saturating_sub(before.lost),
-            refused: self.refused.saturating_sub(before.refused),
-            frozen: self.frozen.saturating_sub(before.frozen),
-            unrecorded: self.unrecorded.saturating_sub(before.unrecorded),
-            faults: SourceFaults {
-                reported: self.faults.reported.saturating_sub(before.faults.reported),
-                ended: self.faults.ended.saturating_sub(before.faults.ended),
-                disconnected: self.faults.disconnected.saturating_sub(before.faults.disconnected),
-            },
-            pictures: self.pictures.saturating_sub(before.pictures),
-            volumes: counts(self.volumes, before.volumes),
-            ..self.clone()
+        let (mut since, mut before) = (self.clone(), before.clone());
+        since.time = self.time.saturating_sub(before.time);
+        for (now, then) in since.counts().into_iter().zip(before.counts()) {
+            *now = now.saturating_sub(*then);
         }
+        since
     }
 
     /// Adds the statistics of a later period.
     pub fn add(&mut self, later: &Statistics) {
         self.time += later.time;
-        self.frames += later.frames;
-        self.lost += later.lost;
-        self.refused += later.refused;
-        self.frozen += later.frozen;
-        self.unrecorded += later.unrecorded;
-        self.faults.reported += later.faults.reported;
-        self.faults.ended += later.faults.ended;
-        self.faults.disconnected += later.faults.disconnected;
-        self.pictures += later.pictures;
-        self.volumes.shown += later.volumes.shown;
-        self.volumes.dropped += later.volumes.dropped;
-        self.volumes.incomplete += later.volumes.incomplete;
-        self.volumes.left_out += later.volumes.left_out;
+        let mut added = later.clone();
+        self.counts().into_iter().zip(added.counts()).for_each(|(sum, more)| *sum += *more);
         // Cannot fail: both histograms have the same bounds.
         let _ = self.latency.add(&later.latency);
         self.latencies.add(&later.latencies);
         self.untimed += later.untimed;
-        for pass in &later.passes {
-            match self.passes.iter_mut().find(|p| p.name == pass.name) {
-                Some(sum) => {
-                    sum.runs += pass.runs;
-                    sum.total += pass.total;
-                }
-                None => self.passes.push(pass.clone()),
-            }
-        }
+        later.passes.iter().for_each(|pass| pass.add_to(&mut self.passes));
     }
 
     /// The counts on one line, for statistics since the beginning.

@@ -45,13 +45,10 @@ pub(super) fn draw(picture: &mut Picture, scene: &Scene, volume: Option<u32>) ->
         }
         strokes.extend(drawn.head.iter().flat_map(|head| overlay::arrow_head(*head, HEAD)));
         let line = if drawn.is_of_other { DIMMED } else { LINE };
-        for (half, colour) in [(HALF_EDGE, EDGE), (HALF, line)] {
-            strokes.iter().for_each(|ends| stroke(picture, drawn.tile, *ends, half, colour));
-        }
+        edged(picture, drawn.tile, &strokes, [HALF_EDGE, HALF], line);
         if !drawn.label.is_empty() {
-            let width = canvas::text_width(&drawn.label, TEXT)?.min(WIDEST).ceil() as u32 + 6;
-            let label = canvas::picture([width, TEXT + 6], &Label(&drawn.label))?;
-            let at = overlay::label_corner(&drawn, [f64::from(width), f64::from(TEXT + 6)]);
+            let label = label(&drawn.label, WIDEST)?;
+            let at = overlay::label_corner(&drawn, [label.width, label.height].map(f64::from));
             blend(picture, &label, at.map(|n| n.round() as i64));
         }
     }
@@ -69,15 +66,8 @@ pub(super) fn slices(picture: &mut Picture, scene: &Scene) -> Result<(), String>
     let tiling = scene.tiling();
     let Some(first) = tiling.tiles.first() else { return Ok(()) };
     let tile = [first.corner, first.size].map(|corner| corner.map(f64::from));
-    for (half, colour) in [(1.5, EDGE), (0.5, LINE)] {
-        tiling.slice_lines().iter().for_each(|ends| stroke(picture, tile, *ends, half, colour));
-    }
-    let text = overlay::spacing_label(&tiling);
-    let width = canvas::text_width(&text, TEXT)?.min(tile[1][0]).ceil() as u32 + 6;
-    let label = canvas::picture([width, TEXT + 6], &Label(&text))?;
-    let bottom = tile[0][1] + tile[1][1] - f64::from(TEXT + 8);
-    blend(picture, &label, [tile[0][0].round() as i64 + 2, bottom.round() as i64]);
-    Ok(())
+    edged(picture, tile, &tiling.slice_lines(), [1.5, 0.5], LINE);
+    label_below(picture, &overlay::spacing_label(&tiling), tile)
 }
 
 /// Writes on each slice of a tomography its position.
@@ -90,9 +80,8 @@ pub(super) fn places(picture: &mut Picture, scene: &Scene) -> Result<(), String>
     }
     for tile in scene.marks().iter().skip(usize::from(scene.has_reference())) {
         let Some(text) = tile.place_label() else { continue };
-        let width = canvas::text_width(&text, TEXT)?.ceil() as u32 + 6;
-        if f64::from(width) < tile.size[0] {
-            let label = canvas::picture([width, TEXT + 6], &Label(&text))?;
+        let label = label(&text, f64::INFINITY)?;
+        if f64::from(label.width) < tile.size[0] {
             blend(picture, &label, [tile.corner[0].round() as i64 + 2, tile.corner[1].round() as i64 + 2]);
         }
     }
@@ -111,18 +100,10 @@ pub(super) fn curve(picture: &mut Picture, scene: &Scene) -> Result<(), String> 
     let mut strokes: Vec<[[f64; 2]; 2]> = on.line.windows(2).map(|ends| [ends[0], ends[1]]).collect();
     strokes.extend(on.head().into_iter().flat_map(|head| overlay::arrow_head(head, HEAD)));
     let colour = CURVE_COLOUR.map(|c| (c * 255.0).round() as u8);
-    for (half, colour) in [(HALF_EDGE, EDGE), (HALF, colour)] {
-        strokes.iter().for_each(|ends| stroke(picture, tile, *ends, half, colour));
-    }
+    edged(picture, tile, &strokes, [HALF_EDGE, HALF], colour);
     let marks = scene.marks();
     let section = marks.iter().find_map(|tile| Some((tile, tile.along_label()?)));
-    if let Some((tile, text)) = section {
-        let width = canvas::text_width(&text, TEXT)?.min(tile.size[0]).ceil() as u32 + 6;
-        let label = canvas::picture([width, TEXT + 6], &Label(&text))?;
-        let bottom = tile.corner[1] + tile.size[1] - f64::from(TEXT + 8);
-        blend(picture, &label, [tile.corner[0].round() as i64 + 2, bottom.round() as i64]);
-    }
-    Ok(())
+    section.map_or(Ok(()), |(tile, text)| label_below(picture, &text, [tile.corner, tile.size]))
 }
 
 /// Draws the body marks: the outline of the body as a thin line, the probe as a bar with a dot at its marked end.
@@ -157,6 +138,13 @@ pub(super) fn start(picture: &mut Picture, lines: &[StartLine]) {
     }
 }
 
+/// Draws lines with a dark edge. `halves`: half the width of the edge and of the line, pixels.
+fn edged(picture: &mut Picture, tile: [[f64; 2]; 2], lines: &[[[f64; 2]; 2]], halves: [f64; 2], colour: [u8; 3]) {
+    for (half, colour) in halves.into_iter().zip([EDGE, colour]) {
+        lines.iter().for_each(|ends| stroke(picture, tile, *ends, half, colour));
+    }
+}
+
 /// Draws a line with smooth borders, within a tile.
 fn stroke(picture: &mut Picture, tile: [[f64; 2]; 2], ends: [[f64; 2]; 2], half: f64, colour: [u8; 3]) {
     let size = [f64::from(picture.width), f64::from(picture.height)];
@@ -183,6 +171,19 @@ fn stroke(picture: &mut Picture, tile: [[f64; 2]; 2], ends: [[f64; 2]; 2], half:
             }
         }
     }
+}
+
+/// Writes a label at the lower left corner of a tile: its corner and size, pixels.
+fn label_below(picture: &mut Picture, text: &str, [corner, size]: [[f64; 2]; 2]) -> Result<(), String> {
+    let bottom = corner[1] + size[1] - f64::from(TEXT + 8);
+    blend(picture, &label(text, size[0])?, [corner[0].round() as i64 + 2, bottom.round() as i64]);
+    Ok(())
+}
+
+/// A label as a picture; a text wider than `most` pixels is cut.
+fn label(text: &str, most: f64) -> Result<Picture, String> {
+    let width = canvas::text_width(text, TEXT)?.min(most).ceil() as u32 + 6;
+    canvas::picture([width, TEXT + 6], &Label(text))
 }
 
 /// A label, white on black.

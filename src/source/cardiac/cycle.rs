@@ -79,15 +79,7 @@ impl Cycle {
 
     /// The header of a recording of the volumes. `range`: the stored values that are displayed as 0 and 1.
     pub fn header(&self, range: [f64; 2]) -> Header {
-        let geometry = crate::probe::Geometry::Sweep(self.probe.clone());
-        Header {
-            forward: geometry.clone(),
-            backward: geometry,
-            stored: self.stored,
-            range,
-            posed: false,
-            synthetic: false,
-        }
+        Header::of(crate::probe::Geometry::Sweep(self.probe.clone()), self.stored, range)
     }
 
     /// The frames of the volume at a phase (an index from 0 to `phases` - 1), by slice. The time stamp of all is that of the phase, s from the

@@ -62,36 +62,47 @@ pub(super) fn class(uid: &str) -> (Class, &'static str) {
     }
 }
 
-/// Transfer syntaxes below 1.2.840.10008.1.2 that are known by name, and whether they are read.
-const SYNTAXES: [(&str, &str, bool); 24] = [
-    ("", "implicit little-endian", true),
-    (".1", "explicit little-endian", true),
-    (".2", "explicit big-endian", true),
-    (".5", "RLE", true),
-    (".4.50", "JPEG baseline", true),
-    (".4.51", "JPEG extended", true),
-    (".4.57", "JPEG lossless", true),
-    (".4.70", "JPEG lossless", true),
-    (".4.80", "JPEG-LS lossless", false),
-    (".4.81", "JPEG-LS near-lossless", false),
-    (".4.90", "JPEG 2000 lossless", true),
-    (".4.91", "JPEG 2000", true),
-    (".4.92", "JPEG 2000 part 2 lossless", false),
-    (".4.93", "JPEG 2000 part 2", false),
-    (".4.100", "MPEG-2 video", false),
-    (".4.101", "MPEG-2 video", false),
-    (".4.102", "H.264 video", false),
-    (".4.103", "H.264 video", false),
-    (".4.104", "H.264 video", false),
-    (".4.107", "H.265 video", false),
-    (".4.108", "H.265 video", false),
-    (".4.201", "High-Throughput JPEG 2000 lossless", false),
-    (".4.202", "High-Throughput JPEG 2000 lossless", false),
-    (".4.203", "High-Throughput JPEG 2000", false),
+/// How the frames of a DICOM file are compressed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in super::super) enum Coding {
+    Native,
+    Rle,
+    /// Baseline or extended, 8 bits.
+    Jpeg,
+    JpegLossless,
+    Jpeg2000,
+}
+
+/// Transfer syntaxes below 1.2.840.10008.1.2 that are known by name, and how they compress pixels; None if they are not read.
+const SYNTAXES: [(&str, &str, Option<Coding>); 24] = [
+    ("", "implicit little-endian", Some(Coding::Native)),
+    (".1", "explicit little-endian", Some(Coding::Native)),
+    (".2", "explicit big-endian", Some(Coding::Native)),
+    (".5", "RLE", Some(Coding::Rle)),
+    (".4.50", "JPEG baseline", Some(Coding::Jpeg)),
+    (".4.51", "JPEG extended", Some(Coding::Jpeg)),
+    (".4.57", "JPEG lossless", Some(Coding::JpegLossless)),
+    (".4.70", "JPEG lossless", Some(Coding::JpegLossless)),
+    (".4.80", "JPEG-LS lossless", None),
+    (".4.81", "JPEG-LS near-lossless", None),
+    (".4.90", "JPEG 2000 lossless", Some(Coding::Jpeg2000)),
+    (".4.91", "JPEG 2000", Some(Coding::Jpeg2000)),
+    (".4.92", "JPEG 2000 part 2 lossless", None),
+    (".4.93", "JPEG 2000 part 2", None),
+    (".4.100", "MPEG-2 video", None),
+    (".4.101", "MPEG-2 video", None),
+    (".4.102", "H.264 video", None),
+    (".4.103", "H.264 video", None),
+    (".4.104", "H.264 video", None),
+    (".4.107", "H.265 video", None),
+    (".4.108", "H.265 video", None),
+    (".4.201", "High-Throughput JPEG 2000 lossless", None),
+    (".4.202", "High-Throughput JPEG 2000 lossless", None),
+    (".4.203", "High-Throughput JPEG 2000", None),
 ];
 
-/// The name of the transfer syntax with this UID, and whether pixels of it can be read.
-pub(super) fn syntax(uid: &str) -> (&'static str, bool) {
+/// The name of the transfer syntax with this UID, and how it compresses pixels; None if they cannot be read.
+pub(super) fn syntax(uid: &str) -> (&'static str, Option<Coding>) {
     let known = uid.strip_prefix("1.2.840.10008.1.2").and_then(|end| SYNTAXES.iter().find(|(known, ..)| *known == end));
-    known.map_or(("unknown", false), |(_, name, is_read)| (name, *is_read))
+    known.map_or(("unknown", None), |(_, name, coding)| (name, *coding))
 }

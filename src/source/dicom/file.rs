@@ -5,8 +5,9 @@ use super::super::packed::InputFile;
 use super::super::{OpenOptions, kretz};
 use super::about::{about, accept};
 use super::classes::Class;
+use super::classes::Coding;
 use super::elements::Elements;
-use super::frames::{Arrangement, Coding};
+use super::image::Arrangement;
 use super::image::Image;
 use super::placed::{Placed, layout};
 use super::tags;
@@ -60,12 +61,6 @@ pub(in super::super) fn read(file: &InputFile, options: &OpenOptions) -> Result<
 }
 
 fn refuse_spacing(file: &InputFile, options: &OpenOptions) -> Result<(), InputError> {
-    match options.voxel_spacing {
-        Some(_) => Err(InputError::new(
-            file.path,
-            "--voxel-spacing",
-            "is for pictures without a spacing; this file states its own",
-        )),
-        None => Ok(()),
-    }
+    let why = "is for pictures without a spacing; this file states its own";
+    options.voxel_spacing.map_or(Ok(()), |_| Err(InputError::new(file.path, "--voxel-spacing", why)))
 }

@@ -1,104 +1,62 @@
 //! The frames of DICOM files as one stream of samples: native, RLE (PS3.5 annex G) or one of the JPEGs, in any order, cut to a part of the picture.
 
 use super::super::gathered::Decoded;
+use super::classes::Coding;
+use super::image::{Arrangement, Image};
 use super::jpeg::{self, Expected};
-use super::palette::Palette;
 use crate::files::progress::CountedFile;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::PathBuf;
-use std::sync::Arc;
 
-/// How the frames of a DICOM file are compressed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in super::super) enum Coding {
-    Native,
-    Rle,
-    /// Baseline or extended, 8 bits.
-    Jpeg,
-    JpegLossless,
-    Jpeg2000,
-}
-
-/// How the numbers of a decompressed frame are arranged.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) enum Arrangement {
-    /// Pixel by pixel, in the channels that are read.
-    Plain,
-    /// Plane by plane: all of the first channel, then all of the next.
-    Planes,
-    /// Luminance and two colour differences for each pixel, of which the luminance is read.
-    Luma,
-    /// Luminance and two colour differences, plane by plane, of which the luminance is read.
-    LumaPlane,
-    /// For each pair of pixels two luminances and two shared colour differences; the luminances are read.
-    LumaPairs,
-    /// Indices into a palette, which are read as the luminance of their colours.
-    Palette(Palette),
-}
-
-/// Where the bytes of a frame are: a file, and a range of [`Frames::parts`].
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
-    pub file: usize,
-    /// Index of the frame's first part in the list of parts; `count` is their number.
-    pub first: usize,
-    pub count: usize,
-    /// True if the frame begins at an odd number of bytes from the first frame, so that in words of 16 bits it begins with the second byte of a
-    /// word.
-    pub odd: bool,
-}
-
-/// The frames of one or more DICOM files, in the order in which they are read, with all that is needed to decode them.
-#[derive(Clone, Debug)]
+/// The frames of one or more DICOM files, with all that is needed to decode them.
 pub(super) struct Frames {
-    pub(super) files: Arc<[PathBuf]>,
-    pub(super) places: Arc<[Place]>,
-    /// Offset and length, bytes, of each fragment, or of each uncompressed frame.
-    pub(super) parts: Arc<[(u64, u64)]>,
-    pub(super) coding: Coding,
-    pub(super) arrangement: Arrangement,
-    /// True if uncompressed bytes are in big-endian words of 16 bits, so that the second byte of a word is the first pixel.
-    pub(super) swapped: bool,
-    /// Columns and rows of a stored picture.
-    pub(super) stored: [usize; 2],
+    pub(super) files: Vec<PathBuf>,
+    /// The pixels of all files. Its places are in the order in which frames are read.
+    pub(super) image: Image,
     /// The part of each picture that is read: first column, first row, columns and rows.
     pub(super) part: [usize; 4],
-    /// Bytes of one number after decoding.
-    pub(super) width: usize,
-    /// Numbers of a pixel after decoding.
-    pub(super) channels: usize,
 }
 
 impl Frames {
+    /// Bytes of one number after decoding.
+    fn width(&self) -> usize {
+        self.image.pixel.number.bytes()
+    }
+
+    /// Numbers of a pixel after decoding.
+    fn channels(&self) -> usize {
+        self.image.pixel.channels
+    }
+
     /// Numbers of a pixel as they are stored.
     fn stored_channels(&self) -> usize {
-        match self.arrangement {
+        match self.image.arrangement {
             Arrangement::Luma | Arrangement::LumaPlane => 3,
             Arrangement::LumaPairs => 2,
             Arrangement::Palette(_) => 1,
-            _ => self.channels,
+            _ => self.channels(),
         }
     }
 
     /// Bytes of a number in the file.
     fn stored_width(&self) -> usize {
-        match &self.arrangement {
+        match &self.image.arrangement {
             Arrangement::Palette(palette) => palette.numbers.width,
-            _ => self.width,
+            _ => self.width(),
         }
     }
 
     /// Bytes of a frame in the file, if it is native.
     fn stored_bytes(&self) -> u64 {
-        (self.stored[0] * self.stored[1] * self.stored_width() * self.stored_channels()) as u64
+        (self.image.size[0] * self.image.size[1] * self.stored_width() * self.stored_channels()) as u64
     }
 
     fn expected(&self) -> Expected {
-        Expected { size: self.stored, channels: self.stored_channels(), width: self.stored_width() }
+        Expected { size: self.image.size, channels: self.stored_channels(), width: self.stored_width() }
     }
 
     fn arranged(&self, numbers: Vec<u8>) -> Vec<u8> {
-        match &self.arrangement {
+        match &self.image.arrangement {
             Arrangement::Plain => numbers,
             Arrangement::Luma => numbers.chunks_exact(3).map(|pixel| pixel[0]).collect(),
             Arrangement::LumaPairs => numbers.chunks_exact(4).flat_map(|pair| [pair[0], pair[1]]).collect(),
@@ -109,12 +67,13 @@ impl Frames {
             }
             Arrangement::Palette(palette) => palette.greys(&numbers),
             Arrangement::Planes => {
-                let plane = numbers.len() / self.channels.max(1);
+                let (width, channels) = (self.width(), self.channels());
+                let plane = numbers.len() / channels.max(1);
                 let mut pixels = Vec::with_capacity(numbers.len());
-                for at in (0..plane).step_by(self.width.max(1)) {
-                    for channel in 0..self.channels {
+                for at in (0..plane).step_by(width.max(1)) {
+                    for channel in 0..channels {
                         let from = channel * plane + at;
-                        pixels.extend_from_slice(numbers.get(from..from + self.width).unwrap_or_default());
+                        pixels.extend_from_slice(numbers.get(from..from + width).unwrap_or_default());
                     }
                 }
                 pixels
@@ -124,8 +83,8 @@ impl Frames {
 
     fn cut(&self, pixels: &[u8]) -> Vec<u8> {
         let [x, y, columns, rows] = self.part;
-        let width = self.width * self.channels;
-        let line = self.stored[0] * width;
+        let width = self.width() * self.channels();
+        let line = self.image.size[0] * width;
         let lines = pixels.chunks_exact(line.max(1)).skip(y).take(rows);
         lines.flat_map(|line| line.get(x * width..(x + columns) * width).unwrap_or_default()).copied().collect()
     }
@@ -133,13 +92,13 @@ impl Frames {
 
 impl Decoded for Frames {
     fn each(&self) -> usize {
-        self.part[2] * self.part[3] * self.width * self.channels
+        self.part[2] * self.part[3] * self.width() * self.channels()
     }
 
     fn decode(&self, number: usize) -> io::Result<Vec<u8>> {
-        let Some(place) = self.places.get(number) else { return Ok(Vec::new()) };
+        let Some(place) = self.image.places.get(number) else { return Ok(Vec::new()) };
         let (Some(path), Some(parts)) =
-            (self.files.get(place.file), self.parts.get(place.first..place.first + place.count))
+            (self.files.get(place.file), self.image.parts.get(place.first..place.first + place.count))
         else {
             return Ok(Vec::new());
         };
@@ -147,21 +106,21 @@ impl Decoded for Frames {
         let mut bytes = Vec::new();
         for (offset, length) in parts {
             // Whole words.
-            let before = u64::from(self.swapped && place.odd);
-            let length = if self.swapped { (length + before).next_multiple_of(2) } else { *length };
+            let before = u64::from(self.image.swapped && place.odd);
+            let length = if self.image.swapped { (length + before).next_multiple_of(2) } else { *length };
             file.seek(SeekFrom::Start(offset.saturating_sub(before)))?;
             (&mut file).take(length).read_to_end(&mut bytes)?;
         }
-        if self.swapped {
+        if self.image.swapped {
             bytes.as_chunks_mut::<2>().0.iter_mut().for_each(|word| word.swap(0, 1));
             bytes.drain(..usize::from(place.odd).min(bytes.len()));
             bytes.truncate(self.stored_bytes() as usize);
         }
         let wrong = |why: &str| io::Error::new(io::ErrorKind::InvalidData, format!("frame {number} {why}"));
-        let numbers = match self.coding {
+        let numbers = match self.image.coding {
             Coding::Native => bytes,
             Coding::Rle => {
-                let pixels = self.stored[0] * self.stored[1];
+                let pixels = self.image.size[0] * self.image.size[1];
                 unpacked(&bytes, pixels, self.stored_width(), self.stored_channels()).map_err(|why| wrong(&why))?
             }
             Coding::Jpeg => jpeg::baseline(&bytes, self.expected()).map_err(|why| wrong(&why))?,
@@ -241,7 +200,9 @@ impl Iterator for PackBits<'_> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::super::pixel::{Number, PixelFormat};
     use super::*;
+    use std::collections::BTreeSet;
 
     #[test]
     fn runs_and_literals_of_every_length_are_unpacked() {
@@ -267,23 +228,25 @@ mod tests {
 
     #[test]
     fn a_part_of_a_picture_is_cut_out() {
-        let frames = Frames {
-            files: Arc::new([]),
-            places: Arc::new([]),
-            parts: Arc::new([]),
-            coding: Coding::Native,
-            arrangement: Arrangement::Planes,
-            swapped: false,
-            stored: [3, 2],
-            part: [1, 0, 2, 2],
-            width: 1,
-            channels: 3,
+        let frames = |arrangement: Arrangement, channels: usize| {
+            let image = Image {
+                size: [3, 2],
+                pixel: PixelFormat { channels, ..PixelFormat::grey(Number::U8) },
+                coding: Coding::Native,
+                arrangement,
+                places: Vec::new(),
+                parts: Vec::new(),
+                swapped: false,
+                warnings: BTreeSet::new(),
+            };
+            Frames { files: Vec::new(), image, part: [1, 0, 2, 2] }
         };
+        let luma = frames(Arrangement::LumaPlane, 1);
+        let frames = frames(Arrangement::Planes, 3);
         let planes = [[0, 1, 2, 3, 4, 5], [10, 11, 12, 13, 14, 15], [20, 21, 22, 23, 24, 25]].concat();
         let pixels = frames.cut(&frames.arranged(planes));
         assert_eq!(pixels, [1, 11, 21, 2, 12, 22, 4, 14, 24, 5, 15, 25]);
         assert_eq!((frames.each(), frames.stored_bytes()), (12, 18));
-        let luma = Frames { arrangement: Arrangement::LumaPlane, channels: 1, ..frames };
         assert_eq!(luma.cut(&luma.arranged((0..18).collect())), [1, 2, 4, 5]);
     }
 }

@@ -2,10 +2,9 @@
 
 use super::super::packed::Encoding;
 use super::super::pixel::{Number, PixelFormat};
-use super::classes::syntax;
+use super::classes::{Coding, syntax};
 use super::elements::{Elements, Fragment, Item, PixelData};
 use super::fragments::{Divided, Stream, divided};
-use super::frames::{Arrangement, Coding, Place};
 use super::palette::{Indices, Palette, Tables};
 use super::tags::{self, Tag};
 use crate::files::{InputError, quoted};
@@ -20,6 +19,35 @@ const MAX_FRAME_BYTES: u64 = 1 << 30;
 const MAX_LOSSLESS_BYTES: u64 = 1 << 28;
 const MAX_JPEG_2000_BYTES: u64 = 1 << 26;
 
+/// How the numbers of a decompressed frame are arranged.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Arrangement {
+    /// Pixel by pixel, in the channels that are read.
+    Plain,
+    /// Plane by plane: all of the first channel, then all of the next.
+    Planes,
+    /// Luminance and two colour differences for each pixel, of which the luminance is read.
+    Luma,
+    /// Luminance and two colour differences, plane by plane, of which the luminance is read.
+    LumaPlane,
+    /// For each pair of pixels two luminances and two shared colour differences; the luminances are read.
+    LumaPairs,
+    /// Indices into a palette, which are read as the luminance of their colours.
+    Palette(Palette),
+}
+
+/// Where the bytes of a frame are: a file, and a range of [`Image::parts`].
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    pub file: usize,
+    /// Index of the frame's first part in the list of parts; `count` is their number.
+    pub first: usize,
+    pub count: usize,
+    /// True if the frame begins at an odd number of bytes from the first frame, so that in words of 16 bits it begins with the second byte of a
+    /// word.
+    pub odd: bool,
+}
+
 /// The pixels of one DICOM file: their size, coding and location.
 pub(super) struct Image {
     /// Columns and rows of a picture.
@@ -30,8 +58,6 @@ pub(super) struct Image {
     /// Where the bytes of each frame are, in the order of the file.
     pub places: Vec<Place>,
     pub parts: Vec<(u64, u64)>,
-    /// True if the decoder turns colours into luminance, so that `pixel` shows one channel although the file has colours.
-    pub from_colour: bool,
     /// True if uncompressed bytes are in big-endian words of 16 bits, so that the second byte of a word is the first pixel.
     pub swapped: bool,
     /// One line for each statement of the file that is wrong or missing.
@@ -47,14 +73,12 @@ impl Image {
     pub fn of(path: &Path, elements: &Elements, slices: u32) -> Result<Image, InputError> {
         let fault = |field: &str, fault: String| Err(InputError::new(path, field, fault));
         let root = &elements.root;
-        let (name, is_read) = syntax(&elements.syntax);
-        if !is_read {
+        let (name, coding) = syntax(&elements.syntax);
+        let Some(coding) = coding else {
             let uid = quoted(&elements.syntax);
-            return fault(
-                "transfer syntax",
-                format!("{name} ({uid}) is not read: uncompressed, RLE, JPEG and JPEG 2000 are"),
-            );
-        }
+            let why = format!("{name} ({uid}) is not read: uncompressed, RLE, JPEG and JPEG 2000 are");
+            return fault("transfer syntax", why);
+        };
         let side = |field: &str, tag| match root.word(tag) {
             Some(n @ 1..) => Ok(usize::from(n)),
             Some(0) => Err(InputError::new(path, field, "is 0, must be at least 1")),
@@ -69,7 +93,6 @@ impl Image {
             },
         };
         let Some(pixels) = &elements.pixels else { return fault("pixel data (7FE0,0010)", "is missing".into()) };
-        let coding = coding(&elements.syntax);
         let mut format = Format::of(path, elements, coding)?;
         if let PixelData::Native(_, length, _) = pixels {
             format.find_full(size, stated.unwrap_or(1), *length);
@@ -114,18 +137,7 @@ impl Image {
             }
             _ => return fault("pixel data (7FE0,0010)", format!("is not in the form of {name}")),
         };
-        let from_colour = !matches!(arrangement, Arrangement::Plain | Arrangement::Planes);
-        Ok(Image { size, pixel, coding, arrangement, places, parts, from_colour, swapped, warnings })
-    }
-}
-
-fn coding(syntax: &str) -> Coding {
-    match syntax {
-        "1.2.840.10008.1.2.5" => Coding::Rle,
-        "1.2.840.10008.1.2.4.57" | "1.2.840.10008.1.2.4.70" => Coding::JpegLossless,
-        JPEG_2000_LOSSLESS | "1.2.840.10008.1.2.4.91" => Coding::Jpeg2000,
-        uid if uid.starts_with("1.2.840.10008.1.2.4.") => Coding::Jpeg,
-        _ => Coding::Native,
+        Ok(Image { size, pixel, coding, arrangement, places, parts, swapped, warnings })
     }
 }
 

@@ -22,12 +22,12 @@ mod tags;
 mod volume;
 mod write;
 
+pub(super) use classes::Coding;
 pub(super) use elements::is_one;
 pub(super) use file::read;
-pub(super) use frames::Coding;
 pub(super) use series::{is_dicom, is_series, read_series};
 pub(super) use tags::rows;
-pub(super) use write::{DicomWriter, Form, MOST_BYTES};
+pub(super) use write::{DicomWriter, MOST_BYTES};
 
 /// Usual file name endings of DICOM files, in lower case without the dot. Many DICOM files have no ending, or a number in its place.
 pub const ENDINGS: [&str; 3] = ["dcm", "dicom", "ima"];

@@ -1,11 +1,10 @@
 //! Where the frames of DICOM files lie, and the layout that follows from it.
 
 use super::super::describe;
-use super::super::keys::Unused;
-use super::super::layout::{Layout, LineOrder, StoredGeometry};
+use super::super::layout::{Layout, StoredGeometry};
 use super::super::packed::{Encoding, Pixels};
-use super::super::transforms::Poses;
 use super::frames::Frames;
+use super::image::Arrangement;
 use super::image::Image;
 use crate::files::InputError;
 use std::collections::{BTreeMap, BTreeSet};
@@ -33,47 +32,22 @@ pub(super) struct Placed {
 pub(super) fn layout(
     files: Vec<PathBuf>,
     path: PathBuf,
-    image: Image,
+    mut image: Image,
     placed: Placed,
     direct: Option<Pixels>,
 ) -> Result<Layout, InputError> {
     let Placed { format, geometry, order, part, has_spacing, times, mut remarks, warnings } = placed;
     warn(&path, &image.warnings | &warnings, &mut remarks);
-    if image.from_colour {
+    if !matches!(image.arrangement, Arrangement::Plain | Arrangement::Planes) {
         remarks.push(("colours".into(), "read as their luminance".into()));
     }
     let [_, _, columns, rows] = part;
-    let places = order.iter().filter_map(|n| image.places.get(*n).copied()).collect();
+    image.places = order.iter().filter_map(|n| image.places.get(*n).copied()).collect();
     let length = image.parts.iter().fold(0u64, |all, (_, length)| all.saturating_add(*length));
-    let frames = Frames {
-        files: files.into(),
-        places,
-        parts: image.parts.into(),
-        coding: image.coding,
-        arrangement: image.arrangement,
-        swapped: image.swapped,
-        stored: image.size,
-        part,
-        width: image.pixel.number.bytes(),
-        channels: image.pixel.channels,
-    };
-    let mut layout = Layout {
-        format,
-        pixel: image.pixel,
-        frame_size: [columns, rows],
-        frames: order.len(),
-        pixels: Pixels::gathered(&path, Encoding::Dicom(frames.coding), length, frames),
-        line_order: LineOrder::InOrder,
-        geometry,
-        backward: false,
-        volumes: 1,
-        states_geometry: has_spacing,
-        poses: Poses::default(),
-        times,
-        synthetic: false,
-        remarks,
-        unused: Unused::default(),
-    };
+    let (pixel, encoding) = (image.pixel, Encoding::Dicom(image.coding));
+    let pixels = Pixels::gathered(&path, encoding, length, Frames { files, image, part });
+    let stated = Layout::new(format, pixel, [columns, rows], order.len(), pixels, geometry);
+    let mut layout = Layout { states_geometry: has_spacing, times, remarks, ..stated };
     if let Some(direct) = direct {
         layout.pixels = direct;
         if !layout.pixels.is_compressed() {

@@ -3,7 +3,7 @@
 //! Nothing is invented, as in [`write`](super::write): what the segments are is stated as tissue, and nothing refers to other images.
 
 use super::tags;
-use super::write::{DicomWriter, Header, Identifier, MOST_BYTES, NAME, PIXEL_DATA, decimal, decimals};
+use super::write::{DicomWriter, Header, Identifier, MOST_BYTES, NAME, decimal, decimals};
 use crate::files::{InputError, Unfinished};
 use crate::probe::World;
 use crate::text::single_line;
@@ -106,16 +106,7 @@ fn header(
         item.tag(0x0020_9165, pointer);
         item.tag(0x0020_9167, group);
     });
-    header.word(tags::SAMPLES, 1);
-    header.text(tags::PHOTOMETRIC, b"CS", "MONOCHROME2");
-    header.text(tags::FRAMES, b"IS", &frames.len().to_string());
-    // The sizes were checked against the format.
-    header.word(tags::ROWS, height as u16);
-    header.word(tags::COLUMNS, width as u16);
-    header.word(tags::BITS_ALLOCATED, 1);
-    header.word(tags::BITS_STORED, 1);
-    header.word(tags::HIGH_BIT, 0);
-    header.word(tags::IS_SIGNED, 0);
+    header.pixels([width, height, frames.len()], 1, None, None);
     header.text(0x0028_2110, b"CS", "00");
     header.text(0x0062_0001, b"CS", "BINARY");
     header.sequence(0x0062_0002, segments.len(), |item, n| {
@@ -159,7 +150,7 @@ fn header(
         });
         item.one(SEGMENT_IDENTIFICATION, |item| item.word(SEGMENT_NUMBER, n as u16 + 1));
     });
-    header.head(PIXEL_DATA, b"OB", bytes + bytes % 2);
+    header.head(tags::PIXEL_DATA, b"OB", bytes + bytes % 2);
     header
 }
 

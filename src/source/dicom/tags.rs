@@ -14,72 +14,7 @@ pub(super) enum Kind {
     Sequence,
 }
 
-pub(super) const SOP_CLASS: Tag = 0x0008_0016;
-pub(super) const MODALITY: Tag = 0x0008_0060;
-pub(super) const MANUFACTURER: Tag = 0x0008_0070;
-pub(super) const MODEL: Tag = 0x0008_1090;
-pub(super) const SLICE_THICKNESS: Tag = 0x0018_0050;
-pub(super) const SPACING_BETWEEN_SLICES: Tag = 0x0018_0088;
-pub(super) const FRAME_TIME: Tag = 0x0018_1063;
-pub(super) const FRAME_TIME_VECTOR: Tag = 0x0018_1065;
-pub(super) const SLICE_LOCATIONS: Tag = 0x0018_2005;
-pub(super) const REGIONS: Tag = 0x0018_6011;
-pub(super) const REGION_FORMAT: Tag = 0x0018_6012;
-pub(super) const REGION_TYPE: Tag = 0x0018_6014;
-pub(super) const REGION_BOX: [Tag; 4] = [0x0018_6018, 0x0018_601a, 0x0018_601c, 0x0018_601e];
-pub(super) const REFERENCE_PIXEL: [Tag; 2] = [0x0018_6020, 0x0018_6022];
-pub(super) const UNITS: [Tag; 2] = [0x0018_6024, 0x0018_6026];
-pub(super) const REFERENCE_VALUE: [Tag; 2] = [0x0018_6028, 0x0018_602a];
-pub(super) const DELTA: [Tag; 2] = [0x0018_602c, 0x0018_602e];
-pub(super) const DATA_TYPES: Tag = 0x0018_9807;
-pub(super) const DATA_TYPE: Tag = 0x0018_9808;
-pub(super) const SERIES: Tag = 0x0020_000e;
-pub(super) const INSTANCE_NUMBER: Tag = 0x0020_0013;
-pub(super) const POSITION_PATIENT: Tag = 0x0020_0032;
-pub(super) const ORIENTATION_PATIENT: Tag = 0x0020_0037;
-pub(super) const FRAME_CONTENT: Tag = 0x0020_9111;
-pub(super) const PLANE_POSITION: Tag = 0x0020_9113;
-pub(super) const PLANE_ORIENTATION: Tag = 0x0020_9116;
-pub(super) const TEMPORAL_INDEX: Tag = 0x0020_9128;
-pub(super) const POSITION_VOLUME: Tag = 0x0020_9301;
-pub(super) const ORIENTATION_VOLUME: Tag = 0x0020_9302;
-pub(super) const APEX: Tag = 0x0020_9308;
-pub(super) const TO_TRANSDUCER: Tag = 0x0020_9309;
-pub(super) const TIME_OFFSET: Tag = 0x0020_930d;
-pub(super) const PLANE_POSITION_VOLUME: Tag = 0x0020_930e;
-pub(super) const PLANE_ORIENTATION_VOLUME: Tag = 0x0020_930f;
-pub(super) const TEMPORAL_POSITION: Tag = 0x0020_9310;
-pub(super) const SAMPLES: Tag = 0x0028_0002;
-pub(super) const PHOTOMETRIC: Tag = 0x0028_0004;
-pub(super) const PLANAR: Tag = 0x0028_0006;
-pub(super) const FRAMES: Tag = 0x0028_0008;
-pub(super) const FRAME_POINTER: Tag = 0x0028_0009;
-pub(super) const ROWS: Tag = 0x0028_0010;
-pub(super) const COLUMNS: Tag = 0x0028_0011;
-pub(super) const PIXEL_SPACING: Tag = 0x0028_0030;
-pub(super) const BITS_ALLOCATED: Tag = 0x0028_0100;
-pub(super) const BITS_STORED: Tag = 0x0028_0101;
-pub(super) const HIGH_BIT: Tag = 0x0028_0102;
-pub(super) const IS_SIGNED: Tag = 0x0028_0103;
-pub(super) const INTERCEPT: Tag = 0x0028_1052;
-pub(super) const SLOPE: Tag = 0x0028_1053;
-pub(super) const PALETTE_ABOUT: [Tag; 3] = [0x0028_1101, 0x0028_1102, 0x0028_1103];
-pub(super) const PALETTE: [Tag; 3] = [0x0028_1201, 0x0028_1202, 0x0028_1203];
-pub(super) const SEGMENTED_PALETTE: [Tag; 3] = [0x0028_1221, 0x0028_1222, 0x0028_1223];
-pub(super) const PIXEL_MEASURES: Tag = 0x0028_9110;
-/// Private element that names the creator of Philips' Cartesian volumes, as public readers know it. The three constants after it are the number of
-/// slices, and unit and spacing of the third axis.
-pub(super) const PHILIPS: Tag = 0x3001_0010;
-pub(super) const PHILIPS_SLICES: Tag = 0x3001_1001;
-pub(super) const PHILIPS_UNIT: Tag = 0x3001_1002;
-pub(super) const PHILIPS_DELTA: Tag = 0x3001_1003;
-pub(super) const SHARED_GROUPS: Tag = 0x5200_9229;
-pub(super) const FRAME_GROUPS: Tag = 0x5200_9230;
-pub(super) const EXTENDED_TABLE: Tag = 0x7fe0_0001;
 pub(super) const PIXEL_DATA: Tag = 0x7fe0_0010;
-pub(super) const META_LENGTH: Tag = 0x0002_0000;
-pub(super) const META_CLASS: Tag = 0x0002_0002;
-pub(super) const META_SYNTAX: Tag = 0x0002_0010;
 pub(super) const ITEM: Tag = 0xfffe_e000;
 pub(super) const ITEM_END: Tag = 0xfffe_e00d;
 pub(super) const SEQUENCE_END: Tag = 0xfffe_e0dd;
@@ -99,89 +34,104 @@ pub(super) struct Wanted {
     pub key: Key,
 }
 
-const fn used(tag: Tag, kind: Kind, keyword: &'static str, aspect: Aspect) -> Wanted {
-    Wanted { tag, kind, key: Key::new(keyword, aspect, Use::Used) }
+/// Makes a constant of each tag, and [`WANTED`].
+macro_rules! wanted {
+    ($($name:ident = $tag:literal, $kind:expr, $keyword:literal, $aspect:ident;)*) => {
+        $(pub(super) const $name: Tag = $tag;)*
+        /// The elements that are kept when a file is read.
+        pub(super) const WANTED: &[Wanted] =
+            &[$(Wanted { tag: $name, kind: $kind, key: Key::new($keyword, Aspect::$aspect, Use::Used) }),*];
+    };
 }
 
-/// The elements that are kept when a file is read.
-pub(super) const WANTED: &[Wanted] = &[
-    used(META_LENGTH, LONGS, "FileMetaInformationGroupLength", Aspect::Storage),
-    used(META_CLASS, Kind::Text, "MediaStorageSOPClassUID", Aspect::Storage),
-    used(META_SYNTAX, Kind::Text, "TransferSyntaxUID", Aspect::Storage),
-    used(SOP_CLASS, Kind::Text, "SOPClassUID", Aspect::Storage),
-    used(MODALITY, Kind::Text, "Modality", Aspect::About),
-    used(MANUFACTURER, Kind::Text, "Manufacturer", Aspect::About),
-    used(MODEL, Kind::Text, "ManufacturerModelName", Aspect::About),
-    used(SLICE_THICKNESS, Kind::Text, "SliceThickness", Aspect::Geometry),
-    used(SPACING_BETWEEN_SLICES, Kind::Text, "SpacingBetweenSlices", Aspect::Geometry),
-    used(FRAME_TIME, Kind::Text, "FrameTime", Aspect::Time),
-    used(FRAME_TIME_VECTOR, Kind::Text, "FrameTimeVector", Aspect::Time),
-    used(SLICE_LOCATIONS, Kind::Text, "SliceLocationVector", Aspect::Geometry),
-    used(REGIONS, Kind::Sequence, "SequenceOfUltrasoundRegions", Aspect::Geometry),
-    used(REGION_FORMAT, WORDS, "RegionSpatialFormat", Aspect::Geometry),
-    used(REGION_TYPE, WORDS, "RegionDataType", Aspect::Geometry),
-    used(REGION_BOX[0], LONGS, "RegionLocationMinX0", Aspect::Geometry),
-    used(REGION_BOX[1], LONGS, "RegionLocationMinY0", Aspect::Geometry),
-    used(REGION_BOX[2], LONGS, "RegionLocationMaxX1", Aspect::Geometry),
-    used(REGION_BOX[3], LONGS, "RegionLocationMaxY1", Aspect::Geometry),
-    used(REFERENCE_PIXEL[0], LONGS, "ReferencePixelX0", Aspect::Geometry),
-    used(REFERENCE_PIXEL[1], LONGS, "ReferencePixelY0", Aspect::Geometry),
-    used(UNITS[0], WORDS, "PhysicalUnitsXDirection", Aspect::Geometry),
-    used(UNITS[1], WORDS, "PhysicalUnitsYDirection", Aspect::Geometry),
-    used(REFERENCE_VALUE[0], REALS, "ReferencePixelPhysicalValueX", Aspect::Geometry),
-    used(REFERENCE_VALUE[1], REALS, "ReferencePixelPhysicalValueY", Aspect::Geometry),
-    used(DELTA[0], REALS, "PhysicalDeltaX", Aspect::Geometry),
-    used(DELTA[1], REALS, "PhysicalDeltaY", Aspect::Geometry),
-    used(DATA_TYPES, Kind::Sequence, "ImageDataTypeSequence", Aspect::Value),
-    used(DATA_TYPE, Kind::Text, "DataType", Aspect::Value),
-    used(SERIES, Kind::Text, "SeriesInstanceUID", Aspect::Storage),
-    used(INSTANCE_NUMBER, Kind::Text, "InstanceNumber", Aspect::Geometry),
-    used(POSITION_PATIENT, Kind::Text, "ImagePositionPatient", Aspect::Geometry),
-    used(ORIENTATION_PATIENT, Kind::Text, "ImageOrientationPatient", Aspect::Orientation),
-    used(FRAME_CONTENT, Kind::Sequence, "FrameContentSequence", Aspect::Time),
-    used(PLANE_POSITION, Kind::Sequence, "PlanePositionSequence", Aspect::Geometry),
-    used(PLANE_ORIENTATION, Kind::Sequence, "PlaneOrientationSequence", Aspect::Orientation),
-    used(TEMPORAL_INDEX, LONGS, "TemporalPositionIndex", Aspect::Time),
-    used(POSITION_VOLUME, REALS, "ImagePositionVolume", Aspect::Geometry),
-    used(ORIENTATION_VOLUME, REALS, "ImageOrientationVolume", Aspect::Orientation),
-    used(APEX, REALS, "ApexPosition", Aspect::Geometry),
-    used(TO_TRANSDUCER, REALS, "VolumeToTransducerMappingMatrix", Aspect::Orientation),
-    used(TIME_OFFSET, REALS, "TemporalPositionTimeOffset", Aspect::Time),
-    used(PLANE_POSITION_VOLUME, Kind::Sequence, "PlanePositionVolumeSequence", Aspect::Geometry),
-    used(PLANE_ORIENTATION_VOLUME, Kind::Sequence, "PlaneOrientationVolumeSequence", Aspect::Orientation),
-    used(TEMPORAL_POSITION, Kind::Sequence, "TemporalPositionSequence", Aspect::Time),
-    used(SAMPLES, WORDS, "SamplesPerPixel", Aspect::Storage),
-    used(PHOTOMETRIC, Kind::Text, "PhotometricInterpretation", Aspect::Value),
-    used(PLANAR, WORDS, "PlanarConfiguration", Aspect::Storage),
-    used(FRAMES, Kind::Text, "NumberOfFrames", Aspect::Geometry),
-    used(FRAME_POINTER, WORDS, "FrameIncrementPointer", Aspect::Time),
-    used(ROWS, WORDS, "Rows", Aspect::Geometry),
-    used(COLUMNS, WORDS, "Columns", Aspect::Geometry),
-    used(PIXEL_SPACING, Kind::Text, "PixelSpacing", Aspect::Geometry),
-    used(BITS_ALLOCATED, WORDS, "BitsAllocated", Aspect::Storage),
-    used(BITS_STORED, WORDS, "BitsStored", Aspect::Storage),
-    used(HIGH_BIT, WORDS, "HighBit", Aspect::Storage),
-    used(IS_SIGNED, WORDS, "PixelRepresentation", Aspect::Value),
-    used(INTERCEPT, Kind::Text, "RescaleIntercept", Aspect::Value),
-    used(SLOPE, Kind::Text, "RescaleSlope", Aspect::Value),
-    used(PALETTE_ABOUT[0], WORDS, "RedPaletteColorLookupTableDescriptor", Aspect::Value),
-    used(PALETTE_ABOUT[1], WORDS, "GreenPaletteColorLookupTableDescriptor", Aspect::Value),
-    used(PALETTE_ABOUT[2], WORDS, "BluePaletteColorLookupTableDescriptor", Aspect::Value),
-    used(PALETTE[0], WORDS, "RedPaletteColorLookupTableData", Aspect::Value),
-    used(PALETTE[1], WORDS, "GreenPaletteColorLookupTableData", Aspect::Value),
-    used(PALETTE[2], WORDS, "BluePaletteColorLookupTableData", Aspect::Value),
-    used(SEGMENTED_PALETTE[0], WORDS, "SegmentedRedPaletteColorLookupTableData", Aspect::Value),
-    used(SEGMENTED_PALETTE[1], WORDS, "SegmentedGreenPaletteColorLookupTableData", Aspect::Value),
-    used(SEGMENTED_PALETTE[2], WORDS, "SegmentedBluePaletteColorLookupTableData", Aspect::Value),
-    used(PIXEL_MEASURES, Kind::Sequence, "PixelMeasuresSequence", Aspect::Geometry),
-    used(PHILIPS, Kind::Text, "private creator of Philips", Aspect::Storage),
-    used(PHILIPS_SLICES, LONGS, "slices of Philips", Aspect::Geometry),
-    used(PHILIPS_UNIT, WORDS, "unit of Philips", Aspect::Geometry),
-    used(PHILIPS_DELTA, REALS, "spacing of Philips", Aspect::Geometry),
-    used(SHARED_GROUPS, Kind::Sequence, "SharedFunctionalGroupsSequence", Aspect::Geometry),
-    used(FRAME_GROUPS, Kind::Sequence, "PerFrameFunctionalGroupsSequence", Aspect::Geometry),
-    used(EXTENDED_TABLE, REALS, "ExtendedOffsetTable", Aspect::Storage),
-];
+wanted! {
+    META_LENGTH = 0x0002_0000, LONGS, "FileMetaInformationGroupLength", Storage;
+    META_CLASS = 0x0002_0002, Kind::Text, "MediaStorageSOPClassUID", Storage;
+    META_SYNTAX = 0x0002_0010, Kind::Text, "TransferSyntaxUID", Storage;
+    SOP_CLASS = 0x0008_0016, Kind::Text, "SOPClassUID", Storage;
+    MODALITY = 0x0008_0060, Kind::Text, "Modality", About;
+    MANUFACTURER = 0x0008_0070, Kind::Text, "Manufacturer", About;
+    MODEL = 0x0008_1090, Kind::Text, "ManufacturerModelName", About;
+    SLICE_THICKNESS = 0x0018_0050, Kind::Text, "SliceThickness", Geometry;
+    SPACING_BETWEEN_SLICES = 0x0018_0088, Kind::Text, "SpacingBetweenSlices", Geometry;
+    FRAME_TIME = 0x0018_1063, Kind::Text, "FrameTime", Time;
+    FRAME_TIME_VECTOR = 0x0018_1065, Kind::Text, "FrameTimeVector", Time;
+    SLICE_LOCATIONS = 0x0018_2005, Kind::Text, "SliceLocationVector", Geometry;
+    REGIONS = 0x0018_6011, Kind::Sequence, "SequenceOfUltrasoundRegions", Geometry;
+    REGION_FORMAT = 0x0018_6012, WORDS, "RegionSpatialFormat", Geometry;
+    REGION_TYPE = 0x0018_6014, WORDS, "RegionDataType", Geometry;
+    REGION_MIN_X = 0x0018_6018, LONGS, "RegionLocationMinX0", Geometry;
+    REGION_MIN_Y = 0x0018_601a, LONGS, "RegionLocationMinY0", Geometry;
+    REGION_MAX_X = 0x0018_601c, LONGS, "RegionLocationMaxX1", Geometry;
+    REGION_MAX_Y = 0x0018_601e, LONGS, "RegionLocationMaxY1", Geometry;
+    REFERENCE_PIXEL_X = 0x0018_6020, LONGS, "ReferencePixelX0", Geometry;
+    REFERENCE_PIXEL_Y = 0x0018_6022, LONGS, "ReferencePixelY0", Geometry;
+    UNIT_X = 0x0018_6024, WORDS, "PhysicalUnitsXDirection", Geometry;
+    UNIT_Y = 0x0018_6026, WORDS, "PhysicalUnitsYDirection", Geometry;
+    REFERENCE_VALUE_X = 0x0018_6028, REALS, "ReferencePixelPhysicalValueX", Geometry;
+    REFERENCE_VALUE_Y = 0x0018_602a, REALS, "ReferencePixelPhysicalValueY", Geometry;
+    DELTA_X = 0x0018_602c, REALS, "PhysicalDeltaX", Geometry;
+    DELTA_Y = 0x0018_602e, REALS, "PhysicalDeltaY", Geometry;
+    DATA_TYPES = 0x0018_9807, Kind::Sequence, "ImageDataTypeSequence", Value;
+    DATA_TYPE = 0x0018_9808, Kind::Text, "DataType", Value;
+    SERIES = 0x0020_000e, Kind::Text, "SeriesInstanceUID", Storage;
+    INSTANCE_NUMBER = 0x0020_0013, Kind::Text, "InstanceNumber", Geometry;
+    POSITION_PATIENT = 0x0020_0032, Kind::Text, "ImagePositionPatient", Geometry;
+    ORIENTATION_PATIENT = 0x0020_0037, Kind::Text, "ImageOrientationPatient", Orientation;
+    FRAME_CONTENT = 0x0020_9111, Kind::Sequence, "FrameContentSequence", Time;
+    PLANE_POSITION = 0x0020_9113, Kind::Sequence, "PlanePositionSequence", Geometry;
+    PLANE_ORIENTATION = 0x0020_9116, Kind::Sequence, "PlaneOrientationSequence", Orientation;
+    TEMPORAL_INDEX = 0x0020_9128, LONGS, "TemporalPositionIndex", Time;
+    POSITION_VOLUME = 0x0020_9301, REALS, "ImagePositionVolume", Geometry;
+    ORIENTATION_VOLUME = 0x0020_9302, REALS, "ImageOrientationVolume", Orientation;
+    APEX = 0x0020_9308, REALS, "ApexPosition", Geometry;
+    TO_TRANSDUCER = 0x0020_9309, REALS, "VolumeToTransducerMappingMatrix", Orientation;
+    TIME_OFFSET = 0x0020_930d, REALS, "TemporalPositionTimeOffset", Time;
+    PLANE_POSITION_VOLUME = 0x0020_930e, Kind::Sequence, "PlanePositionVolumeSequence", Geometry;
+    PLANE_ORIENTATION_VOLUME = 0x0020_930f, Kind::Sequence, "PlaneOrientationVolumeSequence", Orientation;
+    TEMPORAL_POSITION = 0x0020_9310, Kind::Sequence, "TemporalPositionSequence", Time;
+    SAMPLES = 0x0028_0002, WORDS, "SamplesPerPixel", Storage;
+    PHOTOMETRIC = 0x0028_0004, Kind::Text, "PhotometricInterpretation", Value;
+    PLANAR = 0x0028_0006, WORDS, "PlanarConfiguration", Storage;
+    FRAMES = 0x0028_0008, Kind::Text, "NumberOfFrames", Geometry;
+    FRAME_POINTER = 0x0028_0009, WORDS, "FrameIncrementPointer", Time;
+    ROWS = 0x0028_0010, WORDS, "Rows", Geometry;
+    COLUMNS = 0x0028_0011, WORDS, "Columns", Geometry;
+    PIXEL_SPACING = 0x0028_0030, Kind::Text, "PixelSpacing", Geometry;
+    BITS_ALLOCATED = 0x0028_0100, WORDS, "BitsAllocated", Storage;
+    BITS_STORED = 0x0028_0101, WORDS, "BitsStored", Storage;
+    HIGH_BIT = 0x0028_0102, WORDS, "HighBit", Storage;
+    IS_SIGNED = 0x0028_0103, WORDS, "PixelRepresentation", Value;
+    INTERCEPT = 0x0028_1052, Kind::Text, "RescaleIntercept", Value;
+    SLOPE = 0x0028_1053, Kind::Text, "RescaleSlope", Value;
+    RED_ABOUT = 0x0028_1101, WORDS, "RedPaletteColorLookupTableDescriptor", Value;
+    GREEN_ABOUT = 0x0028_1102, WORDS, "GreenPaletteColorLookupTableDescriptor", Value;
+    BLUE_ABOUT = 0x0028_1103, WORDS, "BluePaletteColorLookupTableDescriptor", Value;
+    RED_PALETTE = 0x0028_1201, WORDS, "RedPaletteColorLookupTableData", Value;
+    GREEN_PALETTE = 0x0028_1202, WORDS, "GreenPaletteColorLookupTableData", Value;
+    BLUE_PALETTE = 0x0028_1203, WORDS, "BluePaletteColorLookupTableData", Value;
+    SEGMENTED_RED = 0x0028_1221, WORDS, "SegmentedRedPaletteColorLookupTableData", Value;
+    SEGMENTED_GREEN = 0x0028_1222, WORDS, "SegmentedGreenPaletteColorLookupTableData", Value;
+    SEGMENTED_BLUE = 0x0028_1223, WORDS, "SegmentedBluePaletteColorLookupTableData", Value;
+    PIXEL_MEASURES = 0x0028_9110, Kind::Sequence, "PixelMeasuresSequence", Geometry;
+    // Private element that names the creator of Philips' Cartesian volumes, as public readers know it. The three after it are the number of
+    // slices, and unit and spacing of the third axis.
+    PHILIPS = 0x3001_0010, Kind::Text, "private creator of Philips", Storage;
+    PHILIPS_SLICES = 0x3001_1001, LONGS, "slices of Philips", Geometry;
+    PHILIPS_UNIT = 0x3001_1002, WORDS, "unit of Philips", Geometry;
+    PHILIPS_DELTA = 0x3001_1003, REALS, "spacing of Philips", Geometry;
+    SHARED_GROUPS = 0x5200_9229, Kind::Sequence, "SharedFunctionalGroupsSequence", Geometry;
+    FRAME_GROUPS = 0x5200_9230, Kind::Sequence, "PerFrameFunctionalGroupsSequence", Geometry;
+    EXTENDED_TABLE = 0x7fe0_0001, REALS, "ExtendedOffsetTable", Storage;
+}
+pub(super) const REGION_BOX: [Tag; 4] = [REGION_MIN_X, REGION_MIN_Y, REGION_MAX_X, REGION_MAX_Y];
+pub(super) const REFERENCE_PIXEL: [Tag; 2] = [REFERENCE_PIXEL_X, REFERENCE_PIXEL_Y];
+pub(super) const UNITS: [Tag; 2] = [UNIT_X, UNIT_Y];
+pub(super) const REFERENCE_VALUE: [Tag; 2] = [REFERENCE_VALUE_X, REFERENCE_VALUE_Y];
+pub(super) const DELTA: [Tag; 2] = [DELTA_X, DELTA_Y];
+pub(super) const PALETTE_ABOUT: [Tag; 3] = [RED_ABOUT, GREEN_ABOUT, BLUE_ABOUT];
+pub(super) const PALETTE: [Tag; 3] = [RED_PALETTE, GREEN_PALETTE, BLUE_PALETTE];
+pub(super) const SEGMENTED_PALETTE: [Tag; 3] = [SEGMENTED_RED, SEGMENTED_GREEN, SEGMENTED_BLUE];
 
 /// Elements that could change a picture and are not read. Elements in neither table are skipped too, and listed by their tags.
 pub(super) static NOT_READ: [(Tag, Key); 16] = [

@@ -30,16 +30,9 @@ impl<'a> Groups<'a> {
         [self.own, self.shared].into_iter().flatten().find_map(|item| item.items(sequence).first())
     }
 
-    fn vector(&self, sequence: Tag, tag: Tag, is_text: bool) -> Option<[f64; 3]> {
+    fn numbers(&self, sequence: Tag, tag: Tag, is_text: bool) -> Option<Vec<f64>> {
         let item = self.find(sequence)?;
-        let all = if is_text { item.decimals(tag) } else { item.reals(tag) };
-        all.first_chunk().copied()
-    }
-
-    fn directions(&self, sequence: Tag, tag: Tag, is_text: bool) -> Option<[DVec3; 2]> {
-        let item = self.find(sequence)?;
-        let all = if is_text { item.decimals(tag) } else { item.reals(tag) };
-        directions(&all)
+        Some(if is_text { item.decimals(tag) } else { item.reals(tag) })
     }
 }
 
@@ -88,8 +81,8 @@ pub(super) fn enhanced(path: &Path, elements: &Elements, image: &Image) -> Resul
     let axes = [plane.row * *columns, plane.column * *rows, step];
     let world = World::new(axes, plane.position).map_err(|why| fault("planes", why))?;
     let size = [image.size[0], image.size[1], found.slices];
-    let in_volume =
-        groups.first().and_then(|g| g.directions(tags::PLANE_ORIENTATION_VOLUME, tags::ORIENTATION_VOLUME, false));
+    let stated = |g: &Groups| g.numbers(tags::PLANE_ORIENTATION_VOLUME, tags::ORIENTATION_VOLUME, false);
+    let in_volume = groups.first().and_then(stated).and_then(|numbers| directions(&numbers));
     let order = transducer_order(&root.reals(tags::TO_TRANSDUCER), in_volume);
     let world = world.reordered(&order, size);
     let space = if is_patient { "the patient's (LPS)" } else { "the volume's own frame of reference" };
@@ -137,8 +130,8 @@ fn planes(groups: &[Groups], chosen: &[usize], patient: bool) -> Option<Vec<Plan
     };
     let plane = |n: &usize| {
         let group = groups.get(*n)?;
-        let at = group.vector(position.0, position.1, patient)?;
-        let [row, column] = group.directions(orientation.0, orientation.1, patient)?;
+        let at = *group.numbers(position.0, position.1, patient)?.first_chunk::<3>()?;
+        let [row, column] = directions(&group.numbers(orientation.0, orientation.1, patient)?)?;
         let index = group.find(tags::FRAME_CONTENT).and_then(|item| item.long(tags::TEMPORAL_INDEX));
         let time = group.find(tags::TEMPORAL_POSITION).and_then(|item| item.real(tags::TIME_OFFSET));
         Some(Plane { position: DVec3::from(at), row, column, index, time })

@@ -22,18 +22,8 @@ pub(super) const NAME: &str = "Echolume";
 /// Offset of the length of the file meta information, and of the first byte that it counts.
 const META_LENGTH_AT: usize = 140;
 const META_BEGIN: usize = 144;
-pub(super) const PIXEL_DATA: Tag = 0x7fe0_0010;
 /// Largest number of bytes of pixels in a file: the largest even length of 32 bits, of which the value of all ones means "not stated".
 pub(in super::super) const MOST_BYTES: u64 = 0xffff_fffe;
-
-/// The kind of DICOM file that is written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in super::super) struct Form {
-    /// True for a secondary capture, false for an Enhanced US Volume.
-    pub capture: bool,
-    /// Bytes of a sample: 1 or 2.
-    pub width: usize,
-}
 
 /// A DICOM file that is being written: a header first, then the samples.
 pub(in super::super) struct DicomWriter {
@@ -68,12 +58,19 @@ impl Identifier {
 }
 
 impl DicomWriter {
-    /// Writes all elements before the samples. `size`: columns, rows, slices.
+    /// Writes all elements before the samples. `size`: columns, rows, slices. `capture`: true for a secondary capture, false for an Enhanced US
+    /// Volume. `width`: bytes of a sample, 1 or 2; 1 in a capture.
     ///
     /// # Errors
     /// The file cannot be written.
-    pub fn create(file: Unfinished, size: [usize; 3], world: &World, form: Form) -> io::Result<DicomWriter> {
-        DicomWriter::begin(file, Header::new(size, world, form))
+    pub fn create(
+        file: Unfinished,
+        size: [usize; 3],
+        world: &World,
+        capture: bool,
+        width: usize,
+    ) -> io::Result<DicomWriter> {
+        DicomWriter::begin(file, Header::new(size, world, capture, width))
     }
 
     /// Begins a file with these elements, of which the last is the head of the samples.
@@ -96,8 +93,7 @@ impl DicomWriter {
         for (at, identifier) in self.identifiers {
             self.file.patch(at as u64, identifier.value(&digest).as_bytes())?;
         }
-        self.file.finish()?;
-        self.file.rename()
+        self.file.complete()
     }
 }
 
@@ -138,19 +134,19 @@ pub(super) fn decimals<const N: usize>(values: [f64; N]) -> String {
 }
 
 impl Header {
-    fn new(size: [usize; 3], world: &World, form: Form) -> Header {
+    fn new(size: [usize; 3], world: &World, capture: bool, width: usize) -> Header {
         let mut header = Header::default();
-        let class = if form.capture { CAPTURE } else { ENHANCED_VOLUME };
+        let class = if capture { CAPTURE } else { ENHANCED_VOLUME };
         header.meta(class);
-        match form.capture {
+        match capture {
             true => header.capture(class, size, world),
-            false => header.enhanced(class, size, world, form.width),
+            false => header.enhanced(class, size, world, width),
         }
-        let length = (size[0] * size[1] * size[2] * form.width) as u64;
+        let length = (size[0] * size[1] * size[2] * width) as u64;
         // The length was checked against MOST_BYTES.
         let length = (length + length % 2) as u32;
-        let vr = if form.width == 1 { b"OB" } else { b"OW" };
-        header.head(PIXEL_DATA, vr, length);
+        let vr = if width == 1 { b"OB" } else { b"OW" };
+        header.head(tags::PIXEL_DATA, vr, length);
         header
     }
 
@@ -282,10 +278,9 @@ impl Header {
     }
 
     /// Group 0028 up to the pixels' bits.
-    /// `increment`: the element that tells frames apart, of a capture; `spacing`: of rows and of columns, mm.
-    fn pixels(&mut self, size: [usize; 3], width: usize, increment: Option<Tag>, spacing: Option<[f64; 2]>) {
+    /// `bits`: of a sample; `increment`: the element that tells frames apart, of a capture; `spacing`: of rows and of columns, mm.
+    pub(super) fn pixels(&mut self, size: [usize; 3], bits: u16, increment: Option<Tag>, spacing: Option<[f64; 2]>) {
         let [columns, rows, slices] = size;
-        let bits = 8 * width as u16;
         self.word(tags::SAMPLES, 1);
         self.text(tags::PHOTOMETRIC, b"CS", "MONOCHROME2");
         self.text(tags::FRAMES, b"IS", &slices.to_string());
@@ -361,12 +356,12 @@ impl Header {
         self.text(0x0020_930c, b"CS", "ESTIMATED");
         self.text(0x0020_9311, b"CS", "3D");
         self.identifier(0x0020_9312, Identifier::VolumeSpace);
-        self.pixels(size, width, None, is_right_handed.then_some([spacing[1], spacing[0]]));
+        self.pixels(size, 8 * width as u16, None, is_right_handed.then_some([spacing[1], spacing[0]]));
         self.no_identity();
         self.text(tags::INTERCEPT, b"DS", "0");
         self.text(tags::SLOPE, b"DS", "1");
         self.text(0x0028_2110, b"CS", "00");
-        self.empty_sequence(0x0040_0555);
+        self.head(0x0040_0555, b"SQ", 0);
         self.unknown(0x0054_0220);
         self.text(0x2050_0020, b"CS", "IDENTITY");
         let most = ((8 * width) as f64).exp2() - 1.0;
@@ -412,10 +407,6 @@ impl Header {
         });
     }
 
-    fn empty_sequence(&mut self, tag: Tag) {
-        self.head(tag, b"SQ", 0);
-    }
-
     fn capture(&mut self, class: &str, size: [usize; 3], world: &World) {
         let spacing = [0, 1, 2].map(|n| world.axis(n).length());
         self.general(class, "DERIVED\\SECONDARY", "US");
@@ -434,7 +425,7 @@ impl Header {
         }
         self.study();
         self.empty(0x0020_0060, b"CS");
-        self.pixels(size, 1, is_stated.then_some(tags::SLICE_LOCATIONS), Some([spacing[1], spacing[0]]));
+        self.pixels(size, 8, is_stated.then_some(tags::SLICE_LOCATIONS), Some([spacing[1], spacing[0]]));
         self.no_identity();
         self.text(tags::INTERCEPT, b"DS", "0");
         self.text(tags::SLOPE, b"DS", "1");

@@ -68,20 +68,19 @@ impl Compounder {
         grid.check().map_err(|e| e.fault)?;
         let sticks = Sticks::new(&grid, self.options.max_hole)?;
         let old = self.lattice.grid;
-        let mut voxels = Voxels::new(grid.size, self.options.overlap);
+        let mut voxels = Voxels::new(grid.size);
         let mut touched = vec![false; grid.size[2]];
         let offset = (DVec3::from(old.origin) - DVec3::from(grid.origin)) / DVec3::from(grid.spacing);
         if grid.spacing == old.spacing {
             voxels.copy(&self.voxels, offset.to_array().map(|n| n.round() as usize), &mut touched);
         } else {
-            voxels.begin();
             let scale = DVec3::from(old.spacing) / DVec3::from(grid.spacing);
             let [width, height, depth] = old.size;
             for (z, y, x) in (0..depth).flat_map(|z| (0..height).flat_map(move |y| (0..width).map(move |x| (z, y, x))))
             {
                 let Some((value, weight)) = self.voxels.weighed((z * height + y) * width + x) else { continue };
                 let at = DVec3::new(x as f64, y as f64, z as f64) * scale + offset;
-                voxels.splat(at, value, weight, self.options.splat, &mut touched);
+                voxels.splat(at, value, weight, &mut touched);
             }
         }
         let [x, y, z] = grid.size;
@@ -102,14 +101,10 @@ impl Voxels {
     /// Takes all voxels of a smaller volume whose first one is voxel `first` of this one.
     fn copy(&mut self, old: &Voxels, first: [usize; 3], touched: &mut [bool]) {
         let ([width, height, _], [old_width, old_height, _]) = (self.size, old.size);
-        self.frame = old.frame;
         for (n, [left, right]) in old.rows.iter().enumerate().filter(|(_, [left, right])| left <= right) {
             let (y, z) = (n % old_height + first[1], n / old_height + first[2]);
             let (from, to) = (n * old_width, (z * height + y) * width + first[0]);
             self.sums[to..to + old_width].copy_from_slice(&old.sums[from..from + old_width]);
-            if !old.frames.is_empty() {
-                self.frames[to..to + old_width].copy_from_slice(&old.frames[from..from + old_width]);
-            }
             self.rows[z * height + y] = [left + first[0] as u32, right + first[0] as u32];
             touched[z] = true;
         }

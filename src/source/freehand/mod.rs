@@ -2,8 +2,8 @@
 //!
 //! Two steps, as in the pixel-based methods of Rohling, Gee and Berman, *A comparison of freehand three-dimensional ultrasound
 //! reconstruction techniques*, Med. Image Anal. 3 (1999), and Solberg et al., *Freehand 3D ultrasound reconstruction algorithms: a
-//! review*, Ultrasound Med. Biol. 33 (2007): every pixel is added to the voxels around its position as it arrives ([`Splat`], [`Overlap`]),
-//! and voxels without a pixel are filled from those around them. The second step bridges gaps along straight lines that end in
+//! review*, Ultrasound Med. Biol. 33 (2007): every pixel is added to the voxels around its position as it arrives, and
+//! voxels without a pixel are filled from those around them. The second step bridges gaps along straight lines that end in
 //! reached voxels on both sides (Vaughan et al., *Hole filling with oriented sticks in ultrasound volume reconstruction*, J. Med. Imaging
 //! 2 (2015)): holes up to a width are closed, wider ones stay 0, and nothing is added beyond the border of the swept region.
 
@@ -20,6 +20,7 @@ pub use sweep::{Refusal, Schedule, Sweep};
 
 use crate::probe::Grid;
 use crate::probe::StoredType;
+use crate::tree::Defaults;
 use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
 
@@ -37,65 +38,25 @@ const MAX_WEIGHT: f32 = 4096.0;
 const MAX_SAMPLE: f32 = 1e30;
 /// Smaller weights are rounding errors: a pixel at the centre of a voxel is not added to its neighbours.
 const MIN_WEIGHT: f64 = 1e-6;
-/// Least weight of a pixel that counts for the maximum of a voxel. One of the eight voxels around a pixel always has it.
-const MIN_MAXIMUM_WEIGHT: f32 = 0.125;
-
-/// To which voxels the value of a pixel is added.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Splat {
-    /// To the nearest voxel.
-    Nearest,
-    /// To the eight voxels around it, with the weights of trilinear interpolation.
-    #[default]
-    Trilinear,
-}
-
-/// How the value of a voxel is computed from several pixels.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Overlap {
-    /// The weighted mean of all pixels, independent of their order up to rounding. Once their weights in a voxel sum up to more than 4096, earlier
-    /// pixels count less.
-    #[default]
-    Mean,
-    /// The weighted mean of the pixels of the last frame that reached the voxel.
-    Latest,
-    /// The largest of the pixels with a weight of at least 1/8.
-    Maximum,
-}
-
 /// Options of a [`Compounder`].
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Defaults)]
 pub struct CompoundingOptions {
-    pub splat: Splat,
-    pub overlap: Overlap,
     /// Widest gap between pictures that is filled, mm; at most 64 times the smallest distance between voxels. 0 fills none.
+    #[value(2.0)]
     pub max_hole: f64,
     /// The part of each frame that is used: first column, first row, columns, rows. `None`: the whole frame.
     pub clip: Option<[usize; 4]>,
     /// Distance between voxels along each axis, mm. `None`: the distance between the frames' pixels.
     pub spacing: Option<f64>,
     /// Distance that the volume extends beyond the frames around which it is placed, on all sides, mm.
+    #[value(5.0)]
     pub margin: f64,
     /// Least length of the volume along the normal of the frames, mm, without `margin`. A shorter volume is extended in the direction in which the
     /// frames move, or alike to both sides if they do not move. `None`: no longer than the frames need.
     pub extent: Option<f64>,
     /// Largest number of voxels of the volume. More than 2^31 are refused in any case.
+    #[value(DEFAULT_MAX_VOXELS)]
     pub max_voxels: usize,
-}
-
-impl Default for CompoundingOptions {
-    fn default() -> CompoundingOptions {
-        CompoundingOptions {
-            splat: Splat::default(),
-            overlap: Overlap::default(),
-            max_hole: 2.0,
-            clip: None,
-            spacing: None,
-            margin: 5.0,
-            extent: None,
-            max_voxels: DEFAULT_MAX_VOXELS,
-        }
-    }
 }
 
 /// Numbers of frames and pixels that a [`Compounder`] has processed.
@@ -113,7 +74,7 @@ pub struct CompoundingCounts {
 
 /// Compounds tracked 2D frames into a volume.
 ///
-/// Memory: 8 bytes a voxel, 4 more with [`Overlap::Latest`], and the stored samples of each slice near a frame.
+/// Memory: 8 bytes a voxel, and the stored samples of each slice near a frame.
 pub struct Compounder {
     lattice: Lattice,
     stored: StoredType,
@@ -149,7 +110,7 @@ impl Compounder {
         }
         let sticks = Sticks::new(grid, options.max_hole)?;
         let [x, y, z] = grid.size;
-        let voxels = Voxels::new(grid.size, options.overlap);
+        let voxels = Voxels::new(grid.size);
         let zero = vec![0; x * y * stored.bytes()];
         let (touched, slices) = (vec![false; z], vec![Vec::new(); z]);
         Ok(Compounder {
@@ -195,7 +156,6 @@ impl Compounder {
                 return Err(fault);
             }
         };
-        self.voxels.begin();
         let to_index = |place: DVec3| self.lattice.index_of(place);
         let origin = to_index(frame.pose.place(0.0, 0.0));
         let (right, down) =
@@ -210,7 +170,7 @@ impl Compounder {
                     self.counts.pixels += 1;
                     continue;
                 }
-                inside += u64::from(self.voxels.splat(at, value, 1.0, self.options.splat, &mut self.touched));
+                inside += u64::from(self.voxels.splat(at, value, 1.0, &mut self.touched));
             }
         }
         self.counts.frames += 1;
@@ -350,42 +310,25 @@ impl TrackedFrame<'_> {
 /// Weighted sums of the pixels of each voxel: lateral fastest, then depth, then elevation.
 struct Voxels {
     size: [usize; 3],
-    overlap: Overlap,
     /// Sum of weighted values, and of weights; the latter is 0 for a voxel without pixels.
     sums: Vec<[f32; 2]>,
-    /// The frame of each voxel's sums; only for [`Overlap::Latest`].
-    frames: Vec<u32>,
-    frame: u32,
     /// By row: lowest and highest lateral index with pixels; reversed if there are none.
     rows: Vec<[u32; 2]>,
 }
 
 impl Voxels {
-    fn new(size: [usize; 3], overlap: Overlap) -> Voxels {
+    fn new(size: [usize; 3]) -> Voxels {
         let [x, y, z] = size;
-        let frames = if overlap == Overlap::Latest { vec![0; x * y * z] } else { Vec::new() };
-        Voxels { size, overlap, sums: vec![[0.0; 2]; x * y * z], frames, frame: 0, rows: vec![[u32::MAX, 0]; y * z] }
+        Voxels { size, sums: vec![[0.0; 2]; x * y * z], rows: vec![[u32::MAX, 0]; y * z] }
     }
 
-    /// Begins another frame.
-    fn begin(&mut self) {
-        // 0 means no frame.
-        self.frame = self.frame.wrapping_add(1).max(1);
-    }
-
-    /// Adds pixels of a weight at a position in voxel indices. Sets `touched` for its slices. False if no voxel is there.
-    fn splat(&mut self, at: DVec3, value: f32, pixels: f32, splat: Splat, touched: &mut [bool]) -> bool {
+    /// Adds pixels of a weight to the eight voxels around a position in voxel indices, with the weights of trilinear interpolation. Sets
+    /// `touched` for their slices. False if no voxel is there.
+    fn splat(&mut self, at: DVec3, value: f32, pixels: f32, touched: &mut [bool]) -> bool {
         let size = DVec3::from_array(self.size.map(|n| n as f64));
         // No voxel is within reach, or NaN.
         if !(at.cmpgt(DVec3::NEG_ONE).all() && at.cmplt(size).all()) {
             return false;
-        }
-        if splat == Splat::Nearest {
-            let near = (at + 0.5).floor();
-            return near.cmpge(DVec3::ZERO).all() && near.cmplt(size).all() && {
-                self.add(near.to_array().map(|n| n as usize), value, pixels, touched);
-                true
-            };
         }
         let (low, mut inside) = (at.floor(), false);
         let share = (at - low).to_array();
@@ -407,17 +350,6 @@ impl Voxels {
         let row = z * self.size[1] + y;
         let n = row * self.size[0] + x;
         let sums = &mut self.sums[n];
-        match self.overlap {
-            Overlap::Mean => {}
-            Overlap::Latest if self.frames[n] != self.frame => {
-                self.frames[n] = self.frame;
-                *sums = [0.0; 2];
-            }
-            Overlap::Latest => {}
-            Overlap::Maximum if weight < MIN_MAXIMUM_WEIGHT || (sums[1] > 0.0 && sums[0] >= value) => return,
-            Overlap::Maximum => *sums = [0.0; 2],
-        }
-        let weight = if self.overlap == Overlap::Maximum { 1.0 } else { weight };
         *sums = [sums[0] + value * weight, sums[1] + weight];
         if sums[1] > MAX_WEIGHT {
             *sums = sums.map(|sum| sum / 2.0);

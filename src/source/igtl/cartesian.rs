@@ -139,15 +139,7 @@ impl CartesianVolume {
     }
 
     pub(super) fn header(&self) -> Header {
-        let geometry = Geometry::Cartesian(self.grid);
-        Header {
-            forward: geometry.clone(),
-            backward: geometry,
-            stored: self.stored,
-            range: self.range,
-            posed: true,
-            synthetic: false,
-        }
+        Header { posed: true, ..Header::of(Geometry::Cartesian(self.grid), self.stored, self.range) }
     }
 
     /// Samples of slice `k`; None beyond the last slice.

@@ -4,6 +4,8 @@ use super::begun::{Begun, longest};
 use super::codec::{BODY_LIMIT, DecodeError, Decoded, decode_with};
 use super::message::Message;
 use crate::files::escaped;
+use crate::sync::locked;
+use crate::tree::Defaults;
 use std::collections::VecDeque;
 use std::io::{self, BufRead, BufReader, ErrorKind};
 use std::net::{IpAddr, Shutdown, TcpStream, ToSocketAddrs};
@@ -30,46 +32,38 @@ const MAX_ERROR_CHARACTERS: usize = 600;
 
 /// Options of a [`Client`]. Every value is accepted: the time-out of an attempt to connect, and the wait before the next attempt, count as 10 ms if
 /// they are shorter.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Defaults)]
 pub struct ClientOptions {
     /// Longest time for connecting to one address.
+    #[value(Duration::from_secs(2))]
     pub connect_timeout: Duration,
     /// Longest time without a byte within a message, after which the connection is closed.
+    #[value(Duration::from_secs(5))]
     pub stall_timeout: Duration,
     /// Longest time from the first byte of a message to its last, to which a second is added for each megabyte of the message. After it the
     /// connection is closed, so that a peer that sends a byte now and then does not keep the connection open.
+    #[value(Duration::from_secs(10))]
     pub message_timeout: Duration,
     /// Longest time without a byte between two messages, after which the connection is closed: a peer that lost power does not close it.
+    #[value(Duration::from_secs(30))]
     pub silence_timeout: Duration,
     /// Wait before the first attempt to reconnect. It doubles with every attempt that brings no message.
+    #[value(Duration::from_millis(250))]
     pub first_wait: Duration,
     /// Longest wait before an attempt to reconnect, unless `first_wait` is longer.
+    #[value(Duration::from_secs(5))]
     pub longest_wait: Duration,
     /// Largest body of a message, bytes. After the header of a larger one the connection is closed.
+    #[value(BODY_LIMIT)]
     pub body_limit: usize,
     /// Largest number of messages in the queue; at least the newest is always kept.
+    #[value(256)]
     pub queue_messages: usize,
     /// Largest memory of the queued messages, bytes. The newest message is kept even if it alone is larger.
+    #[value(BODY_LIMIT)]
     pub queue_bytes: usize,
     /// True if messages whose checksum is 0 are accepted without verifying it: some senders compute none.
     pub takes_no_checksum: bool,
-}
-
-impl Default for ClientOptions {
-    fn default() -> ClientOptions {
-        ClientOptions {
-            connect_timeout: Duration::from_secs(2),
-            stall_timeout: Duration::from_secs(5),
-            message_timeout: Duration::from_secs(10),
-            silence_timeout: Duration::from_secs(30),
-            first_wait: Duration::from_millis(250),
-            longest_wait: Duration::from_secs(5),
-            body_limit: BODY_LIMIT,
-            queue_messages: 256,
-            queue_bytes: BODY_LIMIT,
-            takes_no_checksum: false,
-        }
-    }
 }
 
 /// Counts since the client was created, and whether it is connected.
@@ -152,7 +146,7 @@ impl Client {
     /// Takes the oldest message from the queue. If the queue is empty, waits for a message for at most `timeout`; None if none arrives.
     pub fn next(&self, timeout: Duration) -> Option<Received> {
         let started = Instant::now();
-        let mut state = self.shared.lock();
+        let mut state = locked(&self.shared.state);
         loop {
             if let Some(received) = state.queue.pop() {
                 return Some(received);
@@ -167,19 +161,19 @@ impl Client {
 
     /// Counts since the client was created.
     pub fn statistics(&self) -> ClientStatistics {
-        self.shared.lock().statistics.clone()
+        locked(&self.shared.state).statistics.clone()
     }
 
     /// The last error of the connection or of a message that was skipped, on one line; None if there was none since the client was created.
     pub fn last_error(&self) -> Option<String> {
-        self.shared.lock().last_error.clone()
+        locked(&self.shared.state).last_error.clone()
     }
 }
 
 impl Drop for Client {
     fn drop(&mut self) {
         let asked = Instant::now();
-        let mut state = self.shared.lock();
+        let mut state = locked(&self.shared.state);
         state.stop = true;
         if let Some(socket) = &state.socket {
             // Wakes the thread from reading. It may fail if the peer has closed the connection.
@@ -203,17 +197,12 @@ struct FinishOnExit(Arc<Shared>);
 
 impl Drop for FinishOnExit {
     fn drop(&mut self) {
-        self.0.lock().finished = true;
+        locked(&self.0.state).finished = true;
         self.0.changed.notify_all();
     }
 }
 
 impl Shared {
-    fn lock(&self) -> MutexGuard<'_, State> {
-        // Nothing panics while it holds the lock, and the state would still be consistent.
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     fn wait<'a>(&self, state: MutexGuard<'a, State>, most: Duration) -> MutexGuard<'a, State> {
         self.changed.wait_timeout(state, most).unwrap_or_else(PoisonError::into_inner).0
     }
@@ -221,7 +210,7 @@ impl Shared {
     fn run(&self, address: &str, options: &ClientOptions) {
         let first_wait = options.first_wait.max(MIN_WAIT);
         let mut wait = first_wait;
-        while !self.lock().stop {
+        while !locked(&self.state).stop {
             let ended = match self.open(address, options) {
                 Ok(stream) => self.receive(&stream, options),
                 Err(error) if error.kind() == ErrorKind::ConnectionRefused => {
@@ -233,7 +222,7 @@ impl Shared {
             if ended.useful {
                 wait = first_wait;
             }
-            let mut state = self.lock();
+            let mut state = locked(&self.state);
             state.socket = None;
             state.statistics.connected = false;
             if !state.stop {
@@ -252,13 +241,13 @@ impl Shared {
     fn open(&self, address: &str, options: &ClientOptions) -> io::Result<TcpStream> {
         let mut last = io::Error::new(ErrorKind::NotFound, "the name has no address");
         for address in address.to_socket_addrs()?.take(MAX_ADDRESSES) {
-            if self.lock().stop {
+            if locked(&self.state).stop {
                 break;
             }
             match TcpStream::connect_timeout(&address, options.connect_timeout.max(MIN_WAIT)) {
                 Ok(stream) => {
                     stream.set_read_timeout(Some(POLL))?;
-                    let mut state = self.lock();
+                    let mut state = locked(&self.state);
                     state.socket = Some(stream.try_clone()?);
                     state.statistics.connected = true;
                     state.statistics.reconnects = state.connections;
@@ -289,7 +278,7 @@ impl Shared {
                     continue;
                 }
                 Err(DecodeError::Framing { error }) => {
-                    self.lock().statistics.lost_framing += 1;
+                    locked(&self.state).statistics.lost_framing += 1;
                     return ConnectionEnd { why: DecodeError::Framing { error }.to_string(), useful };
                 }
                 Err(skipped) => {
@@ -308,7 +297,7 @@ impl Shared {
             });
             let came = *read.as_ref().unwrap_or(&0);
             input.consume(came);
-            let mut state = self.lock();
+            let mut state = locked(&self.state);
             state.statistics.bytes += came as u64;
             if state.stop {
                 return ConnectionEnd { why: "stopped".into(), useful };
@@ -338,7 +327,7 @@ impl Shared {
     }
 
     fn deliver(&self, message: Message) {
-        let mut state = self.lock();
+        let mut state = locked(&self.state);
         state.statistics.messages += 1;
         state.statistics.skipped += u64::from(matches!(message, Message::Other(_)));
         let dropped = state.queue.push(Received { message, arrived: Instant::now() });
@@ -347,7 +336,7 @@ impl Shared {
     }
 
     fn skip(&self, refused: &DecodeError) {
-        let mut state = self.lock();
+        let mut state = locked(&self.state);
         match refused {
             DecodeError::Checksum { .. } => state.statistics.checksum_failures += 1,
             DecodeError::Content { .. } | DecodeError::Framing { .. } => state.statistics.malformed += 1,

@@ -528,14 +528,6 @@ impl MessageError {
         let message = format!("{} from {}", escaped(kind, MAX_PART), quoted(device));
         MessageError { message, field: fault.field, fault: escaped(&fault.fault, MAX_PART) }
     }
-
-    pub fn field(&self) -> &str {
-        self.field
-    }
-
-    pub fn fault(&self) -> &str {
-        &self.fault
-    }
 }
 
 /// Why bytes are not a message, and where the next message begins if that is known.
@@ -551,16 +543,6 @@ pub enum DecodeError {
     /// stream cannot be resynchronised and the connection has to be renewed.
     #[error("{error}; the stream cannot be re-synchronised")]
     Framing { error: MessageError },
-}
-
-impl DecodeError {
-    pub fn error(&self) -> &MessageError {
-        match self {
-            DecodeError::Checksum { error, .. }
-            | DecodeError::Content { error, .. }
-            | DecodeError::Framing { error } => error,
-        }
-    }
 }
 
 /// An error of a field, before its message is known.

@@ -2,6 +2,9 @@
 
 use glam::{DMat4, DVec3, DVec4};
 
+/// Number type of an image's samples. The protocol has no integers of 64 bits.
+pub use crate::pixel::Number as Scalar;
+
 /// An OpenIGTLink message, as it was decoded or is to be encoded.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Message {
@@ -176,19 +179,6 @@ pub struct Region {
     pub size: [u16; 3],
 }
 
-/// Number type of an image's samples.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Scalar {
-    I8,
-    U8,
-    I16,
-    U16,
-    I32,
-    U32,
-    F32,
-    F64,
-}
-
 /// Coordinate system of the patient: x to the right or left, y to the front or back, z to the head.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Coordinates {
@@ -196,17 +186,6 @@ pub enum Coordinates {
     Ras,
     /// Left, posterior, superior.
     Lps,
-}
-
-impl Scalar {
-    pub fn bytes(self) -> usize {
-        match self {
-            Scalar::I8 | Scalar::U8 => 1,
-            Scalar::I16 | Scalar::U16 => 2,
-            Scalar::I32 | Scalar::U32 | Scalar::F32 => 4,
-            Scalar::F64 => 8,
-        }
-    }
 }
 
 impl Image {

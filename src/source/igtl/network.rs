@@ -17,6 +17,7 @@ use crate::freehand::{AT_ITS_LIMIT, CompoundingOptions, Pose, Refusal, Schedule,
 use crate::live::{Event, Live};
 use crate::probe::StoredType;
 use crate::probe::{Geometry, is_rigid};
+use crate::tree::Defaults;
 use crate::value_range::ValueRange;
 use crate::{Frame, Header};
 use glam::DAffine3;
@@ -35,30 +36,20 @@ pub enum Poses {
 }
 
 /// Options of a [`Network`].
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Defaults)]
 pub struct NetworkOptions {
     pub client: ClientOptions,
     /// Name of the device whose images are used; None: images of all devices.
     pub device: Option<String>,
+    #[value(Poses::Messages { device: None, tolerance: 0.1, patience: 1.0 })]
     pub poses: Poses,
+    #[value(CompoundingOptions { margin: 20.0, ..CompoundingOptions::default() })]
     pub freehand: CompoundingOptions,
     /// When the volume of a freehand sweep is placed, and when it is emitted.
     pub schedule: Schedule,
     /// Largest Cartesian volume that is accepted, bytes of stored samples.
+    #[value(BODY_LIMIT)]
     pub volume_bytes: usize,
-}
-
-impl Default for NetworkOptions {
-    fn default() -> NetworkOptions {
-        NetworkOptions {
-            client: ClientOptions::default(),
-            device: None,
-            poses: Poses::Messages { device: None, tolerance: 0.1, patience: 1.0 },
-            freehand: CompoundingOptions { margin: 20.0, ..CompoundingOptions::default() },
-            schedule: Schedule::default(),
-            volume_bytes: BODY_LIMIT,
-        }
-    }
 }
 
 /// How often the statistics are checked while nothing arrives.
@@ -431,8 +422,7 @@ impl TrackedImages {
     /// None before the volume is placed.
     fn header(&self) -> Option<Header> {
         let geometry = Geometry::Cartesian(self.sweep.lattice()?.grid);
-        let (forward, backward, stored) = (geometry.clone(), geometry, self.sweep.stored());
-        Some(Header { forward, backward, stored, range: self.range, posed: true, synthetic: false })
+        Some(Header { posed: true, ..Header::of(geometry, self.sweep.stored(), self.range) })
     }
 
     /// Where the volume lies (LPS). The space of trackers is RAS in this protocol, that of images is stated.

@@ -1,21 +1,14 @@
 //! The samples of images: their stored types, colours as luminance, and the values that are shown as 0 and 1.
 
 use super::message::{Image, Scalar};
-use crate::pixel::LUMINANCE;
-use crate::samples::{Replaced, store};
+use crate::StoredType;
+use crate::pixel::{LUMINANCE, PixelFormat};
+use crate::samples::Replaced;
 use crate::value_range::ValueRange;
-use crate::{SampleType, StoredType};
-
-/// Added to an i8 to store it as u8.
-const I8_SHIFT: f64 = 128.0;
 
 /// The type in which samples of an image are stored: unsigned 8 and 16 bits unchanged, signed ones shifted to begin at 0, all others as f32.
 pub(super) fn stored(scalar: Scalar) -> StoredType {
-    match scalar {
-        Scalar::I8 | Scalar::U8 => StoredType::U8,
-        Scalar::I16 | Scalar::U16 => StoredType::U16,
-        Scalar::I32 | Scalar::U32 | Scalar::F32 | Scalar::F64 => StoredType::F32,
-    }
+    if scalar == Scalar::I8 { StoredType::U8 } else { scalar.sample().stored() }
 }
 
 /// Converts an image to one little-endian sample a pixel, in the order of the image. The second result is the number of samples that were
@@ -25,63 +18,26 @@ pub(super) fn stored(scalar: Scalar) -> StoredType {
 ///
 /// # Errors
 /// Pixels have another number of components.
-pub(super) fn samples(mut image: Image) -> Result<(Vec<u8>, u64), String> {
-    let scalar = image.scalar;
-    let mut bytes = match (image.components, scalar) {
-        (1, Scalar::I8) => {
-            // Adding 128 to an i8 flips its top bit.
-            image.bytes.iter_mut().for_each(|byte| *byte ^= 0x80);
-            image.bytes
+pub(super) fn samples(image: Image) -> Result<(Vec<u8>, u64), String> {
+    let Image { components, scalar, mut bytes, .. } = image;
+    let channels = usize::from(components);
+    let number = match (scalar, components) {
+        (_, 0 | 2 | 5..) => return Err(format!("pixels have {components} components, must have 1, 3 or 4")),
+        // Other than those of files, these stay 8 bits. Adding 128 to an i8 flips its top bit.
+        (Scalar::I8, 1) => {
+            bytes.iter_mut().for_each(|byte| *byte ^= 0x80);
+            Scalar::U8
         }
-        (1, Scalar::U8 | Scalar::U16 | Scalar::I16 | Scalar::F32) => image.bytes,
-        (1, _) => {
-            let values = image.bytes.chunks_exact(scalar.bytes()).map(|v| value(scalar, v) as f32);
-            values.flat_map(f32::to_le_bytes).collect()
+        (Scalar::I8, _) => {
+            let weighted = |(colour, share): (&u8, f64)| share * f64::from(colour.cast_signed());
+            let grey = |pixel: &[u8]| pixel.iter().zip(LUMINANCE).map(weighted).sum::<f64>();
+            return Ok((bytes.chunks_exact(channels).map(|pixel| (grey(pixel) + 128.0).round() as u8).collect(), 0));
         }
-        (components @ 3..=4, _) => {
-            let mut bytes = Vec::with_capacity(image.bytes.len() / usize::from(components));
-            for pixel in image.bytes.chunks_exact(usize::from(components) * scalar.bytes()) {
-                let colours = pixel.chunks_exact(scalar.bytes()).zip(LUMINANCE);
-                put(&mut bytes, scalar, colours.map(|(colour, share)| share * value(scalar, colour)).sum());
-            }
-            bytes
-        }
-        (components, _) => return Err(format!("pixels have {components} components, must have 1, 3 or 4")),
+        (number, _) => number,
     };
-    let sample = match scalar {
-        Scalar::I8 | Scalar::U8 => SampleType::U8,
-        Scalar::I16 => SampleType::I16,
-        Scalar::U16 => SampleType::U16,
-        Scalar::I32 | Scalar::U32 | Scalar::F32 | Scalar::F64 => SampleType::F32,
-    };
-    let Replaced { not_finite, denormal } = store(sample, false, &mut bytes);
+    let format = PixelFormat { channels, ..PixelFormat::grey(number) };
+    let (bytes, Replaced { not_finite, denormal }) = format.convert(bytes);
     Ok((bytes, not_finite + denormal))
-}
-
-/// The value of little-endian bytes. A number beyond f32 becomes infinite later, and then 0.
-fn value(scalar: Scalar, bytes: &[u8]) -> f64 {
-    match (scalar, bytes) {
-        (Scalar::U8, [a]) => f64::from(*a),
-        (Scalar::I8, [a]) => f64::from(a.cast_signed()),
-        (Scalar::U16, [a, b]) => f64::from(u16::from_le_bytes([*a, *b])),
-        (Scalar::I16, [a, b]) => f64::from(i16::from_le_bytes([*a, *b])),
-        (Scalar::U32, [a, b, c, d]) => f64::from(u32::from_le_bytes([*a, *b, *c, *d])),
-        (Scalar::I32, [a, b, c, d]) => f64::from(i32::from_le_bytes([*a, *b, *c, *d])),
-        (Scalar::F32, [a, b, c, d]) => f64::from(f32::from_le_bytes([*a, *b, *c, *d])),
-        (Scalar::F64, _) => bytes.first_chunk().map_or(0.0, |b| f64::from_le_bytes(*b)),
-        _ => 0.0,
-    }
-}
-
-/// Stores a luminance in the type of the image. An i16 is shifted later, with all samples.
-fn put(bytes: &mut Vec<u8>, scalar: Scalar, value: f64) {
-    match scalar {
-        Scalar::U8 => bytes.push(value.round() as u8),
-        Scalar::I8 => bytes.push((value + I8_SHIFT).round() as u8),
-        Scalar::U16 => bytes.extend((value.round() as u16).to_le_bytes()),
-        Scalar::I16 => bytes.extend((value.round() as i16).to_le_bytes()),
-        Scalar::I32 | Scalar::U32 | Scalar::F32 | Scalar::F64 => bytes.extend((value as f32).to_le_bytes()),
-    }
 }
 
 /// The values that are displayed as 0 and 1: 0 and 255 for u8, otherwise the range of the samples collected in `values`.

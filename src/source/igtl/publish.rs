@@ -8,11 +8,12 @@ use super::server::{Server, ServerOptions, ServerStatistics, now};
 use crate::convert::{Volume, lattice};
 use crate::live::Event;
 use crate::probe::{Geometry, Grid, World};
+use crate::sync::locked;
 use crate::{Frame, Header};
 use glam::{DAffine3, DVec3};
 use std::io;
 use std::net::SocketAddr;
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 
 /// Device name of messages with pictures. [`VOLUME`] is the device name of messages with volumes.
@@ -115,7 +116,7 @@ impl Publisher {
 
     /// Counts since the publisher was started.
     pub fn statistics(&self) -> PublisherStatistics {
-        let mail = self.shared.lock();
+        let mail = locked(&self.shared.mail);
         let (pictures, volumes, replaced, fault) = (mail.pictures, mail.volumes, mail.replaced, mail.fault.clone());
         drop(mail);
         PublisherStatistics { server: self.server.statistics(), pictures, volumes, replaced, fault }
@@ -124,7 +125,7 @@ impl Publisher {
     /// Queues a picture of 8-bit red, green, blue, alpha, rows from the top; ignored while no client is connected. `size`: width and height.
     pub fn picture(&self, size: [u32; 2], pixels: Vec<u8>) {
         if self.server.has_clients() {
-            let mut mail = self.shared.lock();
+            let mut mail = locked(&self.shared.mail);
             mail.replaced += u64::from(mail.picture.replace(Rgba { size, pixels }).is_some());
             drop(mail);
             self.shared.changed.notify_all();
@@ -139,7 +140,7 @@ impl Publisher {
     }
 
     fn stop(&mut self) {
-        self.shared.lock().stop = true;
+        locked(&self.shared.mail).stop = true;
         self.shared.changed.notify_all();
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
@@ -162,16 +163,11 @@ impl Drop for Publisher {
 }
 
 impl Shared {
-    fn lock(&self) -> MutexGuard<'_, Mail> {
-        // Nothing panics while it holds the lock.
-        self.mail.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     /// Converts and sends what is handed over. What waits when the publisher is dropped is still sent.
     fn run(&self, server: &Server) {
         let mut is_picture = false;
         loop {
-            let mut mail = self.lock();
+            let mut mail = locked(&self.mail);
             let letter = loop {
                 match mail.next(is_picture) {
                     Some(letter) => break letter,
@@ -186,7 +182,7 @@ impl Shared {
                 Letter::Volume(whole) => whole.image(self.spacing),
             };
             let sent = image.and_then(|image| server.send(&Message::Image(image)).map_err(|e| e.to_string()));
-            let mut mail = self.lock();
+            let mut mail = locked(&self.mail);
             match sent {
                 Ok(()) if is_picture => mail.pictures += 1,
                 Ok(()) => mail.volumes += 1,
@@ -298,7 +294,7 @@ impl Listener {
         filling.pose = filling.pose.or(frame.pose);
         filling.volume.take(frame);
         let Some((_, whole)) = self.filling.take_if(|(_, filling)| filling.volume.is_whole()) else { return };
-        let mut mail = self.shared.lock();
+        let mut mail = locked(&self.shared.mail);
         mail.replaced += u64::from(mail.volume.replace(whole).is_some());
         drop(mail);
         self.shared.changed.notify_all();

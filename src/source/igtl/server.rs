@@ -4,6 +4,8 @@
 use super::begun::{Begun, longest};
 use super::codec::{self, BODY_LIMIT, DecodeError, Decoded, MessageError, Version, decode, encode};
 use super::message::{Message, Status, Text};
+use crate::sync::locked;
+use crate::tree::Defaults;
 use std::collections::{BTreeMap, VecDeque};
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream, ToSocketAddrs};
@@ -24,37 +26,30 @@ const SUCCESS: u8 = 0;
 const ERROR: u8 = 1;
 
 /// Options of a [`Server`].
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Defaults)]
 pub struct ServerOptions {
     /// Largest number of clients at a time. Further ones are disconnected at once.
+    #[value(16)]
     pub clients: usize,
     /// Largest number of messages of each device that wait for a client; the oldest are dropped in favour of newer ones.
+    #[value(2)]
     pub queue_messages: usize,
     /// Largest number of bytes that wait for a client. The newest message is always kept.
+    #[value(BODY_LIMIT)]
     pub queue_bytes: usize,
     /// Longest time in which a client reads nothing of a message that is being sent to it; after it the client is disconnected.
+    #[value(Duration::from_secs(10))]
     pub stall_timeout: Duration,
     /// Longest time from the first byte of a message of a client, such as a query, to its last; after it the client is disconnected. A message to a
     /// client may take a second more for each megabyte.
+    #[value(Duration::from_secs(10))]
     pub message_timeout: Duration,
     /// Longest time that dropping the server waits until its last messages are sent.
+    #[value(Duration::from_secs(2))]
     pub last: Duration,
     /// Name of the server: device name in its answers to queries, except for images, and text of its STRING message.
+    #[value("Echolume".into())]
     pub name: String,
-}
-
-impl Default for ServerOptions {
-    fn default() -> ServerOptions {
-        ServerOptions {
-            clients: 16,
-            queue_messages: 2,
-            queue_bytes: BODY_LIMIT,
-            stall_timeout: Duration::from_secs(10),
-            message_timeout: Duration::from_secs(10),
-            last: Duration::from_secs(2),
-            name: "Echolume".into(),
-        }
-    }
 }
 
 /// Counts since the server was started, and the number of clients.
@@ -183,7 +178,7 @@ impl Server {
 
     /// True if at least one client is connected.
     pub(crate) fn has_clients(&self) -> bool {
-        self.shared.lock().statistics.clients > 0
+        locked(&self.shared.state).statistics.clients > 0
     }
 
     /// Queues a message for every client except those that asked for no images (STP_IMAGE), and returns at once.
@@ -194,7 +189,7 @@ impl Server {
         let bytes: Arc<[u8]> = encode(message, Version::V1)?.into();
         let device = message.device().to_string();
         let packet = Packet { device: Some(device.clone()), bytes };
-        let mut state = self.shared.lock();
+        let mut state = locked(&self.shared.state);
         let State { clients, last, statistics, .. } = &mut *state;
         for queue in clients.values_mut().filter(|queue| !queue.is_paused) {
             statistics.dropped += queue.push(packet.clone(), &self.shared.options);
@@ -207,14 +202,14 @@ impl Server {
 
     /// Counts since the server was started.
     pub fn statistics(&self) -> ServerStatistics {
-        self.shared.lock().statistics.clone()
+        locked(&self.shared.state).statistics.clone()
     }
 }
 
 impl Server {
     /// Sends the waiting messages, for [`ServerOptions::last`] at most, and ends all connections. The statistics remain available.
     pub fn finish(&self) {
-        let mut state = self.shared.lock();
+        let mut state = locked(&self.shared.state);
         state.stop = true;
         self.shared.changed.notify_all();
         let asked = Instant::now();
@@ -224,7 +219,7 @@ impl Server {
         state.abort = true;
         drop(state);
         self.shared.changed.notify_all();
-        let thread = self.thread.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let thread = locked(&self.thread).take();
         if let Some(thread) = thread {
             let _ = thread.join();
         }
@@ -238,11 +233,6 @@ impl Drop for Server {
 }
 
 impl Shared {
-    fn lock(&self) -> MutexGuard<'_, State> {
-        // Nothing panics while it holds the lock.
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     fn wait<'a>(&self, state: MutexGuard<'a, State>, most: Duration) -> MutexGuard<'a, State> {
         self.changed.wait_timeout(state, most).unwrap_or_else(PoisonError::into_inner).0
     }
@@ -253,7 +243,7 @@ impl Shared {
         let mut number = 0;
         loop {
             threads.retain(|thread| !thread.is_finished());
-            let state = self.lock();
+            let state = locked(&self.state);
             if state.stop {
                 break;
             }
@@ -262,7 +252,7 @@ impl Shared {
             match listener.accept() {
                 Ok((stream, peer)) if is_full => {
                     tracing::warn!("OpenIGTLink: {peer} is refused, {} clients are connected", self.options.clients);
-                    self.lock().statistics.refused += 1;
+                    locked(&self.state).statistics.refused += 1;
                     drop(stream);
                 }
                 Ok((stream, peer)) => {
@@ -288,7 +278,7 @@ impl Shared {
         stream.set_read_timeout(Some(POLL))?;
         stream.set_write_timeout(Some(POLL))?;
         let theirs = stream.try_clone()?;
-        let mut state = self.lock();
+        let mut state = locked(&self.state);
         state.clients.insert(number, Queue::default());
         state.statistics.connections += 1;
         state.statistics.clients = state.clients.len();
@@ -310,7 +300,7 @@ impl Shared {
     }
 
     fn leave(&self, number: u64) {
-        let mut state = self.lock();
+        let mut state = locked(&self.state);
         state.clients.remove(&number);
         state.statistics.clients = state.clients.len();
         drop(state);
@@ -320,7 +310,7 @@ impl Shared {
     /// Sends what is queued for a client, until it leaves or the server ends. Returns the reason.
     fn write(&self, mut stream: &TcpStream, number: u64) -> String {
         loop {
-            let mut state = self.lock();
+            let mut state = locked(&self.state);
             let packet = loop {
                 if state.abort {
                     return "the server ends".into();
@@ -344,7 +334,7 @@ impl Shared {
                     Err(e) if e.kind() == ErrorKind::Interrupted => {}
                     Err(e) => return e.to_string(),
                 }
-                let mut state = self.lock();
+                let mut state = locked(&self.state);
                 if state.abort || !state.clients.contains_key(&number) {
                     return "the server ends, or it left or was refused".into();
                 }
@@ -357,7 +347,7 @@ impl Shared {
                     return format!("it did not read a message within {} ms", most.as_millis());
                 }
             }
-            self.lock().statistics.sent += 1;
+            locked(&self.state).statistics.sent += 1;
         }
     }
 
@@ -396,7 +386,7 @@ impl Shared {
                 Err(e) if matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted) => {}
                 Err(_) => return self.leave(number),
             }
-            let state = self.lock();
+            let state = locked(&self.state);
             if state.abort || !state.clients.contains_key(&number) {
                 return;
             }
@@ -407,14 +397,14 @@ impl Shared {
     fn refuse(&self, stream: &TcpStream, number: u64, why: &str) {
         let peer = stream.peer_addr().map_or_else(|_| "a client".to_string(), |peer| peer.to_string());
         tracing::warn!("OpenIGTLink: {peer} is refused: {why}");
-        self.lock().statistics.disconnected += 1;
+        locked(&self.state).statistics.disconnected += 1;
         self.leave(number);
     }
 
     /// Answers a query. False if too many answers wait.
     fn answer(&self, query: &Message, number: u64) -> bool {
         let Some((what, kind)) = query.kind().split_once('_') else { return true };
-        let mut state = self.lock();
+        let mut state = locked(&self.state);
         let State { clients, last, statistics, .. } = &mut *state;
         let Some(queue) = clients.get_mut(&number) else { return true };
         let name = query.device();
@@ -493,7 +483,7 @@ mod tests {
     fn images_that_are_asked_for_are_bounded_as_others_are() {
         let options = ServerOptions { queue_messages: 2, queue_bytes: 1000, ..ServerOptions::default() };
         let shared = Shared { state: Mutex::default(), changed: Condvar::new(), options };
-        shared.lock().clients.insert(1, Queue::default());
+        locked(&shared.state).clients.insert(1, Queue::default());
         let ask = |kind: &str, device: &str| {
             let bytes = codec::packed(kind, device, 0.0, &[]).expect("a query");
             let Ok(Decoded::Message { message, .. }) = decode(&bytes, QUERY_LIMIT) else { panic!("a query") };
@@ -502,12 +492,12 @@ mod tests {
         for n in 0..500 {
             // A new image each time, so that none of the bytes are shared.
             let device = ["a", "b", "c"][n % 3];
-            shared.lock().last.insert(device.into(), packet(Some(device), 400));
+            locked(&shared.state).last.insert(device.into(), packet(Some(device), 400));
             assert!(ask("GET_IMAGE", device), "{n}");
-            assert!(shared.lock().clients[&1].bytes <= 1000, "{n}");
+            assert!(locked(&shared.state).clients[&1].bytes <= 1000, "{n}");
         }
-        let dropped = shared.lock().statistics.dropped;
-        let held = shared.lock().clients[&1].waiting.len();
+        let dropped = locked(&shared.state).statistics.dropped;
+        let held = locked(&shared.state).clients[&1].waiting.len();
         assert_eq!((dropped + held as u64, held), (500, 2), "what is lost is counted");
         // Short answers are bounded by their number.
         assert_eq!((0..500).take_while(|_| ask("GET_STATUS", "")).count(), MAX_ANSWERS);

@@ -182,7 +182,7 @@ impl MotorTracked {
         if self.reported_at.elapsed() < REPORT_INTERVAL {
             return;
         }
-        if let Some(fault) = self.counts.since(&self.reported).fault() {
+        if let Some(fault) = self.counts.fault(&self.reported) {
             self.out.push_back(Event::Fault(fault));
             (self.reported, self.reported_at) = (self.counts, Instant::now());
         }

@@ -205,30 +205,14 @@ pub struct TrackingCounts {
 }
 
 impl TrackingCounts {
-    /// The counts minus earlier counts.
-    pub fn since(&self, before: &TrackingCounts) -> TrackingCounts {
-        TrackingCounts {
-            placed: self.placed - before.placed,
-            early: self.early - before.early,
-            turning: self.turning - before.turning,
-            beyond: self.beyond - before.beyond,
-            farther: self.farther - before.farther,
-            unknown: self.unknown - before.unknown,
-            late: self.late - before.late,
-            filled: self.filled - before.filled,
-            whole: self.whole - before.whole,
-            incomplete: self.incomplete - before.incomplete,
-        }
-    }
-
-    /// A line for users on slices and frames that were lost. None if there is nothing to report: it is normal that some frames are left out
-    /// because there are more than slices.
-    pub fn fault(&self) -> Option<String> {
+    /// A line for users on slices and frames that were lost since earlier counts. None if there is nothing to report: it is normal that some
+    /// frames are left out because there are more than slices.
+    pub fn fault(&self, before: &TrackingCounts) -> Option<String> {
         let parts = [
-            (self.filled, "slices had no frame of their own and were given a neighbour's"),
-            (self.incomplete, "passes missed more than two slices in a row and stayed incomplete"),
-            (self.unknown, "frames were left out, the motor's position at their time not being known"),
-            (self.late, "frames were left out, coming after those of a later pass or slice"),
+            (self.filled - before.filled, "slices had no frame of their own and were given a neighbour's"),
+            (self.incomplete - before.incomplete, "passes missed more than two slices in a row and stayed incomplete"),
+            (self.unknown - before.unknown, "frames were left out, the motor's position at their time not being known"),
+            (self.late - before.late, "frames were left out, coming after those of a later pass or slice"),
         ];
         let parts: Vec<String> =
             parts.iter().filter(|(count, _)| *count > 0).map(|(n, what)| format!("{n} {what}")).collect();
@@ -385,9 +369,9 @@ mod count_tests {
             whole: 1,
             ..TrackingCounts::default()
         };
-        assert_eq!(plenty.fault(), None);
+        assert_eq!(plenty.fault(&TrackingCounts::default()), None);
         let one = TrackingCounts { filled: 2, ..plenty };
-        assert!(one.since(&plenty).fault().is_some_and(|f| f.starts_with("motor: 2 slices") && !f.contains(';')));
+        assert!(one.fault(&plenty).is_some_and(|f| f.starts_with("motor: 2 slices") && !f.contains(';')));
         assert!(one.to_string().contains("2 slices filled") && one.to_string().lines().count() == 1);
     }
 }

@@ -1,6 +1,6 @@
 //! The header of a NRRD: its fields, the keys that programs add, and the names of its data files.
 
-use super::super::keys::{Aspect, Key, Stated, Unused, Use};
+use super::super::keys::{Aspect, Keys, Stated, Unused, Use, keys};
 use super::super::packed::InputFile;
 use super::super::plus::PlusFrames;
 use crate::files::{InputError, quoted};
@@ -16,45 +16,32 @@ const MAX_HEADER_LINES: usize = 500_000;
 const MAX_VECTORS: usize = 8;
 
 /// The fields of NRRD, and the keys of other programs that are read, with how they are treated.
-pub(in super::super) static KEYS: [Key; 36] = [
-    Key::new("type", Aspect::Storage, Use::Used),
-    Key::new("dimension", Aspect::Geometry, Use::Used),
-    Key::new("space", Aspect::Orientation, Use::Used),
-    Key::new("space dimension", Aspect::Geometry, Use::Optional),
-    Key::new("sizes", Aspect::Geometry, Use::Used),
-    Key::new("space directions", Aspect::Orientation, Use::Used),
-    Key::new("spacings", Aspect::Geometry, Use::Used),
-    Key::new("kinds", Aspect::Time, Use::Used),
-    Key::new("labels", Aspect::Time, Use::Used),
-    Key::new("space units", Aspect::Geometry, Use::Used),
-    Key::new("units", Aspect::Geometry, Use::Used),
-    Key::new("space origin", Aspect::Geometry, Use::Used),
-    Key::new("encoding", Aspect::Storage, Use::Used),
-    Key::new("endian", Aspect::Storage, Use::Optional),
-    Key::new("line skip", Aspect::Storage, Use::Used),
-    Key::new("byte skip", Aspect::Storage, Use::Used),
-    Key::new("data file", Aspect::Storage, Use::Used),
-    Key::new("axis mins", Aspect::Geometry, Use::Used),
-    Key::new("axis maxs", Aspect::Geometry, Use::Used),
-    Key::new("centerings", Aspect::Geometry, Use::Optional),
-    Key::new(ORIENTATION, Aspect::Orientation, Use::Used),
-    Key::new(IMAGE_TYPE, Aspect::Value, Use::Used),
-    Key::new("axis N index values", Aspect::Time, Use::Used),
-    Key::new("axis N index type", Aspect::Time, Use::Used),
-    Key::new("old min", Aspect::Value, Use::Warned(&[])),
-    Key::new("old max", Aspect::Value, Use::Warned(&[])),
-    Key::new("block size", Aspect::Storage, Use::Listed),
-    Key::new("content", Aspect::About, Use::Listed),
-    Key::new("number", Aspect::About, Use::Listed),
-    Key::new("min", Aspect::About, Use::Listed),
-    Key::new("max", Aspect::About, Use::Listed),
-    Key::new("sample units", Aspect::About, Use::Listed),
-    Key::new("thicknesses", Aspect::About, Use::Listed),
-    // Of vectors and tensors.
-    Key::new("measurement frame", Aspect::About, Use::Listed),
-    Key::new("SegmentN_*", Aspect::About, Use::Listed),
-    Key::new("Segmentation_*", Aspect::About, Use::Listed),
-];
+pub(in super::super) static KEYS: Keys = Keys::new(|| {
+    keys(&[
+        ("type", Aspect::Storage, Use::Used),
+        ("dimension", Aspect::Geometry, Use::Used),
+        ("space", Aspect::Orientation, Use::Used),
+        ("space dimension", Aspect::Geometry, Use::Optional),
+        ("sizes", Aspect::Geometry, Use::Used),
+        ("space directions", Aspect::Orientation, Use::Used),
+        ("spacings", Aspect::Geometry, Use::Used),
+        ("kinds|labels", Aspect::Time, Use::Used),
+        ("space units|units|space origin", Aspect::Geometry, Use::Used),
+        ("encoding", Aspect::Storage, Use::Used),
+        ("endian", Aspect::Storage, Use::Optional),
+        ("line skip|byte skip|data file", Aspect::Storage, Use::Used),
+        ("axis mins|axis maxs", Aspect::Geometry, Use::Used),
+        ("centerings", Aspect::Geometry, Use::Optional),
+        (ORIENTATION, Aspect::Orientation, Use::Used),
+        (IMAGE_TYPE, Aspect::Value, Use::Used),
+        ("axis N index values|axis N index type", Aspect::Time, Use::Used),
+        ("old min|old max", Aspect::Value, Use::Warned(&[])),
+        ("block size", Aspect::Storage, Use::Listed),
+        ("content|number|min|max|sample units|thicknesses", Aspect::About, Use::Listed),
+        // Of vectors and tensors.
+        ("measurement frame|SegmentN_*|Segmentation_*", Aspect::About, Use::Listed),
+    ])
+});
 /// Other spellings of fields.
 const SPELLINGS: [(&str, &str); 10] = [
     ("datafile", "data file"),

@@ -5,7 +5,6 @@ mod axes;
 mod header;
 
 use super::data_files::{self, Pattern};
-use super::keys::Unused;
 use super::layout::Layout;
 use super::packed::{Encoding, InputFile, Pixels};
 use super::pixel::{Number, PixelFormat};
@@ -79,23 +78,8 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
         remarks.push(("orientation".into(), quoted(orientation)));
     }
     let poses = header.frames.poses(file.path, depth, &mut remarks);
-    let mut layout = Layout {
-        format: "NRRD",
-        pixel,
-        frame_size: [width, height],
-        frames,
-        pixels: file.pixels(header.length),
-        line_order,
-        geometry,
-        backward: false,
-        volumes: 1,
-        states_geometry,
-        poses,
-        times,
-        synthetic: false,
-        remarks,
-        unused: Unused::default(),
-    };
+    let stated = Layout::new("NRRD", pixel, [width, height], frames, file.pixels(header.length), geometry);
+    let mut layout = Layout { line_order, states_geometry, poses, times, remarks, ..stated };
     find_pixels(file, &header, &mut layout)?;
     layout.check(file.path, "sizes")?;
     layout.unused = header.unused(&mut layout.remarks)?;

@@ -7,13 +7,15 @@ use super::speckle::{Beam, DYNAMIC_RANGE, Echo};
 use super::vessels::VesselTree;
 use crate::files::InputError;
 use crate::probe::Probe;
+use crate::tree::{All, Name};
 use glam::DVec3;
 use std::fmt;
 use std::path::Path;
 use std::str::FromStr;
 
 /// The object that the phantom's probe scans.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, All, Name)]
+#[tree(rename_all = "lowercase")]
 pub enum Body {
     /// A fetal head, shoulders, a hand and an umbilical cord, in fluid behind the uterine wall. Head and hand move, unless [`PhantomOptions::still`]
     /// is true.
@@ -36,22 +38,6 @@ pub enum Body {
 }
 
 impl Body {
-    pub const ALL: [Body; 8] =
-        [Body::Head, Body::Sphere, Body::Step, Body::Wires, Body::Constant, Body::Ramp, Body::Heart, Body::Vessels];
-
-    pub fn name(self) -> &'static str {
-        match self {
-            Body::Head => "head",
-            Body::Sphere => "sphere",
-            Body::Step => "step",
-            Body::Wires => "wires",
-            Body::Constant => "constant",
-            Body::Ramp => "ramp",
-            Body::Heart => "heart",
-            Body::Vessels => "vessels",
-        }
-    }
-
     /// The labels that this object's ground truth can have. Empty if a formula describes the object.
     pub fn labels(self) -> &'static [Label] {
         match self {

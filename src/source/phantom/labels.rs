@@ -1,8 +1,11 @@
 //! The names of what the volumes of head and vessels hold, as a label volume numbers them.
 
+use crate::tree::{All, Name};
+
 /// The tissue at a point in the volume of the fetal head or of the vessels, as stored in label volumes. The number of a label never changes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, All, Name)]
 #[repr(u8)]
+#[tree(rename_all = "lowercase")]
 pub enum Label {
     /// Amniotic fluid.
     Fluid = 0,
@@ -13,6 +16,7 @@ pub enum Label {
     Cord = 3,
     Skull = 4,
     Brain = 5,
+    #[tree(rename = "choroid plexus")]
     ChoroidPlexus = 6,
     /// Cerebrospinal fluid.
     Ventricle = 7,
@@ -21,46 +25,13 @@ pub enum Label {
     Uterus = 9,
     /// Blood in the vessels.
     Blood = 10,
+    #[tree(rename = "vessel wall")]
     VesselWall = 11,
     /// The liver tissue around the vessels.
     Liver = 12,
 }
 
 impl Label {
-    pub const ALL: [Label; 13] = [
-        Label::Fluid,
-        Label::Skin,
-        Label::Hand,
-        Label::Cord,
-        Label::Skull,
-        Label::Brain,
-        Label::ChoroidPlexus,
-        Label::Ventricle,
-        Label::Falx,
-        Label::Uterus,
-        Label::Blood,
-        Label::VesselWall,
-        Label::Liver,
-    ];
-
-    pub fn name(self) -> &'static str {
-        match self {
-            Label::Fluid => "fluid",
-            Label::Skin => "skin",
-            Label::Hand => "hand",
-            Label::Cord => "cord",
-            Label::Skull => "skull",
-            Label::Brain => "brain",
-            Label::ChoroidPlexus => "choroid plexus",
-            Label::Ventricle => "ventricle",
-            Label::Falx => "falx",
-            Label::Uterus => "uterus",
-            Label::Blood => "blood",
-            Label::VesselWall => "vessel wall",
-            Label::Liver => "liver",
-        }
-    }
-
     /// The colour of this label in a segmentation: red, green, blue, 0..=1.
     pub fn colour(self) -> [f64; 3] {
         match self {

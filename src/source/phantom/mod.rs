@@ -32,6 +32,7 @@ use crate::files::InputError;
 use crate::probe::SampleType;
 use crate::probe::{Advance, Array, Axis, Motion, Probe, Rigid, Volumes};
 use crate::sequence::{self, MAX_FRAMES};
+use crate::tree::Defaults;
 use body::{Scatterers, refusal};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -78,26 +79,34 @@ impl Speckle {
 }
 
 /// Options of a [`Phantom`].
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Defaults)]
 pub struct PhantomOptions {
     /// Seed of the random speckle. The scanned object does not depend on it.
+    #[value(1)]
     pub seed: u64,
     pub body: Body,
     /// Number of volumes, consecutive in time, 1..=10000.
+    #[value(1)]
     pub volumes: usize,
     /// True if every second volume is swept backwards.
     pub both_ways: bool,
+    #[value(Speckle::Random)]
     pub speckle: Speckle,
     /// Share of the distance between two frames that the motor travels while one frame is acquired, 0..=1.
     pub speed_ratio: f64,
     /// Number of frames of a volume, 2..=1024.
+    #[value(37)]
     pub frames: usize,
     /// Number of scan lines of a frame, 2..=1024.
+    #[value(128)]
     pub lines: usize,
     /// Number of samples of a line, 16..=8192, over a depth of 120 mm.
+    #[value(512)]
     pub samples: usize,
     /// Angle between the first and the last frame of a volume, degrees, 10..=120.
+    #[value(FAN_ANGLE_DEG)]
     pub fan_angle_deg: f64,
+    #[value(PointSpread { axial_mm: 0.35, lateral_deg: 0.8, elevation_deg: 1.2 })]
     pub point_spread: PointSpread,
     /// True if the head does not move and the heart does not beat.
     pub still: bool,
@@ -105,6 +114,7 @@ pub struct PhantomOptions {
     pub heart_swing: f64,
     /// Least distance between the near uterine wall and the fetus of body head, filled by fluid, mm, 0..=29.9. A smaller gap makes the wall
     /// thicker.
+    #[value(GAP)]
     pub gap: f64,
     /// Level of clutter in body head, a haze of reverberations and side lobes everywhere, dB re full scale, -60..=0. None: no clutter.
     pub clutter_db: Option<f64>,
@@ -116,29 +126,6 @@ impl PhantomOptions {
     /// The point between the eyes of the head where [`PhantomOptions::moved`] is no motion, mm in the coordinates of [`Probe`]: 55 mm below the
     /// array's face.
     pub const CENTRE: DVec3 = DVec3::new(0.0, ARRAY_RADIUS + 55.0, 0.0);
-}
-
-impl Default for PhantomOptions {
-    fn default() -> PhantomOptions {
-        PhantomOptions {
-            seed: 1,
-            body: Body::Head,
-            volumes: 1,
-            both_ways: false,
-            speckle: Speckle::Random,
-            speed_ratio: 0.0,
-            frames: 37,
-            lines: 128,
-            samples: 512,
-            fan_angle_deg: FAN_ANGLE_DEG,
-            point_spread: PointSpread { axial_mm: 0.35, lateral_deg: 0.8, elevation_deg: 1.2 },
-            still: false,
-            heart_swing: 0.0,
-            gap: GAP,
-            clutter_db: None,
-            moved: Rigid::default(),
-        }
-    }
 }
 
 /// A simulated sweep: the checked options and the probe that they define. Frames are computed on request.
@@ -168,25 +155,24 @@ impl Phantom {
         if options.frames * options.lines * options.samples > MAX_VOLUME_SAMPLES {
             return Err(refusal("samples", format!("more than {MAX_VOLUME_SAMPLES} in a volume")));
         }
-        if !(0.0..=1.0).contains(&options.speed_ratio) {
-            return Err(refusal("speed_ratio", format!("is {}, must lie in 0..=1", options.speed_ratio)));
-        }
-        if !(10.0..=120.0).contains(&options.fan_angle_deg) {
-            return Err(refusal("fan_angle", format!("is {}, must lie in 10..=120", options.fan_angle_deg)));
-        }
-        if !(0.0..=0.3).contains(&options.heart_swing) {
-            return Err(refusal("heart_swing", format!("is {}, must lie in 0..=0.3", options.heart_swing)));
-        }
-        if !(0.0..=GAP).contains(&options.gap) {
-            return Err(refusal("gap", format!("is {}, must lie in 0..={GAP}", options.gap)));
-        }
-        if let Some(level) = options.clutter_db.filter(|level| !(-60.0..=0.0).contains(level)) {
-            return Err(refusal("clutter", format!("is {level}, must lie in -60..=0")));
+        let spread = options.point_spread;
+        for (field, value, least, most) in [
+            ("speed_ratio", options.speed_ratio, 0.0, 1.0),
+            ("fan_angle", options.fan_angle_deg, 10.0, 120.0),
+            ("heart_swing", options.heart_swing, 0.0, 0.3),
+            ("gap", options.gap, 0.0, GAP),
+            ("clutter", options.clutter_db.unwrap_or(0.0), -60.0, 0.0),
+            ("psf_axial", spread.axial_mm, 0.0, 5.0),
+            ("psf_lateral", spread.lateral_deg, 0.0, 10.0),
+            ("psf_elevation", spread.elevation_deg, 0.0, 10.0),
+        ] {
+            if !(least..=most).contains(&value) {
+                return Err(refusal(field, format!("is {value}, must lie in {least}..={most}")));
+            }
         }
         if options.moved != Rigid::default() && !matches!(options.body, Body::Head | Body::Vessels) {
             return Err(refusal("moved", "is for the bodies head and vessels"));
         }
-        options.point_spread.check()?;
         let volumes = Volumes {
             both_ways: options.both_ways,
             speed_ratio: options.speed_ratio,
@@ -268,13 +254,10 @@ impl Phantom {
             .into_iter()
             .enumerate()
             .map(|(slice, bytes)| Frame {
-                volume: volume as u32,
                 number: self.number_of(volume, slice) as u32,
-                slice,
                 backward,
                 time: Some(self.line_time(volume, slice, 0)),
-                pose: None,
-                bytes,
+                ..Frame::of_slice(volume as u32, slice, bytes)
             })
             .collect();
         made.sort_by_key(|frame| frame.number);
@@ -306,11 +289,8 @@ impl Phantom {
 fn write_sequence(phantom: &Phantom, path: &Path) -> Result<(), InputError> {
     let frames = phantom.options().frames * phantom.volumes();
     if frames > MAX_FRAMES {
-        return Err(InputError::new(
-            path,
-            "volumes",
-            format!("make {frames} frames, a file holds at most {MAX_FRAMES}"),
-        ));
+        let why = format!("make {frames} frames, a file holds at most {MAX_FRAMES}");
+        return Err(InputError::new(path, "volumes", why));
     }
     sequence::write_both(path, &header(phantom), &probe_file(phantom), |file| {
         for volume in 0..phantom.volumes() {

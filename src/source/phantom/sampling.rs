@@ -2,6 +2,7 @@
 
 use super::{PhantomOptions, refusal};
 use crate::files::InputError;
+use crate::tree::{All, Name};
 use std::fmt;
 use std::str::FromStr;
 
@@ -16,28 +17,9 @@ pub struct PointSpread {
     pub elevation_deg: f64,
 }
 
-impl PointSpread {
-    /// Checks the ranges.
-    ///
-    /// # Errors
-    /// A standard deviation is out of its range.
-    pub(super) fn check(&self) -> Result<(), InputError> {
-        let parts = [
-            ("psf_axial", self.axial_mm, 5),
-            ("psf_lateral", self.lateral_deg, 10),
-            ("psf_elevation", self.elevation_deg, 10),
-        ];
-        for (field, sd, most) in parts {
-            if !(0.0..=f64::from(most)).contains(&sd) {
-                return Err(refusal(field, format!("is {sd}, must lie in 0..={most}")));
-            }
-        }
-        Ok(())
-    }
-}
-
 /// Named sets of [`PhantomOptions`]: how densely the head is scanned, how wide the beam is, and whether the fetus moves.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, All, Name)]
+#[tree(rename_all = "lowercase")]
 pub enum Sampling {
     /// As a live probe acquires in under a second: 37 frames of 128 lines.
     #[default]
@@ -47,15 +29,6 @@ pub enum Sampling {
 }
 
 impl Sampling {
-    pub const ALL: [Sampling; 2] = [Sampling::Live, Sampling::Gallery];
-
-    pub fn name(self) -> &'static str {
-        match self {
-            Sampling::Live => "live",
-            Sampling::Gallery => "gallery",
-        }
-    }
-
     /// Options for one volume of the head with this sampling.
     pub fn options(self) -> PhantomOptions {
         let live = PhantomOptions::default();

@@ -6,6 +6,7 @@
 
 use super::sampling::PointSpread;
 use crate::probe::{Indices, Probe};
+use crate::statistics::mix;
 use glam::{DAffine3, DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -403,13 +404,6 @@ fn bell(distance: f32, sd: f32) -> f32 {
         return 1.0;
     }
     (-0.5 * (distance / sd).powi(2)).exp()
-}
-
-/// The finaliser of SplitMix64 (Steele, Lea, Flood 2014): a counter goes in, 64 independent-looking bits come out.
-fn mix(mut z: u64) -> u64 {
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
 }
 
 const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;

@@ -5,10 +5,9 @@ use super::body::{Scatterers, Truth, refusal};
 use super::head::Head;
 use super::labels::Label;
 use super::vessels::VesselTree;
-use crate::convert::{lattice, write_grid, write_labels};
+use crate::convert::{lattice, place_of, write_grid};
 use crate::files::InputError;
-use crate::probe::SampleType;
-use crate::probe::{Geometry, Grid};
+use crate::probe::{Geometry, Grid, SampleType, World};
 use crate::segmentation::{self, Segment};
 use crate::volume_file::VolumeFile;
 use glam::DVec3;
@@ -79,7 +78,8 @@ impl Phantom {
             // Fluid is 0: no segment.
             let segments = self.options.body.labels().iter().filter(|label| **label as u8 > 0);
             let segments = segments.map(|l| Segment { label: *l as u8, name: l.name().into(), colour: l.colour() });
-            write_labels(grid, &segments.collect::<Vec<_>>(), path, |place| label(place).unwrap_or(0))?;
+            let label = |voxel| label(place_of(grid, voxel)).unwrap_or(0);
+            segmentation::write(path, grid, &World::of(grid), &segments.collect::<Vec<_>>(), label, || ())?;
         } else if VolumeFile::of(path).is_ok_and(|format| format == VolumeFile::MetaImage) {
             write_grid(grid, SampleType::U8, path, |place| label(place).map(f64::from), || ())?;
         } else {

@@ -1,9 +1,10 @@
 //! The keys that are held, the gestures of mice and fingers, and the pointer by keyboard.
 
-use crate::command::{Command, HeldKeys, Tool};
+use crate::command::{Command, Tool};
 use crate::gestures::{self, Gestures};
 use crate::input::{Input, Key, Modifiers};
 use crate::keyboard_pointer::{KeyboardPointer, PictureArea, Pointed, PointerMark};
+use crate::keys::HeldKeys;
 use crate::picking::Viewport;
 
 /// The state of the user's inputs: keys, gestures, and the pointer.

@@ -9,22 +9,26 @@ use crate::probe::World;
 use crate::recordings::OpenRecordings;
 use crate::scene::Settings;
 use crate::source::live::SourceKind;
+use crate::tree::Defaults;
 use crate::workspace::Origin;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Options of a [`Console`](super::Console).
+/// Options of a [`Console`](super::Console). The default is an interactive window at full quality, without recording; `wake` does nothing.
+#[derive(Defaults)]
 pub struct ConsoleOptions {
     pub settings: Settings,
     /// Options of the stream: chosen settings, volume images, queues, time stamps, cine loop, and the watched folder of shaders. The console
     /// itself sets those that depend on its window.
     pub stream: StreamOptions,
     /// Time between two statistics in the log and in the display of times.
+    #[value(Duration::from_secs(1))]
     pub statistics_interval: Duration,
     /// The frame budget: longest time that a picture may take while the view moves; `None`: no limit.
     pub budget: Option<Duration>,
     /// The rungs of the quality ladder. The first is full quality.
+    #[value(built_in_ladder())]
     pub rungs: Vec<Rung>,
     /// Time after which a source that ended or could not be opened is opened again; `None`: it is not.
     pub retry: Option<Duration>,
@@ -35,12 +39,16 @@ pub struct ConsoleOptions {
     /// Path of a file with metrics for Prometheus, which is rewritten at intervals; `None`: there is none.
     pub prometheus: Option<PathBuf>,
     /// Folder for files that the user saves or exports.
+    #[value(".".into())]
     pub folder: PathBuf,
     /// True if panels, messages and marks are drawn over the picture.
+    #[value(true)]
     pub overlay: bool,
     /// True if sliders and buttons are shown at the start.
+    #[value(true)]
     pub panels: bool,
     /// Pixels of the window per point, the unit of text and buttons.
+    #[value(1.0)]
     pub scale: f32,
     /// The key combination that ends the console at once, also in a kiosk; `None`: there is none.
     pub exit: Option<Chord>,
@@ -56,45 +64,16 @@ pub struct ConsoleOptions {
     /// Path of the file with the user's presets; `None`: the user can save no presets.
     pub presets: Option<PathBuf>,
     /// Called on any thread when [`Console::update`](super::Console::update) has something to do.
+    #[value(Arc::new(|| ()))]
     pub wake: Wake,
     /// A fault that prevents the view, so that only its message is shown.
     pub startup_fault: Option<StartupFault>,
     /// True if the pipelines of every mode, layout and preset are compiled in advance while the user does nothing.
+    #[value(true)]
     pub warms: bool,
     /// True if thumbnails of presets and of the cine loop's volumes are drawn while the user does nothing. In a kiosk they are not.
+    #[value(true)]
     pub small_pictures: bool,
-}
-
-impl Default for ConsoleOptions {
-    /// An interactive window at full quality, without recording. `wake` does nothing.
-    fn default() -> ConsoleOptions {
-        ConsoleOptions {
-            settings: Settings::default(),
-            stream: StreamOptions::default(),
-            statistics_interval: Duration::from_secs(1),
-            budget: None,
-            rungs: built_in_ladder(),
-            retry: None,
-            source: SourceKind::default(),
-            record: None,
-            prometheus: None,
-            folder: ".".into(),
-            overlay: true,
-            panels: true,
-            scale: 1.0,
-            exit: None,
-            is_kiosk: false,
-            origin: None,
-            plays_once: false,
-            opening: OpeningOptions::default(),
-            first_steps: None,
-            presets: None,
-            wake: Arc::new(|| ()),
-            startup_fault: None,
-            warms: true,
-            small_pictures: true,
-        }
-    }
 }
 
 /// Options for opening files besides the console's own source.

@@ -9,7 +9,7 @@ use crate::progress_lines::Progress;
 use crate::segment::files::write_segments;
 use crate::source::live::SourceKind;
 use crate::texts;
-use crate::volume_export::{FORMATS, Job, renumbered};
+use crate::volume_export::{FORMATS, Job, Work, renumbered, write_frames};
 use crate::workspace::Origin;
 use std::time::SystemTime;
 
@@ -62,7 +62,8 @@ impl Console {
         let saved = match self.stream.header() {
             Some(header) if !volumes.is_empty() => {
                 let header = header.clone();
-                self.exporter.volumes(header, volumes, complete_to.map_or(Holds::Nothing, Holds::Loop))
+                let holds = complete_to.map_or(Holds::Nothing, Holds::Loop);
+                self.exporter.written("frames", holds, move |file| write_frames(file, header, &volumes))
             }
             _ => Err(texts::WHY_NO_VOLUMES.into()),
         };
@@ -76,7 +77,7 @@ impl Console {
     pub(super) fn export_volume(&mut self, n: usize) {
         let Some(format) = FORMATS.get(n).copied() else { return };
         self.visible.close_exports();
-        if format.is_of_labels() {
+        if format.work == Work::Labels {
             let labels = self.controls.labels_to_export().ok_or_else(|| texts::WHY_NO_LABELS.to_string());
             let begun = labels.and_then(|(labels, segments)| {
                 self.exporter.written(format.ending, Holds::Nothing, move |file| {
@@ -87,11 +88,11 @@ impl Console {
         }
         let cine = self.stream.cine().volumes();
         let shown = || self.stream.cine_position().and_then(|at| cine.get(at)).or(cine.back()).cloned();
-        let volumes = if format.takes_the_loop() { self.marked_volumes() } else { shown().into_iter().collect() };
+        let volumes = if format.work == Work::Loop { self.marked_volumes() } else { shown().into_iter().collect() };
         let rate = self.cine_loop().played_rate();
-        let origin = if format.is_report() { self.numbered_origin() } else { None };
+        let origin = if format.work == Work::Report { self.numbered_origin() } else { None };
         let begun = match self.stream.header().cloned() {
-            _ if format.is_report() && origin.is_none() => Err(texts::WHY_NO_REPORT.into()),
+            _ if format.work == Work::Report && origin.is_none() => Err(texts::WHY_NO_REPORT.into()),
             Some(header) if !volumes.is_empty() => {
                 let mut settings = self.controls.settings().clone();
                 let numbers: Vec<u32> = volumes.iter().map(|volume| volume.volume).collect();

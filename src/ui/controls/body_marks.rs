@@ -2,7 +2,7 @@
 
 use super::{Change, Controls};
 use crate::command::Command;
-use crate::scene::{BODY_MARK_SIZES, BodyMark, MAX_BODY_MARKS, Settings};
+use crate::scene::{BODY_MARK_SIZES, BodyMark, MAX_BODY_MARKS};
 use crate::texts;
 use crate::view;
 
@@ -31,7 +31,7 @@ impl Controls {
                 let at = PLACES.into_iter().find(|at| marks.iter().all(|mark| mark.at != *at));
                 let new = BodyMark { body, at: at.unwrap_or(PLACES[0]), ..BodyMark::default() };
                 self.body_mark = marks.len();
-                self.change_body_marks(command, |all| all.push(new))
+                self.mark(command, |settings| settings.body_marks.push(new))
             }
             Command::ChangeBodyMark(index, new) => {
                 let Some(valid) = marks.get(index).and_then(|_| checked(new)) else { return Some(Change::Nothing) };
@@ -40,7 +40,7 @@ impl Controls {
                 match is_same {
                     true if was_about == index => Change::Nothing,
                     true => Change::Marks,
-                    false => self.change_body_marks(command, |all| all[index] = valid),
+                    false => self.mark(command, |settings| settings.body_marks[index] = valid),
                 }
             }
             Command::SelectBodyMark(index) if index < marks.len() => {
@@ -49,19 +49,11 @@ impl Controls {
                 Change::Marks
             }
             Command::RemoveBodyMark(index) if index < marks.len() => {
-                self.change_body_marks(command, |all| _ = all.remove(index))
+                self.mark(command, |settings| _ = settings.body_marks.remove(index))
             }
             Command::SelectBodyMark(_) | Command::RemoveBodyMark(_) => Change::Nothing,
             _ => return None,
         })
-    }
-
-    /// Changes the list as a step that can be undone.
-    fn change_body_marks(&mut self, command: &Command, change: impl FnOnce(&mut Vec<BodyMark>)) -> Change {
-        let before: Settings = self.settings.clone();
-        change(&mut self.settings.body_marks);
-        self.history.record(before, command);
-        Change::Marks
     }
 }
 

@@ -27,9 +27,6 @@ impl Controls {
         if cine == self.settings.cine {
             return Change::Nothing;
         }
-        let before = self.settings.clone();
-        self.settings.cine = cine;
-        self.history.record(before, command);
-        Change::Marks
+        self.mark(command, |settings| settings.cine = cine)
     }
 }

@@ -86,11 +86,7 @@ impl Controls {
         }
         let new = self.switched(new);
         match self.current(scene).and_then(|now| drawable(&now, new)) {
-            Some(settings) => {
-                let before = std::mem::replace(&mut self.settings, settings);
-                self.history.record(before, command);
-                Change::Settings
-            }
+            Some(settings) => self.put(settings, command),
             None => Change::Refused(texts::CURVE_NOT_DRAWN),
         }
     }

@@ -85,10 +85,7 @@ impl Controls {
                 Change::Tool
             }
             Command::ClearCuts if !self.settings.cuts.is_empty() => {
-                let before = self.settings.clone();
-                self.settings.cuts.clear();
-                self.history.record(before, command);
-                Change::Settings
+                self.put(Settings { cuts: Vec::new(), ..self.settings.clone() }, command)
             }
             Command::CancelCut if !self.outline.is_empty() => {
                 self.outline.clear();
@@ -151,11 +148,7 @@ impl Controls {
         }
         let now = self.current(scene);
         match now.and_then(|now| drawable(&now, new)) {
-            Some(settings) => {
-                let before = std::mem::replace(&mut self.settings, settings);
-                self.history.record(before, command);
-                Change::Settings
-            }
+            Some(settings) => self.put(settings, command),
             None => Change::Refused(texts::CANNOT_CUT_BOTH),
         }
     }

@@ -40,7 +40,7 @@ impl Controls {
             return Change::Refused(why);
         }
         let has_text = matches!(measured.kind, MeasureKind::Text | MeasureKind::Arrow);
-        self.change_measures(&Command::EndMeasure, |all| all.push(measured));
+        self.mark(&Command::EndMeasure, |settings| settings.measure.push(measured));
         self.typing = has_text.then(|| self.settings.measure.len() - 1);
         Change::Marks
     }
@@ -57,18 +57,20 @@ impl Controls {
             Command::MovePoint(index, point, to) if is_place(to) => {
                 let there = self.settings.measure.get(index).filter(|measured| measured.kind != MeasureKind::Surface);
                 match there.and_then(|measured| measured.points.get(point)) {
-                    Some(was) if *was != to => self.change_measures(command, |all| all[index].points[point] = to),
+                    Some(was) if *was != to => {
+                        self.mark(command, |settings| settings.measure[index].points[point] = to)
+                    }
                     _ => Change::Nothing,
                 }
             }
             Command::DeleteMeasure(index) => {
                 let last = self.settings.measure.len().checked_sub(1)?;
                 self.typing = None;
-                self.change_measures(command, |all| _ = all.remove(index.min(last)))
+                self.mark(command, |settings| _ = settings.measure.remove(index.min(last)))
             }
             Command::ClearMeasures if !self.settings.measure.is_empty() => {
                 self.typing = None;
-                self.change_measures(command, Vec::clear)
+                self.mark(command, |settings| settings.measure.clear())
             }
             Command::LabelMeasure(index) if index < self.settings.measure.len() => {
                 self.history.seal();
@@ -84,7 +86,7 @@ impl Controls {
             Command::EndTyping => match self.typing.take() {
                 // A text that says nothing is none.
                 Some(index) if self.settings.measure.get(index).is_some_and(is_empty_text) => {
-                    self.change_measures(command, |all| _ = all.remove(index))
+                    self.mark(command, |settings| _ = settings.measure.remove(index))
                 }
                 Some(_) => Change::Marks,
                 None => Change::Nothing,
@@ -113,14 +115,6 @@ impl Controls {
         true
     }
 
-    /// Changes the list as a step that can be undone.
-    fn change_measures(&mut self, command: &Command, change: impl FnOnce(&mut Vec<Measurement>)) -> Change {
-        let before = self.settings.clone();
-        change(&mut self.settings.measure);
-        self.history.record(before, command);
-        Change::Marks
-    }
-
     /// True if so many more points are too many.
     fn is_full(&self, more: usize) -> bool {
         let there: usize = self.settings.measure.iter().map(Measurement::count).sum();
@@ -129,7 +123,7 @@ impl Controls {
 
     fn change_text(&mut self, command: &Command, change: impl FnOnce(&mut String)) -> Change {
         match self.typing.filter(|index| *index < self.settings.measure.len()) {
-            Some(index) => self.change_measures(command, |all| change(&mut all[index].text)),
+            Some(index) => self.mark(command, |settings| change(&mut settings.measure[index].text)),
             None => Change::Nothing,
         }
     }

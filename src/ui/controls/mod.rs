@@ -254,6 +254,15 @@ impl Controls {
     /// Applies a command. `scene`: the one that is shown, which may be older than the settings. Without a scene only changes of the tool, the
     /// reset and commands for the caller have an effect.
     pub(super) fn apply(&mut self, command: &Command, scene: Option<&Scene>) -> Change {
+        use Command::{
+            Align, Back, CancelExport, CancelReading, CloseHints, CloseRecording, Compare, CompareFurther, CompareView,
+            CopyMeasures, DeletePreset, Discard, EndNaming, Exit, Export, Exports, Find, FocusPanels, Freeze,
+            InspectorTab, KeyboardPointer, MarkCine, MeasureBody, MoveCompared, MoveWipe, NamePreset, NextTab,
+            OpenFile, OpenFiles, PickSurface, PlayCine, Preset, Presets, RenamePreset, RestorePresets, SaveAndExit,
+            SaveLoop, SaveMeasures, SavePicture, SaveWorkspace, SeekCine, ShowControl, ShowRecording, StepCine,
+            StepRecording, ToggleDrawer, ToggleFullScreen, ToggleHelp, ToggleLink, TogglePanels, ToggleTimes, TrimCine,
+            Turntable, TypeValue,
+        };
         if let Some(change) = self.cut(command, scene).or_else(|| self.curve(command, scene)) {
             return change;
         }
@@ -291,60 +300,16 @@ impl Controls {
             Command::Sides(..) | Command::ExchangeLeftAndRight | Command::ProbeMarker(_) | Command::SavesBar(_) => {
                 return self.mark_sides(command);
             }
-            Command::Freeze
-            | Command::StepCine(_)
-            | Command::SeekCine(_)
-            | Command::PlayCine
-            | Command::MarkCine(_)
-            | Command::TrimCine(..)
-            | Command::SavePicture
-            | Command::SaveLoop
-            | Command::ToggleHelp
-            | Command::CloseHints
-            | Command::Find
-            | Command::ShowControl(_)
-            | Command::TypeValue(_)
-            | Command::ToggleTimes
-            | Command::TogglePanels
-            | Command::FocusPanels
-            | Command::InspectorTab(_)
-            | Command::NextTab
-            | Command::ToggleDrawer
-            | Command::KeyboardPointer
-            | Command::ToggleFullScreen
-            | Command::Back
-            | Command::Exit
-            | Command::SaveAndExit
-            | Command::Discard
-            | Command::PickSurface(_)
-            | Command::MeasureBody
-            | Command::CopyMeasures
-            | Command::SaveMeasures
-            | Command::SaveWorkspace
-            | Command::OpenFiles
-            | Command::OpenFile(_)
-            | Command::Turntable
-            | Command::ShowRecording(_)
-            | Command::StepRecording(_)
-            | Command::CloseRecording(_)
-            | Command::CancelReading
-            | Command::Compare
-            | Command::CompareView(_)
-            | Command::MoveWipe(_)
-            | Command::ToggleLink(_)
-            | Command::Align
-            | Command::CompareFurther
-            | Command::MoveCompared(..)
-            | Command::Exports
-            | Command::Export(_)
-            | Command::CancelExport
-            | Command::Presets
-            | Command::Preset(_)
-            | Command::NamePreset
-            | Command::RenamePreset(_)
-            | Command::EndNaming
-            | Command::DeletePreset(_)
-            | Command::RestorePresets => return Change::Caller(*command),
+            Freeze | StepCine(_) | SeekCine(_) | PlayCine | MarkCine(_) | TrimCine(..) | SavePicture | SaveLoop
+            | ToggleHelp | CloseHints | Find | ShowControl(_) | TypeValue(_) | ToggleTimes | TogglePanels
+            | FocusPanels | InspectorTab(_) | NextTab | ToggleDrawer | KeyboardPointer | ToggleFullScreen | Back
+            | Exit | SaveAndExit | Discard | PickSurface(_) | MeasureBody | CopyMeasures | SaveMeasures
+            | SaveWorkspace | OpenFiles | OpenFile(_) | Turntable | ShowRecording(_) | StepRecording(_)
+            | CloseRecording(_) | CancelReading | Compare | CompareView(_) | MoveWipe(_) | ToggleLink(_) | Align
+            | CompareFurther | MoveCompared(..) | Exports | Export(_) | CancelExport | Presets | Preset(_)
+            | NamePreset | RenamePreset(_) | EndNaming | DeletePreset(_) | RestorePresets => {
+                return Change::Caller(*command);
+            }
             _ => {}
         }
         if let Some(change) = self
@@ -362,20 +327,31 @@ impl Controls {
         }
         let wanted = self.changed(command, &now).map(|settings| self.switched(settings));
         match wanted.clone().and_then(|settings| drawable(&now, settings)) {
-            Some(settings) if settings != self.settings => {
-                if !settings.mode.is_flat() {
-                    self.rendered = settings.mode;
-                }
-                let before = std::mem::replace(&mut self.settings, settings);
-                self.history.record(before, command);
-                Change::Settings
-            }
+            Some(settings) if settings != self.settings => self.put(settings, command),
             None => {
                 let why = wanted.and_then(|settings| cutting::in_the_way(&now, &settings));
                 why.map_or(Change::Nothing, Change::Refused)
             }
             Some(_) => Change::Nothing,
         }
+    }
+
+    /// Has these settings from now on, as a step that can be undone.
+    fn put(&mut self, settings: Settings, command: &Command) -> Change {
+        if !settings.mode.is_flat() {
+            self.rendered = settings.mode;
+        }
+        let before = std::mem::replace(&mut self.settings, settings);
+        self.history.record(before, command);
+        Change::Settings
+    }
+
+    /// Changes what is drawn over the picture or how the loop is played, as a step that can be undone.
+    fn mark(&mut self, command: &Command, change: impl FnOnce(&mut Settings)) -> Change {
+        let before = self.settings.clone();
+        change(&mut self.settings);
+        self.history.record(before, command);
+        Change::Marks
     }
 
     /// The scene of the current settings.

@@ -86,12 +86,7 @@ impl Controls {
         if settings == self.settings {
             return Change::Nothing;
         }
-        if !settings.mode.is_flat() {
-            self.rendered = settings.mode;
-        }
-        let before = std::mem::replace(&mut self.settings, settings);
         self.history.seal();
-        self.history.record(before, command);
-        Change::Settings
+        self.put(settings, command)
     }
 }

@@ -18,9 +18,6 @@ impl Controls {
         if marks == self.settings.marks {
             return Change::Nothing;
         }
-        let before = self.settings.clone();
-        self.settings.marks = marks;
-        self.history.record(before, command);
-        Change::Marks
+        self.mark(command, |settings| settings.marks = marks)
     }
 }

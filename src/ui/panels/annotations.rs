@@ -279,7 +279,7 @@ fn line(painter: &Painter, from: Pos2, to: Pos2) {
 }
 
 /// A bright line between dark edges, which is visible on any picture.
-fn stroke(painter: &Painter, ends: [Pos2; 2], width: f32, colour: Color32) {
+pub(super) fn stroke(painter: &Painter, ends: [Pos2; 2], width: f32, colour: Color32) {
     painter.line_segment(ends, Stroke::new(width + 2.5, OUTLINE));
     painter.line_segment(ends, Stroke::new(width, colour));
 }

@@ -8,14 +8,15 @@ use super::colours::{UNCOLOURED, WEAK_TEXT};
 use super::icons::{self, Icon};
 use super::names::{self, Tell};
 use super::rail::icon_button;
-use super::{PanelState, SMALL_TEXT, TEXT_SIZE};
+use super::top::{INSPECTOR, Item, place, show_item};
+use super::{Execute, PanelState, Pictures, SMALL_TEXT, TEXT_SIZE};
 use crate::cine_player::{CineState, SPEEDS};
 use crate::command::Command;
 use crate::texts;
 use egui::accesskit::{Action, Role};
 use egui::{
-    Align2, FontId, Frame, Key, Panel, Rect, Response, Sense, Stroke, StrokeKind, TextureId, Ui, UiBuilder, Vec2,
-    WidgetInfo, WidgetType, pos2, vec2,
+    Align2, FontId, Frame, Key, Panel, Rect, Response, Sense, Stroke, StrokeKind, Ui, UiBuilder, Vec2, WidgetInfo,
+    WidgetType, pos2, vec2,
 };
 use std::time::Duration;
 
@@ -29,13 +30,11 @@ const GAP: f32 = 8.0;
 /// Width of a button with an icon, points; the second in the smallest windows.
 const ICON: [f32; 2] = [44.0, 42.0];
 
-pub(super) fn show(
-    ui: &mut Ui,
-    state: &PanelState,
-    height: f32,
-    pictures: &[Option<TextureId>],
-    execute: &mut dyn FnMut(Command),
-) {
+const EXPORTS: Item = (icons::EXPORT, texts::EXPORT, Command::Exports, texts::EXPORT_HINT);
+const SAVE_LOOP: Item = (icons::FILM, texts::SAVE_LOOP, Command::SaveLoop, texts::SAVE_LOOP_HINT);
+const SAVE_PICTURE: Item = (icons::CAMERA, texts::SAVE_PICTURE, Command::SavePicture, texts::SAVE_PICTURE_HINT);
+
+pub(super) fn show(ui: &mut Ui, state: &PanelState, height: f32, pictures: Pictures, execute: Execute) {
     let panel = Panel::bottom("bar").exact_size(height).resizable(false).show_separator_line(false);
     panel.frame(Frame::new().fill(PANEL)).show(ui, |ui| {
         names::name(ui, Role::Toolbar, texts::CINE_LOOP);
@@ -50,38 +49,22 @@ pub(super) fn show(
             WITH_LINE.. => 92.0,
             _ => 76.0,
         };
-        freeze(ui, state, at(row, left, frozen), execute);
+        freeze(ui, state, place(row, left, frozen), execute);
         left += frozen + GAP;
         let has_texts = width >= WITH_TEXTS;
         let with_text = |text: f32| if has_texts { text } else { icon };
-        let exports = (icons::EXPORT, texts::EXPORT, with_text(100.0), Command::Exports, texts::EXPORT_HINT);
-        let save_loop = (icons::FILM, texts::SAVE_LOOP, with_text(120.0), Command::SaveLoop, texts::SAVE_LOOP_HINT);
-        let save =
-            (icons::CAMERA, texts::SAVE_PICTURE, with_text(140.0), Command::SavePicture, texts::SAVE_PICTURE_HINT);
-        let drawer = (icons::INSPECTOR, texts::INSPECTOR, icon, Command::ToggleDrawer, texts::DRAWER_HINT);
-        let more = (width >= WITH_STEPS).then_some([exports, save_loop]);
-        let drawer = (state.room.has_drawer && !state.room.has_top).then_some(drawer);
+        let more = (width >= WITH_STEPS).then_some([(EXPORTS, with_text(100.0)), (SAVE_LOOP, with_text(120.0))]);
+        let save = (SAVE_PICTURE, with_text(140.0));
+        let drawer = (state.room.has_drawer && !state.room.has_top).then_some((INSPECTOR, icon));
         let of_right: Vec<_> = more.into_iter().flatten().chain([save]).chain(drawer).collect();
-        let right = row.right() - of_right.iter().map(|(_, _, width, ..)| width + GAP).sum::<f32>();
+        let right = row.right() - of_right.iter().map(|(_, width)| width + GAP).sum::<f32>();
         cine(ui, state, (row.with_min_x(left).with_max_x(right), width), pictures, execute);
         let mut from = right + GAP;
-        for (icon, name, width, command, hint) in of_right {
-            let is_on = command == Command::ToggleDrawer && state.visible.inspector.is_open;
-            let text = if has_texts { name } else { "" };
-            let area = at(row, from, width);
-            let response = part(ui, area, |ui, size| icon_button(ui, icon, (text, name), size, (true, is_on)));
-            let response = response.tell(hint).named(name);
-            let response = if command == Command::ToggleDrawer { response.expanded(is_on) } else { response };
-            if response.clicked() {
-                execute(command);
-            }
+        for (item, width) in of_right {
+            show_item(ui, state, item, has_texts, place(row, from, width), execute);
             from += width + GAP;
         }
     });
-}
-
-fn at(row: Rect, left: f32, width: f32) -> Rect {
-    Rect::from_min_size(pos2(left, row.top()), vec2(width, row.height()))
 }
 
 fn part(ui: &mut Ui, area: Rect, add: impl FnOnce(&mut Ui, Vec2) -> Response) -> Response {
@@ -89,7 +72,7 @@ fn part(ui: &mut Ui, area: Rect, add: impl FnOnce(&mut Ui, Vec2) -> Response) ->
 }
 
 /// The button that freezes: what the picture is, and what a press does.
-fn freeze(ui: &mut Ui, state: &PanelState, area: Rect, execute: &mut dyn FnMut(Command)) {
+fn freeze(ui: &mut Ui, state: &PanelState, area: Rect, execute: Execute) {
     let (title, about, fill, colour) = match (state.is_frozen, state.ended) {
         (true, _) => (texts::FROZEN, texts::GO_LIVE, WARNING, ON_WARNING),
         (false, None) if state.is_live || state.origin.is_some() => {
@@ -128,13 +111,7 @@ fn freeze(ui: &mut Ui, state: &PanelState, area: Rect, execute: &mut dyn FnMut(C
 }
 
 /// The cine loop in this area of a window so wide.
-fn cine(
-    ui: &mut Ui,
-    state: &PanelState,
-    (area, window): (Rect, f32),
-    pictures: &[Option<TextureId>],
-    execute: &mut dyn FnMut(Command),
-) {
+fn cine(ui: &mut Ui, state: &PanelState, (area, window): (Rect, f32), pictures: Pictures, execute: Execute) {
     let cine = &state.cine;
     let mut left = area.left();
     let mut buttons: Vec<(Icon, &str, &str, &str, Command, f32)> = Vec::new();
@@ -170,8 +147,9 @@ fn cine(
     }
     for (icon, text, name, hint, command, width) in buttons {
         let is_enabled = cine.count > 0;
-        let response =
-            part(ui, at(area, left, width), |ui, size| icon_button(ui, icon, (text, name), size, (is_enabled, false)));
+        let response = part(ui, place(area, left, width), |ui, size| {
+            icon_button(ui, icon, (text, name), size, (is_enabled, false))
+        });
         if response.tell(hint).named(name).clicked() {
             execute(command);
         }
@@ -197,13 +175,7 @@ enum Grip {
 }
 
 /// The volumes in a row: the one that is shown, and the part that is played, whose ends can be dragged.
-fn time_line(
-    ui: &mut Ui,
-    cine: &CineState,
-    area: Rect,
-    pictures: &[Option<TextureId>],
-    execute: &mut dyn FnMut(Command),
-) {
+fn time_line(ui: &mut Ui, cine: &CineState, area: Rect, pictures: Pictures, execute: Execute) {
     let strip =
         if area.height() >= 44.0 { area.with_max_y(area.bottom() - LABELS) } else { area.shrink2(vec2(0.0, 6.0)) };
     let sense = if cine.count > 0 { Sense::click_and_drag() } else { Sense::hover() };
@@ -287,13 +259,7 @@ fn labels(painter: &egui::Painter, cine: &CineState, area: Rect, x: f32) {
 }
 
 /// What pointer, keyboard and screen reader do on the line.
-fn react(
-    ui: &Ui,
-    cine: &CineState,
-    response: Response,
-    (strip, each, ends): (Rect, f32, [f32; 2]),
-    execute: &mut dyn FnMut(Command),
-) {
+fn react(ui: &Ui, cine: &CineState, response: Response, (strip, each, ends): (Rect, f32, [f32; 2]), execute: Execute) {
     let last = cine.count - 1;
     let shown = cine.shown.unwrap_or(last).min(last);
     let value = texts::place_in_loop(shown + 1, cine.count);

@@ -2,13 +2,13 @@
 
 use super::colours::{BODY, MEASURE, OUTLINE, SELECTED, TEXT, WEAK_TEXT};
 use super::names::{self, Tell};
-use super::widgets::{scale_slider, switch};
-use super::{PanelState, ROW_HEIGHT, SMALL_TEXT, heading, picture_rect, shown};
+use super::widgets::{add_and_remove, say_step, scale_slider, switch};
+use super::{Execute, PanelState, ROW_HEIGHT, heading, picture_rect, shown};
 use crate::command::{Command, Tool};
 use crate::measure::body_marks::{self, Drawn};
 use crate::scene::{BODY_MARK_SIZES, Body, BodyMark, MAX_BODY_MARKS};
 use crate::texts;
-use egui::{Button, Label, Painter, Pos2, Rect, RichText, Sense, Stroke, StrokeKind, Ui, WidgetInfo, WidgetType, vec2};
+use egui::{Button, Painter, Pos2, Rect, Sense, Stroke, StrokeKind, Ui, WidgetInfo, WidgetType, vec2};
 
 /// Columns of the buttons of parts of the body.
 const COLUMNS: usize = 4;
@@ -61,7 +61,7 @@ fn draw(painter: &Painter, place: impl Fn([f64; 2]) -> Pos2, scale: f32, drawn: 
 }
 
 /// Shows the controls of the selected body mark while the tool for body marks is selected.
-pub(super) fn show(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+pub(super) fn show(ui: &mut Ui, state: &PanelState, width: f32, execute: Execute) {
     if state.controls.tool() != Tool::BodyMark {
         return;
     }
@@ -70,10 +70,7 @@ pub(super) fn show(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dy
         heading(ui, texts::BODY_MARK);
         ui.set_max_width(width);
         let step = if about.is_some() { texts::BODY_MARK_STEP } else { texts::BODY_MARK_FIRST_STEP };
-        names::group(ui, step, |ui| {
-            names::announce(ui, step, false);
-            ui.add(Label::new(RichText::new(step).size(SMALL_TEXT).color(TEXT)).wrap());
-        });
+        say_step(ui, step, TEXT);
         bodies(ui, about, width, execute);
         let Some((index, mark)) = about else { return };
         let mut is_mirrored = mark.mirrored;
@@ -113,7 +110,7 @@ pub(super) fn show(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dy
 }
 
 /// Buttons with the parts of the body: a press gives the mark that part, or adds the first mark.
-fn bodies(ui: &mut Ui, about: Option<(usize, BodyMark)>, width: f32, execute: &mut dyn FnMut(Command)) {
+fn bodies(ui: &mut Ui, about: Option<(usize, BodyMark)>, width: f32, execute: Execute) {
     let gap = ui.spacing().item_spacing.x;
     let edge = ((width - gap * (COLUMNS - 1) as f32) / COLUMNS as f32).min(52.0);
     for some in Body::ALL.chunks(COLUMNS) {
@@ -150,13 +147,7 @@ fn bodies(ui: &mut Ui, about: Option<(usize, BodyMark)>, width: f32, execute: &m
 }
 
 /// The numbers of several marks, and buttons that add one and remove this one.
-fn others(
-    ui: &mut Ui,
-    state: &PanelState,
-    (index, mark): (usize, BodyMark),
-    width: f32,
-    execute: &mut dyn FnMut(Command),
-) {
+fn others(ui: &mut Ui, state: &PanelState, (index, mark): (usize, BodyMark), width: f32, execute: Execute) {
     let (count, gap) = (state.controls.body_marks().len(), ui.spacing().item_spacing.x);
     if count > 1 {
         let each = vec2((width - gap * (count - 1) as f32) / count as f32, ROW_HEIGHT);
@@ -170,26 +161,9 @@ fn others(
             }
         });
     }
-    let half = vec2((width - gap) / 2.0, ROW_HEIGHT);
-    ui.horizontal(|ui| {
-        for (command, [word, name], is_there, hint) in [
-            (
-                Command::AddBodyMark(mark.body),
-                [texts::ADD, texts::ADD_BODY_MARK],
-                count < MAX_BODY_MARKS,
-                texts::ADD_BODY_MARK_HINT,
-            ),
-            (
-                Command::RemoveBodyMark(index),
-                [texts::REMOVE, texts::REMOVE_BODY_MARK],
-                true,
-                texts::REMOVE_BODY_MARK_HINT,
-            ),
-        ] {
-            let button = ui.add_enabled(is_there, Button::new(word).min_size(half));
-            if button.tell(hint).on_disabled_hover_text(hint).named(name).clicked() {
-                execute(command);
-            }
-        }
-    });
+    let both = [
+        (Command::AddBodyMark(mark.body), texts::ADD_BODY_MARK, count < MAX_BODY_MARKS, texts::ADD_BODY_MARK_HINT),
+        (Command::RemoveBodyMark(index), texts::REMOVE_BODY_MARK, true, texts::REMOVE_BODY_MARK_HINT),
+    ];
+    add_and_remove(ui, width, both, execute);
 }

@@ -2,7 +2,7 @@
 
 use super::colours::{BACKING, MARK, TEXT, UNCOLOURED, WEAK_TEXT};
 use super::names::{self, Tell};
-use super::{PanelState, ROW_HEIGHT, SMALL_TEXT, TOUCH_SIZE, picture_rect};
+use super::{Execute, PanelState, Pictures, ROW_HEIGHT, SMALL_TEXT, TOUCH_SIZE, picture_rect};
 use crate::command::Command;
 use crate::compare::{DIFFERENCE, MAX_TILES, tile_name};
 use crate::comparison::{CompareView, Link, Shown};
@@ -10,7 +10,7 @@ use crate::texts;
 use egui::accesskit::Role;
 use egui::{
     Align2, Area, Button, CursorIcon, FontId, Frame, Id, Margin, Order, Painter, PointerButton, Rect, RichText, Sense,
-    Stroke, TextureId, Ui, WidgetInfo, WidgetType, pos2, vec2,
+    Stroke, Ui, WidgetInfo, WidgetType, pos2, vec2,
 };
 
 /// The views with their names and hints.
@@ -34,7 +34,7 @@ fn about(link: Link) -> (&'static str, &'static str) {
 const EDGE: f32 = 10.0;
 
 /// Paints the compared pictures and the difference, below everything that is drawn over pictures. `textures`: as [`Shown::pictures`].
-pub(super) fn paint(ui: &Ui, state: &PanelState, textures: &[Option<TextureId>], scale: f32) {
+pub(super) fn paint(ui: &Ui, state: &PanelState, textures: Pictures, scale: f32) {
     let Some(shown) = state.compared else { return };
     let painter = ui.painter();
     let texture = |n: usize| textures.get(n).copied().flatten();
@@ -72,7 +72,7 @@ fn tile(state: &PanelState, n: u32, scale: f32) -> Rect {
 }
 
 /// Shows the names of the tiles, the handle of the wipe, and the buttons.
-pub(super) fn show(ui: &Ui, state: &PanelState, scale: f32, execute: &mut dyn FnMut(Command)) {
+pub(super) fn show(ui: &Ui, state: &PanelState, scale: f32, execute: Execute) {
     let Some(shown) = state.compared else { return };
     let (painter, first) = (ui.painter(), picture_rect(state, scale));
     let is_wipe = shown.view == CompareView::Wipe;
@@ -112,7 +112,7 @@ fn name(painter: &Painter, tile: Rect, text: &str, is_alone: bool) {
 }
 
 /// Lets drags over the picture of the n-th compared volume move it: with Shift or the right button they turn it.
-fn hand(ui: &Ui, n: usize, tile: Rect, scale: f32, execute: &mut dyn FnMut(Command)) {
+fn hand(ui: &Ui, n: usize, tile: Rect, scale: f32, execute: Execute) {
     let area = Area::new(Id::new((texts::COMPARISON, n))).order(Order::Background).fixed_pos(tile.min).constrain(false);
     area.show(ui.ctx(), |ui| {
         let (_, response) = ui.allocate_exact_size(tile.size(), Sense::DRAG);
@@ -127,7 +127,7 @@ fn hand(ui: &Ui, n: usize, tile: Rect, scale: f32, execute: &mut dyn FnMut(Comma
 }
 
 /// Shows the handle on the line of the wipe, which is at `at` in an area.
-fn handle(ui: &Ui, area: Rect, at: f32, execute: &mut dyn FnMut(Command)) {
+fn handle(ui: &Ui, area: Rect, at: f32, execute: Execute) {
     let handle = Rect::from_center_size(pos2(at, area.center().y), vec2(0.5 * TOUCH_SIZE, TOUCH_SIZE));
     Area::new(Id::new(texts::WIPE_LINE)).order(Order::Middle).fixed_pos(handle.min).constrain(false).show(
         ui.ctx(),
@@ -151,7 +151,7 @@ fn handle(ui: &Ui, area: Rect, at: f32, execute: &mut dyn FnMut(Command)) {
 }
 
 /// Shows the buttons of the comparison at the upper edge of an area.
-fn buttons(ui: &Ui, shown: &Shown, over: Rect, execute: &mut dyn FnMut(Command)) {
+fn buttons(ui: &Ui, shown: &Shown, over: Rect, execute: Execute) {
     let place = over.center_top() + vec2(0.0, EDGE);
     let area = Area::new(Id::new(texts::COMPARISON)).order(Order::Middle).pivot(Align2::CENTER_TOP).fixed_pos(place);
     area.show(ui.ctx(), |ui| {

@@ -1,12 +1,13 @@
 //! The line of the curved plane on the plane that it is drawn on, with its points while its tool is selected, and the line in progress.
 
+use super::canvas::Canvas;
 use super::colours::{self, OUTLINE, TEXT};
-use super::{PanelState, ShownPicture, picture_rect, shown};
+use super::{PanelState, ShownPicture};
 use crate::command::Tool;
 use crate::measure::overlay;
 use crate::scene::Curve;
 use crate::scene::planes::{CURVE_COLOUR, CurveLine};
-use egui::{Painter, Rect, Stroke, Ui, vec2};
+use egui::{Painter, Stroke, Ui, vec2};
 
 /// Radius of a point, points.
 const POINT: f32 = 4.5;
@@ -14,24 +15,19 @@ const POINT: f32 = 4.5;
 const HEAD: f64 = 12.0;
 
 pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
-    let Some((ShownPicture { scene, .. }, picture)) = shown(state, scale) else { return };
+    let Some((ShownPicture { scene, .. }, canvas)) = Canvas::of(ui, state, scale) else { return };
     let (is_chosen, work) = (state.controls.tool() == Tool::Curve, state.controls.line());
     if scene.settings.planes.curve.is_none() && work.is_none() {
         return;
     }
-    let painter = ui.ctx().layer_painter(egui::LayerId::background()).with_clip_rect(picture_rect(state, scale));
     let tiling = scene.tiling();
-    let area = |tile: usize| {
-        let [corner, size] =
-            [tiling.tiles[tile].corner, tiling.tiles[tile].size].map(|[x, y]| vec2(x as f32, y as f32));
-        Rect::from_min_size(picture.min + corner / scale, size / scale)
+    let within = |line: &CurveLine| {
+        let tile = &tiling.tiles[line.tile];
+        canvas.within(tile.corner.map(f64::from), tile.size.map(f64::from))
     };
-    let draw = |line: &CurveLine, has_points: bool| {
-        let painter = painter.with_clip_rect(area(line.tile).intersect(painter.clip_rect()));
-        draw(&painter, picture, scale, line, has_points);
-    };
-    let hover = ui.ctx().pointer_hover_pos().filter(|at| painter.clip_rect().contains(*at));
-    let hover = hover.map(|at| ((at - picture.min) * scale).into()).map(|[x, y]: [f32; 2]| [x, y].map(f64::from));
+    let draw = |line: &CurveLine, has_points: bool| draw(&within(line), &canvas, line, has_points);
+    let hover = ui.ctx().pointer_hover_pos().filter(|at| canvas.painter.clip_rect().contains(*at));
+    let hover = hover.map(|at| ((at - canvas.origin) * scale).into()).map(|[x, y]: [f32; 2]| [x, y].map(f64::from));
     // The tile under the pointer, and the place in space.
     let under = hover.and_then(|at| {
         let tile = tiling.tile_at(at[0].max(0.0) as usize, at[1].max(0.0) as usize)?;
@@ -43,8 +39,7 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
         // Where on the line the pointer over the section is.
         if let Some((_, place)) = under.filter(|(number, _)| tiling.tiles[*number].section.is_some()) {
             let [x, y] = tiling.project(&tiling.tiles[line.tile], place).0.map(|v| v as f32);
-            let at = picture.min + vec2(x, y) / scale;
-            let painter = painter.with_clip_rect(area(line.tile).intersect(painter.clip_rect()));
+            let (at, painter) = (canvas.origin + vec2(x, y) / scale, within(&line));
             [Stroke::new(4.0, OUTLINE), Stroke::new(2.0, colours::of_scene(CURVE_COLOUR))].into_iter().for_each(
                 |stroke| {
                     painter.circle_stroke(at, POINT + 2.0, stroke);
@@ -66,14 +61,11 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
     }
 }
 
-fn draw(painter: &Painter, picture: Rect, scale: f32, line: &CurveLine, has_points: bool) {
+fn draw(painter: &Painter, canvas: &Canvas, line: &CurveLine, has_points: bool) {
     let colour = colours::of_scene(CURVE_COLOUR);
-    let at = |[x, y]: [f64; 2]| {
-        let near = |v: f64| (v / f64::from(scale)).clamp(-1e5, 1e5) as f32;
-        picture.min + vec2(near(x), near(y))
-    };
+    let at = |place| canvas.at(place);
     let mut strokes: Vec<[[f64; 2]; 2]> = line.line.windows(2).map(|ends| [ends[0], ends[1]]).collect();
-    strokes.extend(line.head().into_iter().flat_map(|head| overlay::arrow_head(head, HEAD * f64::from(scale))));
+    strokes.extend(line.head().into_iter().flat_map(|head| overlay::arrow_head(head, HEAD * f64::from(canvas.scale))));
     for stroke in [Stroke::new(4.0, OUTLINE), Stroke::new(1.5, colour)] {
         strokes.iter().for_each(|ends| _ = painter.line_segment(ends.map(at), stroke));
     }

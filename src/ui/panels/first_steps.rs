@@ -3,7 +3,7 @@
 use super::annotations::MIN_FOR_AXES;
 use super::colours::{ACCENT, MESSAGE, TEXT};
 use super::names::{self, Tell};
-use super::{PanelState, ROW_HEIGHT, SMALL_TEXT, TEXT_SIZE, picture_rect};
+use super::{Execute, PanelState, ROW_HEIGHT, SMALL_TEXT, TEXT_SIZE, picture_rect};
 use crate::command::Command;
 use crate::texts;
 use egui::accesskit::Role;
@@ -26,7 +26,7 @@ pub(crate) fn has_room(picture: [u32; 2], scale: f32) -> bool {
     width >= MIN_PICTURE[0] && height >= MIN_PICTURE[1]
 }
 
-pub(super) fn show(ui: &Ui, state: &PanelState, scale: f32, execute: &mut dyn FnMut(Command)) {
+pub(super) fn show(ui: &Ui, state: &PanelState, scale: f32, execute: Execute) {
     let picture = picture_rect(state, scale);
     let below = if picture.width().min(picture.height()) >= MIN_FOR_AXES { ABOVE_AXES } else { BELOW };
     let at = picture.left_bottom() + vec2(BESIDE, -below);

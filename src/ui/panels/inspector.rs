@@ -3,7 +3,10 @@
 
 use super::colours::{ACCENT, EDGE, PANEL, TEXT, WEAK_TEXT};
 use super::names::{self, Tell};
-use super::{Edges, INSPECTOR_WIDTH, PanelState, Room, SMALL_TEXT, TEXT_SIZE, body_marks, labels, look, measures};
+use super::{
+    Edges, Execute, INSPECTOR_WIDTH, PanelState, Pictures, Room, SMALL_TEXT, TEXT_SIZE, body_marks, labels, look,
+    measures,
+};
 use super::{planes, presets, rail, recordings, sides, tools, top};
 use crate::command::{Command, InspectorTab, Tool};
 use crate::scene::{Group, MeasureKind};
@@ -11,8 +14,8 @@ use crate::sliders::SLIDERS;
 use crate::texts;
 use egui::accesskit::Role;
 use egui::{
-    Align2, Area, FontId, Frame, Id, Margin, Order, Panel, ScrollArea, Sense, Stroke, TextureId, Ui, WidgetInfo,
-    WidgetType, pos2, vec2,
+    Align2, Area, FontId, Frame, Id, Margin, Order, Panel, ScrollArea, Sense, Stroke, Ui, WidgetInfo, WidgetType, pos2,
+    vec2,
 };
 
 const TABS: [(InspectorTab, &str, &str); 5] = [
@@ -97,13 +100,7 @@ fn tabs(room: &Room) -> impl Iterator<Item = (InspectorTab, &'static str, &'stat
 }
 
 /// Shows the inspector as a column beside the picture. `looks`: thumbnails of the presets.
-pub(super) fn show_column(
-    ui: &mut Ui,
-    state: &PanelState,
-    width: f32,
-    looks: &[Option<TextureId>],
-    execute: &mut dyn FnMut(Command),
-) {
+pub(super) fn show_column(ui: &mut Ui, state: &PanelState, width: f32, looks: Pictures, execute: Execute) {
     let frame = Frame::new().fill(PANEL);
     let column = Panel::right("inspector").exact_size(width).resizable(false).show_separator_line(false).frame(frame);
     column.show(ui, |ui| show(ui, state, width, TABS_HEIGHT[0], looks, execute));
@@ -115,8 +112,8 @@ pub(super) fn show_drawer(
     state: &PanelState,
     size: [f32; 2],
     edges: Edges,
-    looks: &[Option<TextureId>],
-    execute: &mut dyn FnMut(Command),
+    looks: Pictures,
+    execute: Execute,
 ) {
     let [width, height] = [size[0].min(INSPECTOR_WIDTH), (size[1] - edges.below - edges.above).max(1.0)];
     let corner = pos2(size[0] - width, edges.above);
@@ -132,14 +129,7 @@ pub(super) fn show_drawer(
     });
 }
 
-fn show(
-    ui: &mut Ui,
-    state: &PanelState,
-    width: f32,
-    tabs_height: f32,
-    looks: &[Option<TextureId>],
-    execute: &mut dyn FnMut(Command),
-) {
+fn show(ui: &mut Ui, state: &PanelState, width: f32, tabs_height: f32, looks: Pictures, execute: Execute) {
     ui.spacing_mut().item_spacing = vec2(8.0, 4.0);
     show_tabs(ui, state, [width, tabs_height], execute);
     let content = width - MARGINS[0] - MARGINS[1];
@@ -193,7 +183,7 @@ fn name_of(tab: InspectorTab) -> &'static str {
     TABS.iter().find(|(other, ..)| *other == tab).map_or("", |(_, name, _)| name)
 }
 
-fn show_tabs(ui: &mut Ui, state: &PanelState, [width, height]: [f32; 2], execute: &mut dyn FnMut(Command)) {
+fn show_tabs(ui: &mut Ui, state: &PanelState, [width, height]: [f32; 2], execute: Execute) {
     let shown = state.visible.inspector.tab(&state.room);
     let count = tabs(&state.room).count() as f32;
     let measured = state.controls.measures().len();

@@ -3,7 +3,7 @@
 use super::colours::{self, EDGE};
 use super::names::{self, Tell};
 use super::widgets::{row_of, switch};
-use super::{PanelState, ROW_HEIGHT, TEXT_SIZE, tools};
+use super::{Execute, PanelState, ROW_HEIGHT, TEXT_SIZE, tools};
 use crate::command::{Command, Effect, LabelCommand, Tool};
 use crate::scene::MeasureKind;
 use crate::texts;
@@ -18,7 +18,7 @@ const EFFECTS: [((Effect, &str), &str); 4] = [
 ];
 
 /// Shows, while the tool for labels is selected, what it does, the brush, and the labels.
-pub(super) fn show(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+pub(super) fn show(ui: &mut Ui, state: &PanelState, width: f32, execute: Execute) {
     let is_chosen = state.controls.tool() == Tool::Labels;
     let Some(labels) = state.controls.labelling().filter(|_| is_chosen) else { return };
     names::group(ui, texts::LABELS, |ui| {

@@ -4,7 +4,7 @@ use super::colours::{ACCENT, FAULT, PANEL, TEXT, WEAK_TEXT};
 use super::names::{self, Tell};
 use super::overlays::LOW_WINDOW;
 use super::walking::Walk;
-use super::{SMALL_TEXT, TOUCH_SIZE, heading};
+use super::{Execute, SMALL_TEXT, TOUCH_SIZE, heading};
 use crate::command::Command;
 use crate::progress_lines::Progress;
 use crate::texts;
@@ -45,7 +45,7 @@ struct List<'a> {
 }
 
 /// Shows the list of files to open.
-pub(super) fn show_files(ui: &Ui, files: &FilesShown, execute: &mut dyn FnMut(Command)) {
+pub(super) fn show_files(ui: &Ui, files: &FilesShown, execute: Execute) {
     let line = match files.typed {
         Some((_, Some(fault))) => (fault, FAULT),
         Some((_, None)) => (texts::HOW_TO_TYPE_A_PATH, WEAK_TEXT),
@@ -73,7 +73,7 @@ pub(super) fn show_files(ui: &Ui, files: &FilesShown, execute: &mut dyn FnMut(Co
 }
 
 /// Shows the list of export formats. `running`: name and progress of the running export.
-pub(super) fn show_exports(ui: &Ui, running: Option<(&str, Option<Progress>)>, execute: &mut dyn FnMut(Command)) {
+pub(super) fn show_exports(ui: &Ui, running: Option<(&str, Option<Progress>)>, execute: Execute) {
     let about = match running {
         Some((name, Some(progress))) => texts::is_exported_so_far(name, progress.done, progress.of),
         Some((name, None)) => texts::is_being_exported(name),
@@ -82,7 +82,7 @@ pub(super) fn show_exports(ui: &Ui, running: Option<(&str, Option<Progress>)>, e
     let close = (texts::CLOSE_EXPORT_HINT, Command::Exports);
     let list = List { title: texts::EXPORT, about: &about, typed: None, line: None, headings: &[], close, empty: "" };
     let entries = FORMATS.iter().map(|format| (format.name, format.hint));
-    let cancel = |ui: &mut Ui, execute: &mut dyn FnMut(Command)| {
+    let cancel = |ui: &mut Ui, execute: Execute| {
         let hint = texts::CANCEL_EXPORT_HINT;
         if running.is_some() && ui.button(texts::CANCEL_EXPORT).tell(hint).clicked() {
             execute(Command::CancelExport);
@@ -111,9 +111,9 @@ impl List<'_> {
         &self,
         ui: &Ui,
         entries: impl ExactSizeIterator<Item = (&'a str, &'a str)>,
-        choose: impl Fn(usize, &mut dyn FnMut(Command)),
-        more: impl Fn(&mut Ui, &mut dyn FnMut(Command)),
-        execute: &mut dyn FnMut(Command),
+        choose: impl Fn(usize, Execute),
+        more: impl Fn(&mut Ui, Execute),
+        execute: Execute,
     ) {
         let screen = ui.ctx().content_rect();
         let area =

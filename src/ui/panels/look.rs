@@ -3,7 +3,7 @@
 use super::colours::{self, EDGE, ON_SELECTED, OUTLINE, TEXT};
 use super::names::{self, Tell};
 use super::widgets::{absent, front, row_of, slider, switch};
-use super::{PanelState, ROW_HEIGHT, heading, tools};
+use super::{Execute, PanelState, ROW_HEIGHT, heading, tools};
 use crate::command::Command;
 use crate::scene::Slider as Control;
 use crate::scene::{ColourMap, Group, Mode, Settings, Transfer, TransferName};
@@ -26,50 +26,26 @@ const FRONT: [(&str, &[&str]); 6] = [
     (texts::DEPTH, &["start_depth"]),
 ];
 
-/// Colours of what is shown: of a volume those of its transfer function, of other modes those of the picture.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Colour {
-    Transfer(TransferName),
-    Map(ColourMap),
-}
-
-const OF_VOLUME: [(Colour, &str); 6] = [
-    (Colour::Transfer(TransferName::Grey), texts::GREY),
-    (Colour::Transfer(TransferName::Sepia), texts::SEPIA),
-    (Colour::Transfer(TransferName::Skin), texts::SKIN),
-    (Colour::Transfer(TransferName::Bone), texts::BONE),
-    (Colour::Transfer(TransferName::Cool), texts::COOL),
-    (Colour::Transfer(TransferName::Warm), texts::WARM),
+/// The transfer functions of a volume, which give it colours and opacities.
+const TRANSFERS: [(TransferName, &str); 6] = [
+    (TransferName::Grey, texts::GREY),
+    (TransferName::Sepia, texts::SEPIA),
+    (TransferName::Skin, texts::SKIN),
+    (TransferName::Bone, texts::BONE),
+    (TransferName::Cool, texts::COOL),
+    (TransferName::Warm, texts::WARM),
 ];
 
-const OF_PICTURE: [(Colour, &str); 5] = [
-    (Colour::Map(ColourMap::None), texts::AS_IS),
-    (Colour::Map(ColourMap::Grey), texts::GREY),
-    (Colour::Map(ColourMap::Sepia), texts::SEPIA),
-    (Colour::Map(ColourMap::Skin), texts::SKIN),
-    (Colour::Map(ColourMap::Ice), texts::ICE),
+const OF_PICTURE: [(Command, &str); 5] = [
+    (Command::ColourMap(ColourMap::None), texts::AS_IS),
+    (Command::ColourMap(ColourMap::Grey), texts::GREY),
+    (Command::ColourMap(ColourMap::Sepia), texts::SEPIA),
+    (Command::ColourMap(ColourMap::Skin), texts::SKIN),
+    (Command::ColourMap(ColourMap::Ice), texts::ICE),
 ];
-
-/// Whose opacities a volume has: those of its own function, or of another.
-const OPACITIES: [(Option<TransferName>, &str); 7] = [
-    (None, texts::SAME_AS_COLOUR),
-    (Some(TransferName::Grey), texts::GREY),
-    (Some(TransferName::Sepia), texts::SEPIA),
-    (Some(TransferName::Skin), texts::SKIN),
-    (Some(TransferName::Bone), texts::BONE),
-    (Some(TransferName::Cool), texts::COOL),
-    (Some(TransferName::Warm), texts::WARM),
-];
-
-fn colours(settings: &Settings) -> &'static [(Colour, &'static str)] {
-    match settings.mode {
-        Mode::Volume | Mode::Mixed => &OF_VOLUME,
-        _ => &OF_PICTURE,
-    }
-}
 
 /// Shows this tab of the inspector, `width` points wide.
-pub(super) fn show(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+pub(super) fn show(ui: &mut Ui, state: &PanelState, width: f32, execute: Execute) {
     let settings = state.controls.settings();
     let modes = RENDERED.map(|mode| (mode, mode.title()));
     let of_mode = |mode| settings.mode == mode;
@@ -145,7 +121,7 @@ pub(super) fn show(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dy
 }
 
 /// Where a rendering is seen from.
-fn views(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+fn views(ui: &mut Ui, state: &PanelState, width: f32, execute: Execute) {
     let is_there = |v| state.scene.is_some_and(|scene| view::is_seen_from(scene, v));
     let views = names::VIEWPOINTS;
     row_of(ui, texts::VIEW_FROM, &views, (4, width), is_there, hints::of_viewpoint, |v| execute(Command::LookFrom(v)));
@@ -155,24 +131,24 @@ fn views(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Co
     }
 }
 
-fn show_colours(ui: &mut Ui, settings: &Settings, width: f32, execute: &mut dyn FnMut(Command)) {
+/// Shows the colours: of a volume those of its transfer function, and whose opacities it has; of other modes those of the picture.
+fn show_colours(ui: &mut Ui, settings: &Settings, width: f32, execute: Execute) {
+    let is_volume = matches!(settings.mode, Mode::Volume | Mode::Mixed);
+    let of_volume = TRANSFERS.map(|(transfer, name)| (Command::Transfer(transfer), name));
     let is_chosen = |colour| match colour {
-        Colour::Transfer(name) => match settings.volume.colour {
+        Command::Transfer(name) => match settings.volume.colour {
             Some(colour) => colour == name,
             None => settings.volume.transfer == Transfer::Named(name),
         },
-        Colour::Map(map) => settings.post.colour_map == map,
+        colour => colour == Command::ColourMap(settings.post.colour_map),
     };
-    let hint = |_| texts::COLOUR_HINT;
-    row_of(ui, texts::COLOUR, colours(settings), (3, width), is_chosen, hint, |colour| match colour {
-        Colour::Transfer(name) => execute(Command::Transfer(name)),
-        Colour::Map(map) => execute(Command::ColourMap(map)),
-    });
-    if matches!(settings.mode, Mode::Volume | Mode::Mixed) {
-        let is_chosen = |name| settings.volume.opacity == name;
-        let hint = |_| texts::OPACITY_OF_HINT;
-        let select = |name| execute(Command::Opacity(name));
-        row_of(ui, texts::OPACITY_OF, &OPACITIES, (4, width), is_chosen, hint, select);
+    let colours = if is_volume { &of_volume[..] } else { &OF_PICTURE };
+    row_of(ui, texts::COLOUR, colours, (3, width), is_chosen, |_| texts::COLOUR_HINT, &mut *execute);
+    if is_volume {
+        let mut opacities = vec![(Command::Opacity(None), texts::SAME_AS_COLOUR)];
+        opacities.extend(TRANSFERS.map(|(transfer, name)| (Command::Opacity(Some(transfer)), name)));
+        let is_chosen = |opacity| opacity == Command::Opacity(settings.volume.opacity);
+        row_of(ui, texts::OPACITY_OF, &opacities, (4, width), is_chosen, |_| texts::OPACITY_OF_HINT, execute);
     }
 }
 
@@ -180,7 +156,7 @@ fn show_colours(ui: &mut Ui, settings: &Settings, width: f32, execute: &mut dyn 
 const BALL: f32 = 68.0;
 
 /// A ball under the lamp, which a drag on it moves.
-fn light_ball(ui: &mut Ui, settings: &Settings, execute: &mut dyn FnMut(Command)) {
+fn light_ball(ui: &mut Ui, settings: &Settings, execute: Execute) {
     let (area, response) = ui.allocate_exact_size(vec2(BALL, BALL), Sense::DRAG);
     let light = settings.light.position.unwrap_or(settings.light.direction).normalize_or(glam::DVec3::Z);
     response.widget_info(|| WidgetInfo::labeled(WidgetType::Image, true, texts::LIGHT_BALL));

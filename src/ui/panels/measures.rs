@@ -1,9 +1,11 @@
 //! Measuring: its tools, the list of results, and the measurements over the picture.
 
+use super::canvas::Canvas;
 use super::colours::{ACCENT, BACKING, MEASURE, OUTLINE, TEXT, WARNING, WEAK_TEXT};
 use super::names::{self, Tell};
 use super::overlays::first;
-use super::{PanelState, ROW_HEIGHT, SMALL_TEXT, ShownPicture, TEXT_SIZE, heading, icons, picture_rect, rail, shown};
+use super::widgets::say_step;
+use super::{Execute, PanelState, ROW_HEIGHT, SMALL_TEXT, ShownPicture, TEXT_SIZE, heading, icons, rail};
 use crate::command::{Command, Effect, Tool};
 use crate::measure::outcome::{self, Quantity};
 use crate::measure::overlay::{self, Drawn};
@@ -31,7 +33,7 @@ const CROSS: f32 = 5.0;
 const HEAD: f64 = 12.0;
 
 /// Shows the buttons of the measuring tools, in rows `width` points wide.
-pub(super) fn show_tools(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+pub(super) fn show_tools(ui: &mut Ui, state: &PanelState, width: f32, execute: Execute) {
     names::group(ui, texts::MEASURE, |ui| {
         ui.add_space(2.0);
         for row in MEASURING.chunks(3) {
@@ -44,7 +46,7 @@ pub(super) fn show_tools(ui: &mut Ui, state: &PanelState, width: f32, execute: &
 }
 
 /// Shows the buttons of the tools for texts, arrows and body marks.
-pub(super) fn show_marks(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+pub(super) fn show_marks(ui: &mut Ui, state: &PanelState, width: f32, execute: Execute) {
     names::group(ui, texts::TAB_MARKS, |ui| {
         ui.add_space(2.0);
         let size = vec2((width - 2.0 * ui.spacing().item_spacing.x) / 3.0, ROW_HEIGHT);
@@ -62,14 +64,7 @@ pub(super) fn show_marks(ui: &mut Ui, state: &PanelState, width: f32, execute: &
     });
 }
 
-fn kind_button(
-    ui: &mut Ui,
-    state: &PanelState,
-    kind: MeasureKind,
-    name: &str,
-    size: egui::Vec2,
-    execute: &mut dyn FnMut(Command),
-) {
+fn kind_button(ui: &mut Ui, state: &PanelState, kind: MeasureKind, name: &str, size: egui::Vec2, execute: Execute) {
     let (command, is_on) = match kind {
         MeasureKind::Threshold => (Command::MeasureBody, false),
         kind => (Command::Tool(Tool::Measure(kind)), state.controls.tool() == Tool::Measure(kind)),
@@ -82,7 +77,7 @@ fn kind_button(
 }
 
 /// Shows the list of results, `width` points wide, or a line that says that there are none.
-pub(super) fn show_results(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+pub(super) fn show_results(ui: &mut Ui, state: &PanelState, width: f32, execute: Execute) {
     let measures = state.controls.measures();
     let is_measuring = matches!(state.controls.tool(), Tool::Measure(_));
     if measures.is_empty() && state.controls.work().is_none() && !is_measuring {
@@ -92,7 +87,7 @@ pub(super) fn show_results(ui: &mut Ui, state: &PanelState, width: f32, execute:
     names::group(ui, texts::MEASUREMENTS, |ui| results(ui, state, width, execute));
 }
 
-fn results(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+fn results(ui: &mut Ui, state: &PanelState, width: f32, execute: Execute) {
     let measures = state.controls.measures();
     heading(ui, texts::MEASUREMENTS);
     if let Tool::Measure(kind) = state.controls.tool() {
@@ -164,43 +159,16 @@ fn results(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(
 }
 
 fn say_next_step(ui: &mut Ui, state: &PanelState, kind: MeasureKind) {
-    let step = next_step(state, kind);
-    names::group(ui, step, |ui| {
-        names::announce(ui, step, false);
-        ui.add(Label::new(RichText::new(step).size(SMALL_TEXT).color(ACCENT)).wrap());
-    });
-}
-
-/// What to do next with a tool.
-fn next_step(state: &PanelState, kind: MeasureKind) -> &'static str {
-    if state.controls.typing().is_some() {
-        return texts::STEP_TYPE;
-    }
     let work = state.controls.work().filter(|work| work.kind == kind);
     let set = work.map_or(0, |work| work.points.len());
     let has_contours = work.is_some_and(|work| !work.contours.is_empty());
-    match (kind, set) {
-        (MeasureKind::Distance | MeasureKind::Surface, 0) => texts::STEP_FIRST_END,
-        (MeasureKind::Distance | MeasureKind::Surface, _) => texts::STEP_OTHER_END,
-        (MeasureKind::Angle, 0) => texts::STEP_FIRST_LEG,
-        (MeasureKind::Angle, 1) => texts::STEP_VERTEX,
-        (MeasureKind::Angle, _) => texts::STEP_OTHER_LEG,
-        (MeasureKind::Ellipse, 0) => texts::STEP_LONG_AXIS,
-        (MeasureKind::Ellipse, 1) => texts::STEP_LONG_AXIS_END,
-        (MeasureKind::Ellipse, _) => texts::STEP_SHORT_AXIS,
-        (MeasureKind::Volume, 0) if has_contours => texts::STEP_NEXT_CONTOUR,
-        (MeasureKind::Trace | MeasureKind::Volume, 0) => texts::STEP_OUTLINE,
-        (MeasureKind::Trace | MeasureKind::Volume, _) => texts::STEP_CLOSE_OUTLINE,
-        (MeasureKind::Text, _) => texts::STEP_TEXT,
-        (MeasureKind::Arrow, 0) => texts::STEP_ARROW_TIP,
-        (MeasureKind::Arrow, _) => texts::STEP_LONG_AXIS_END,
-        (MeasureKind::Threshold, _) => "",
-    }
+    let is_typing = state.controls.typing().is_some();
+    say_step(ui, if is_typing { texts::STEP_TYPE } else { hints::of_step(kind, set, has_contours) }, ACCENT);
 }
 
 /// Draws measurements and annotations, and the contour of a cut in progress, over the picture.
 pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
-    let Some((ShownPicture { scene, volume, .. }, picture)) = shown(state, scale) else { return };
+    let Some((ShownPicture { scene, volume, .. }, canvas)) = Canvas::of(ui, state, scale) else { return };
     let (measures, outline) = (state.controls.measures(), state.controls.outline());
     let effect = state.controls.labelling().map(|labels| labels.effect);
     let is_brush = match state.controls.tool() {
@@ -212,9 +180,7 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
     if is_empty {
         return;
     }
-    let in_sight = picture_rect(state, scale);
-    let painter = ui.ctx().layer_painter(egui::LayerId::background()).with_clip_rect(in_sight);
-    let canvas = Canvas { painter, origin: picture.min, scale };
+    let hover = ui.ctx().pointer_hover_pos().filter(|at| canvas.painter.clip_rect().contains(*at));
     for mut drawn in overlay::drawn(scene, Some(*volume), measures) {
         if state.controls.typing() == Some(drawn.index) {
             drawn.label.push('_');
@@ -222,11 +188,10 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
         canvas.draw(&drawn);
     }
     if is_brush {
-        let hover = ui.ctx().pointer_hover_pos().filter(|at| in_sight.contains(*at));
         let place = outline.last().map(|at| canvas.at(*at)).or(hover);
         // On a plane in its scale.
         let on_plane = place.and_then(|at| {
-            let pixel: [f32; 2] = ((at - picture.min) * scale).into();
+            let pixel: [f32; 2] = ((at - canvas.origin) * scale).into();
             let [x, y] = pixel.map(|n| n.max(0.0) as usize);
             scene.cuts_planes().then(|| scene.tiling().tile_at(x, y).map(|tile| tile.pixel)).flatten()
         });
@@ -246,8 +211,7 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
         canvas.lines(&canvas.painter, &ends.map(|ends| ends.map(|at| canvas.at(at))).collect::<Vec<_>>(), MEASURE);
     }
     if let Some(work) = state.controls.work() {
-        let hover = ui.ctx().pointer_hover_pos().filter(|at| in_sight.contains(*at));
-        let hover = hover.and_then(|at| place_at(scene, ((at - picture.min) * scale).into()));
+        let hover = hover.and_then(|at| place_at(scene, ((at - canvas.origin) * scale).into()));
         let hover = hover.filter(|_| !work.on_surface);
         let is_curved = hover.is_some_and(|(_, is_curved)| is_curved);
         overlay::preview(scene, measures.len() + 1, work, hover.map(|(point, _)| point), is_curved)
@@ -267,21 +231,7 @@ fn place_at(scene: &Scene, at: [f32; 2]) -> Option<([f64; 3], bool)> {
     Some((scene.point_of(tiling.point(tile, at)), tile.section.is_some()))
 }
 
-struct Canvas {
-    painter: Painter,
-    /// Upper left corner of the picture, points.
-    origin: Pos2,
-    /// Pixels per point.
-    scale: f32,
-}
-
 impl Canvas {
-    fn at(&self, [x, y]: [f64; 2]) -> Pos2 {
-        // Far outside of the picture a coordinate of any size would do.
-        let near = |v: f64| (v / f64::from(self.scale)).clamp(-1e5, 1e5) as f32;
-        self.origin + vec2(near(x), near(y))
-    }
-
     /// A dark edge along the bright line is visible on any picture.
     fn lines(&self, painter: &Painter, strokes: &[[Pos2; 2]], colour: Color32) {
         for stroke in [Stroke::new(3.5, OUTLINE), Stroke::new(1.5, colour)] {
@@ -291,9 +241,7 @@ impl Canvas {
 
     fn draw(&self, drawn: &Drawn) {
         let [corner, size] = drawn.tile;
-        let end = [corner[0] + size[0], corner[1] + size[1]];
-        let area = Rect::from_min_max(self.at(corner), self.at(end));
-        let painter = self.painter.with_clip_rect(area.intersect(self.painter.clip_rect()));
+        let painter = self.within(corner, size);
         let mut strokes: Vec<[Pos2; 2]> = Vec::new();
         for line in &drawn.lines {
             strokes.extend(line.windows(2).map(|ends| [self.at(ends[0]), self.at(ends[1])]));

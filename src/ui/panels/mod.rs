@@ -7,6 +7,7 @@
 mod annotations;
 mod bar;
 mod body_marks;
+mod canvas;
 pub(super) mod colours;
 mod compared;
 mod curve;
@@ -58,10 +59,16 @@ pub use egui::accesskit;
 use egui::accesskit::{ActionRequest, TreeUpdate};
 use egui::{
     CornerRadius, Event, FontData, FontDefinitions, FontFamily, FontId, Modifiers as EguiModifiers, MouseWheelUnit,
-    PointerButton, Pos2, Rect, Stroke, TextStyle, Theme, TouchPhase, pos2, vec2,
+    PointerButton, Pos2, Rect, Stroke, TextStyle, TextureId, Theme, TouchPhase, pos2, vec2,
 };
 use std::sync::Arc;
 use std::time::Duration;
+
+/// Takes the commands that panels give.
+type Execute<'a> = &'a mut dyn FnMut(Command);
+
+/// Pictures of tiles on the device, as far as they are made.
+type Pictures<'a> = &'a [Option<TextureId>];
 
 /// The result of a layout of the panels.
 pub(super) struct PanelOutput {

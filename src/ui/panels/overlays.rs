@@ -7,8 +7,8 @@ use super::colours::{
 };
 use super::names::{self, Tell};
 use super::widgets::{BETWEEN_MESSAGES, MESSAGE_EDGES, message_frame};
-use super::{LARGE_TEXT, Note, PanelState, SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE, picture_rect};
-use crate::command::{self, Command};
+use super::{Execute, LARGE_TEXT, Note, PanelState, SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE, picture_rect};
+use crate::command::Command;
 use crate::texts::keys;
 use crate::texts::{self, Unsaved};
 use egui::accesskit::Role;
@@ -313,45 +313,25 @@ fn small(ui: &mut Ui, text: String, colour: Color32) {
     ui.label(RichText::new(text).size(SMALL_TEXT).color(colour));
 }
 
-/// Gestures on the picture, for the help.
-const GESTURES: [(&str, &str); 17] = [
-    (texts::DRAG_GESTURE, texts::DRAG_DOES),
-    (texts::SHIFT_DRAG, texts::SHIFT_DRAG_DOES),
-    (texts::CTRL_DRAG, texts::CTRL_DRAG_DOES),
-    (texts::WHEEL, texts::WHEEL_DOES),
-    (texts::TWO_FINGERS, texts::TWO_FINGERS_DO),
-    (texts::DOUBLE_CLICK, texts::DOUBLE_CLICK_DOES),
-    (texts::REGION_DRAG, texts::REGION_DRAG_DOES),
-    (texts::START_LINE_CLICK, texts::START_LINE_CLICK_DOES),
-    (texts::REGION_DRAG_ON_PLANE, texts::REGION_DRAG_ON_PLANE_DOES),
-    (texts::LIGHT_BALL_DRAG, texts::LIGHT_BALL_DRAG_DOES),
-    (texts::CLIP_DRAG, texts::CLIP_DRAG_DOES),
-    (texts::CUT_DRAG, texts::CUT_DRAG_DOES),
-    (texts::BRUSH_DRAG, texts::BRUSH_DRAG_DOES),
-    (texts::PLANES_CLICK, texts::PLANES_CLICK_DOES),
-    (texts::CURVE_CLICKS, texts::CURVE_CLICKS_DO),
-    (texts::CURVE_DRAG, texts::CURVE_DRAG_DOES),
-    (texts::BODY_MARK_DRAG, texts::BODY_MARK_DRAG_DOES),
-];
-
-/// A line of the help: keys or gesture, and what it does.
-type HelpLine = (String, String);
-
-/// The groups of the help. All of it has to fit one page.
-fn groups(exit_key: &str, has_keyboard_pointer: bool) -> Vec<(&'static str, Vec<HelpLine>)> {
-    let in_table = command::help().map(|(key, label)| (key, label.to_string()));
-    let exit = (!exit_key.is_empty()).then(|| (exit_key.to_string(), texts::QUIT.to_string()));
-    let pairs = |of: &[(&str, &str)]| of.iter().map(|(key, label)| (key.to_string(), label.to_string())).collect();
-    let of_pointer: Vec<HelpLine> = if has_keyboard_pointer { pairs(&keys::POINTER_KEYS) } else { Vec::new() };
-    let groups = [
-        (keys::BY_KEYBOARD, of_pointer),
-        (texts::KEYS, in_table.chain(exit).collect()),
-        (texts::GESTURES, pairs(&GESTURES)),
-    ];
-    groups.into_iter().filter(|(_, lines)| !lines.is_empty()).collect()
+/// The rows of the help. All of them have to fit one page.
+fn help_rows(exit_key: &str, has_keyboard_pointer: bool) -> Vec<HelpRow> {
+    let line = |(key, does): (&str, &'static str)| HelpRow::Line(key.into(), does);
+    let mut rows = Vec::new();
+    if has_keyboard_pointer {
+        rows.push(HelpRow::Heading(keys::BY_KEYBOARD));
+        rows.extend(keys::POINTER_KEYS.map(line));
+    }
+    rows.push(HelpRow::Heading(texts::KEYS));
+    rows.extend(keys::help().map(|(key, does)| HelpRow::Line(key, does)));
+    if !exit_key.is_empty() {
+        rows.push(line((exit_key, texts::QUIT)));
+    }
+    rows.push(HelpRow::Heading(texts::GESTURES));
+    rows.extend(texts::GESTURES_OF_HELP.map(line));
+    rows
 }
 
-pub(super) fn show_help(ui: &mut Ui, state: &PanelState, execute: &mut dyn FnMut(Command)) {
+pub(super) fn show_help(ui: &mut Ui, state: &PanelState, execute: Execute) {
     let screen = ui.ctx().content_rect();
     let mut is_closed = false;
     Area::new(Id::new("help")).order(Order::Foreground).anchor(Align2::CENTER_CENTER, vec2(0.0, 0.0)).show(
@@ -379,7 +359,7 @@ pub(super) fn show_help(ui: &mut Ui, state: &PanelState, execute: &mut dyn FnMut
                     });
                 });
                 let height = (screen.height() - 110.0).max(0.0);
-                let lines = lines_of(&groups(state.exit_key, state.keyboard_pointer.is_some()));
+                let lines = help_rows(state.exit_key, state.keyboard_pointer.is_some());
                 ScrollArea::vertical().max_height(height).min_scrolled_height(height).show(ui, |ui| {
                     let columns = ((width / 330.0) as usize).clamp(1, 3);
                     let each = lines.len().div_ceil(columns).max(1);
@@ -406,20 +386,14 @@ const MIN_HELP_TEXT: f32 = 11.0;
 /// A row of the help.
 enum HelpRow {
     Heading(&'static str),
-    Line(HelpLine),
-}
-
-fn lines_of(groups: &[(&'static str, Vec<HelpLine>)]) -> Vec<HelpRow> {
-    let rows = groups.iter().flat_map(|(name, lines)| {
-        std::iter::once(HelpRow::Heading(name)).chain(lines.iter().cloned().map(HelpRow::Line))
-    });
-    rows.collect()
+    /// Keys or a gesture, and what they do.
+    Line(String, &'static str),
 }
 
 fn help_line(ui: &mut Ui, row: &HelpRow, size: f32) {
     match row {
         HelpRow::Heading(name) => _ = ui.label(RichText::new(*name).size(size).color(WEAK_TEXT)),
-        HelpRow::Line((key, label)) => {
+        HelpRow::Line(key, label) => {
             ui.horizontal(|ui| {
                 let width = (ui.available_width() * 0.4).min(190.0);
                 let key = egui::Label::new(RichText::new(key).color(ACCENT).size(size)).truncate();
@@ -431,7 +405,7 @@ fn help_line(ui: &mut Ui, row: &HelpRow, size: f32) {
                         ui.add(key);
                     },
                 );
-                ui.add(egui::Label::new(RichText::new(label).size(size)).truncate()).on_hover_text(label);
+                ui.add(egui::Label::new(RichText::new(*label).size(size)).truncate()).on_hover_text(*label);
             });
         }
     }
@@ -446,7 +420,7 @@ pub(super) fn first<'a>(text: RichText) -> Button<'a> {
 pub(super) const LOW_WINDOW: f32 = 360.0;
 
 /// Shows the question whether to save what would be lost when the program ends.
-pub(super) fn ask_to_leave(ui: &Ui, unsaved: &Unsaved, execute: &mut dyn FnMut(Command)) {
+pub(super) fn ask_to_leave(ui: &Ui, unsaved: &Unsaved, execute: Execute) {
     let screen = ui.ctx().content_rect();
     // Nothing behind it reacts.
     let shade = Area::new(Id::new("shade")).order(Order::Foreground).fixed_pos(screen.min);
@@ -536,11 +510,15 @@ mod tests {
 
     #[test]
     fn the_help_has_every_key_and_gesture() {
-        let count = |groups: &[(&str, Vec<HelpLine>)]| groups.iter().map(|(_, lines)| lines.len()).sum::<usize>();
-        assert_eq!(count(&groups("", false)), command::help().count() + GESTURES.len());
-        let first = groups("Ctrl+Alt+Q", true).swap_remove(0);
-        assert_eq!((first.0, first.1.len()), (keys::BY_KEYBOARD, keys::POINTER_KEYS.len()), "while it is on");
-        assert!(groups("Ctrl+Alt+Q", false)[0].1.iter().any(|(key, _)| key == "Ctrl+Alt+Q"));
+        let is_line = |row: &&HelpRow| matches!(row, HelpRow::Line(..));
+        let all = help_rows("", false);
+        assert_eq!(all.iter().filter(is_line).count(), keys::help().count() + texts::GESTURES_OF_HELP.len());
+        let on = help_rows("Ctrl+Alt+Q", true);
+        assert!(matches!(on[0], HelpRow::Heading(keys::BY_KEYBOARD)), "while it is on");
+        assert_eq!(on[1..].iter().take_while(is_line).count(), keys::POINTER_KEYS.len(), "while it is on");
+        let off = help_rows("Ctrl+Alt+Q", false);
+        let mut of_keys = off[1..].iter().take_while(is_line);
+        assert!(of_keys.any(|row| matches!(row, HelpRow::Line(key, _) if key == "Ctrl+Alt+Q")));
     }
 
     #[test]

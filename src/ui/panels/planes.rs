@@ -2,7 +2,7 @@
 
 use super::names::{self, Tell};
 use super::widgets::{row_of, slider, switch};
-use super::{PanelState, ROW_HEIGHT, SMALL_TEXT, tools};
+use super::{Execute, PanelState, ROW_HEIGHT, SMALL_TEXT, tools};
 use crate::command::Command;
 use crate::scene::{Group, Mode, PlaneName};
 use crate::sliders::SLIDERS;
@@ -11,7 +11,7 @@ use egui::{Button, Label, RichText, Ui, vec2};
 
 const PLANES: [(PlaneName, &str); 3] = [(PlaneName::A, "A"), (PlaneName::B, "B"), (PlaneName::C, "C")];
 
-pub(super) fn show(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+pub(super) fn show(ui: &mut Ui, state: &PanelState, width: f32, execute: Execute) {
     let settings = state.controls.settings();
     let has_planes = settings.mode.is_flat() || settings.layout.has_planes();
     tools::curve(ui, state, width, execute);

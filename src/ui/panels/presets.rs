@@ -4,7 +4,7 @@ use super::colours::{ACCENT, BACKGROUND, BUTTON, EDGE, FAULT, PANEL, TEXT, UNCOL
 use super::names::{self, Tell};
 use super::overlays::{LOW_WINDOW, first};
 use super::walking::Walk;
-use super::{PanelState, ROW_HEIGHT, SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE};
+use super::{Execute, PanelState, Pictures, ROW_HEIGHT, SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE};
 use crate::command::Command;
 use crate::picture::Picture;
 use crate::texts;
@@ -82,13 +82,7 @@ const ROWS: usize = 2;
 const SMALL_NAME: f32 = 16.0;
 
 /// Shows presets as thumbnails, and a button that opens the list in which presets are saved, renamed and deleted. `textures`: the thumbnails.
-pub(super) fn show_strip(
-    ui: &mut Ui,
-    state: &PanelState,
-    textures: &[Option<TextureId>],
-    width: f32,
-    execute: &mut dyn FnMut(Command),
-) {
+pub(super) fn show_strip(ui: &mut Ui, state: &PanelState, textures: Pictures, width: f32, execute: Execute) {
     names::group(ui, texts::QUICK_LOOKS, |ui| {
         ui.horizontal(|ui| {
             ui.label(RichText::new(texts::LOOKS).size(SMALL_TEXT).color(WEAK_TEXT));
@@ -133,7 +127,7 @@ pub(super) fn show_strip(
 }
 
 /// The looks by their names, where no pictures are made.
-fn names_of_looks(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+fn names_of_looks(ui: &mut Ui, state: &PanelState, width: f32, execute: Execute) {
     let size = vec2((width - 12.0) / 3.0, ROW_HEIGHT);
     let all: Vec<(usize, &PresetTile)> = state.looks.iter().enumerate().take(9).collect();
     for row in all.chunks(3) {
@@ -157,7 +151,7 @@ fn paint_picture(ui: &Ui, area: Rect, texture: Option<TextureId>) {
     }
 }
 
-pub(super) fn show(ui: &Ui, shown: &PresetsShown, textures: &[Option<TextureId>], execute: &mut dyn FnMut(Command)) {
+pub(super) fn show(ui: &Ui, shown: &PresetsShown, textures: Pictures, execute: Execute) {
     let screen = ui.ctx().content_rect();
     let area =
         Area::new(Id::new(texts::PRESETS)).order(Order::Foreground).anchor(Align2::CENTER_CENTER, vec2(0.0, 0.0));
@@ -185,7 +179,7 @@ pub(super) fn show(ui: &Ui, shown: &PresetsShown, textures: &[Option<TextureId>]
     });
 }
 
-fn header(ui: &mut Ui, shown: &PresetsShown, execute: &mut dyn FnMut(Command)) {
+fn header(ui: &mut Ui, shown: &PresetsShown, execute: Execute) {
     title(ui, shown, execute);
     if let Some(fault) = shown.fault {
         ui.add(Label::new(RichText::new(fault).size(SMALL_TEXT).color(FAULT)).truncate()).on_hover_text(fault);
@@ -193,7 +187,7 @@ fn header(ui: &mut Ui, shown: &PresetsShown, execute: &mut dyn FnMut(Command)) {
 }
 
 /// The title, and what closes the list and saves a preset; or the name that is being typed.
-fn title(ui: &mut Ui, shown: &PresetsShown, execute: &mut dyn FnMut(Command)) {
+fn title(ui: &mut Ui, shown: &PresetsShown, execute: Execute) {
     ui.horizontal_wrapped(|ui| {
         if let Some((text, is_rename)) = shown.naming {
             let about = if is_rename { texts::NEW_NAME } else { texts::NAME };
@@ -227,13 +221,7 @@ fn title(ui: &mut Ui, shown: &PresetsShown, execute: &mut dyn FnMut(Command)) {
     });
 }
 
-fn tiles(
-    ui: &mut Ui,
-    shown: &PresetsShown,
-    textures: &[Option<TextureId>],
-    width: f32,
-    execute: &mut dyn FnMut(Command),
-) {
+fn tiles(ui: &mut Ui, shown: &PresetsShown, textures: Pictures, width: f32, execute: Execute) {
     let columns = ((width + GAP) / (TILE + GAP)).floor().clamp(1.0, 3.0) as usize;
     let each = (width - GAP * (columns - 1) as f32) / columns as f32;
     ui.spacing_mut().item_spacing = vec2(GAP, GAP);
@@ -282,7 +270,7 @@ fn button(ui: &mut Ui, n: usize, tile: &PresetTile, texture: Option<TextureId>, 
 }
 
 /// What renames and deletes a preset of the user.
-fn own_buttons(ui: &mut Ui, own: usize, name: &str, width: f32, execute: &mut dyn FnMut(Command)) {
+fn own_buttons(ui: &mut Ui, own: usize, name: &str, width: f32, execute: Execute) {
     let size = vec2((width - GAP) / 2.0, BUTTONS.min(TOUCH_SIZE * 0.7));
     ui.horizontal(|ui| {
         for (command, label, hint) in [

@@ -3,7 +3,7 @@
 use super::colours::{ACCENT, BUTTON, CHOSEN, EDGE, PANEL, TEXT, WEAK_TEXT};
 use super::icons::{self, Icon};
 use super::names::{self, Tell};
-use super::{PanelState, RAIL_WIDTH, SMALL_TEXT, heading};
+use super::{Execute, PanelState, RAIL_WIDTH, SMALL_TEXT, heading};
 use crate::command::{Command, InspectorTab, Tool};
 use crate::scene::MeasureKind;
 use crate::texts;
@@ -71,7 +71,7 @@ pub(super) fn has_all(height: f32) -> bool {
     button_height(height).is_some()
 }
 
-pub(super) fn show(ui: &mut Ui, state: &PanelState, height: f32, execute: &mut dyn FnMut(Command)) {
+pub(super) fn show(ui: &mut Ui, state: &PanelState, height: f32, execute: Execute) {
     let frame = Frame::new().fill(PANEL);
     let rail = Panel::left("rail").exact_size(RAIL_WIDTH).resizable(false).show_separator_line(false).frame(frame);
     rail.show(ui, |ui| {
@@ -102,7 +102,7 @@ pub(super) fn show(ui: &mut Ui, state: &PanelState, height: f32, execute: &mut d
 }
 
 /// Shows the tools as a grid in the inspector, `width` points wide.
-pub(super) fn show_grid(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+pub(super) fn show_grid(ui: &mut Ui, state: &PanelState, width: f32, execute: Execute) {
     names::group(ui, texts::TOOLS, |ui| {
         heading(ui, texts::TOOLS);
         let columns = (width / RAIL_WIDTH).floor().max(1.0);
@@ -115,7 +115,7 @@ pub(super) fn show_grid(ui: &mut Ui, state: &PanelState, width: f32, execute: &m
     });
 }
 
-fn tool(ui: &mut Ui, state: &PanelState, place: &Place, size: Vec2, execute: &mut dyn FnMut(Command)) {
+fn tool(ui: &mut Ui, state: &PanelState, place: &Place, size: Vec2, execute: Execute) {
     let chosen = state.controls.tool();
     let is_chosen = place.tools.contains(&chosen);
     let response = button(ui, place.icon, place.name, size, is_chosen);

@@ -3,7 +3,7 @@
 use super::colours::{ACCENT, BAR, EDGE, TEXT, WHOLE_BAR};
 use super::names::{self, Tell};
 use super::widgets::{BETWEEN_MESSAGES, MESSAGE_EDGES, message_frame};
-use super::{PanelState, ROW_HEIGHT, SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE, heading, icons, picture_rect, rail};
+use super::{Execute, PanelState, ROW_HEIGHT, SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE, heading, icons, picture_rect, rail};
 use crate::command::Command;
 use crate::texts;
 use egui::accesskit::Role;
@@ -25,7 +25,7 @@ pub struct Reading {
 const CLOSE: f32 = 36.0;
 
 /// Shows the list of open recordings, if more than one is open.
-pub(super) fn show_list(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+pub(super) fn show_list(ui: &mut Ui, state: &PanelState, width: f32, execute: Execute) {
     if state.recordings.len() < 2 {
         return;
     }
@@ -87,7 +87,7 @@ pub(super) fn reading_area(state: &PanelState, scale: f32) -> Option<Rect> {
 }
 
 /// Shows the progress of the file that is being read over the picture, below the messages. Returns the height that it takes from them, points.
-pub(super) fn show_reading(ui: &mut Ui, state: &PanelState, scale: f32, execute: &mut dyn FnMut(Command)) -> f32 {
+pub(super) fn show_reading(ui: &mut Ui, state: &PanelState, scale: f32, execute: Execute) -> f32 {
     let Some(reading) = state.reading else { return 0.0 };
     let ReadingPlace { has_bar, height, width, top, is_alone } = reading_place(state, scale);
     let area = Area::new(Id::new("reading")).order(Order::Middle).pivot(Align2::CENTER_TOP).fixed_pos(top);

@@ -5,7 +5,7 @@ use super::icons;
 use super::names::{self, Tell};
 use super::overlays::LOW_WINDOW;
 use super::visible::Search;
-use super::{ROW_HEIGHT, SMALL_TEXT, TEXT_SIZE, rail};
+use super::{Execute, ROW_HEIGHT, SMALL_TEXT, TEXT_SIZE, rail};
 use crate::command::Command;
 use crate::palette::{self, Entry};
 use crate::texts;
@@ -18,7 +18,7 @@ use egui::{
 /// Most entries that are shown: more is found by another word.
 const MAX_SHOWN: usize = 60;
 
-pub(super) fn show(ui: &Ui, search: &Search, execute: &mut dyn FnMut(Command)) {
+pub(super) fn show(ui: &Ui, search: &Search, execute: Execute) {
     let screen = ui.ctx().content_rect();
     let is_low = screen.height() < LOW_WINDOW;
     let margin = if is_low { 6.0 } else { 12.0 };
@@ -56,7 +56,7 @@ pub(super) fn show(ui: &Ui, search: &Search, execute: &mut dyn FnMut(Command)) {
 }
 
 /// What is typed, and what closes the search.
-fn typed(ui: &mut Ui, search: &Search, width: f32, execute: &mut dyn FnMut(Command)) {
+fn typed(ui: &mut Ui, search: &Search, width: f32, execute: Execute) {
     ui.horizontal(|ui| {
         let size = vec2(width - ROW_HEIGHT - 8.0, ROW_HEIGHT);
         let (area, response) = ui.allocate_exact_size(size, Sense::hover());

@@ -2,7 +2,7 @@
 
 use super::names::{self, Tell};
 use super::widgets::switch;
-use super::{PanelState, ROW_HEIGHT, SMALL_TEXT, heading};
+use super::{Execute, PanelState, ROW_HEIGHT, SMALL_TEXT, heading};
 use crate::command::Command;
 use crate::scene::{Marks, ProbeMarker, Sides, VolumeAxis};
 use crate::texts;
@@ -18,7 +18,7 @@ const CHOICES: [[Option<Sides>; 4]; 2] = [
 ];
 const MARKERS: [ProbeMarker; 3] = [ProbeMarker::First, ProbeMarker::Last, ProbeMarker::Hidden];
 
-pub(super) fn show(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+pub(super) fn show(ui: &mut Ui, state: &PanelState, width: f32, execute: Execute) {
     let marks = &state.controls.settings().marks;
     let shown =
         CollapsingHeader::new(title(marks)).id_salt(texts::SIDES).default_open(true).show_unindented(ui, |ui| {

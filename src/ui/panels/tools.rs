@@ -2,15 +2,15 @@
 
 use super::colours::ACCENT;
 use super::names::{self, Tell};
-use super::widgets::{front, plain_slider, slider, switch};
-use super::{PanelState, ROW_HEIGHT, SMALL_TEXT, heading};
+use super::widgets::{add_and_remove, front, plain_slider, say_step, slider, switch};
+use super::{Execute, PanelState, ROW_HEIGHT, heading};
 use crate::command::{Command, Tool};
 use crate::controls::BRUSH_RADII;
 use crate::scene::{KeptSide, MAX_START_POINTS, MIN_START_POINTS, Settings};
 use crate::sliders::SLIDERS;
 use crate::texts;
 use crate::view;
-use egui::{Button, Label, RichText, Ui, vec2};
+use egui::{Button, RichText, Ui, vec2};
 
 /// The indices of the two sliders for faces of clip planes; None for one that does not exist with these settings.
 pub(super) fn of_clip(settings: &Settings) -> [Option<usize>; 2] {
@@ -18,7 +18,7 @@ pub(super) fn of_clip(settings: &Settings) -> [Option<usize>; 2] {
 }
 
 /// Shows, while there are clip planes, the switch for showing echoes on cut faces, and their level.
-pub(super) fn clip(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+pub(super) fn clip(ui: &mut Ui, state: &PanelState, width: f32, execute: Execute) {
     let there = of_clip(state.controls.settings());
     if there == [None; 2] {
         return;
@@ -39,7 +39,7 @@ pub(super) fn depth_of_cut(state: &PanelState) -> Option<usize> {
 
 /// Shows, while the tool for cuts is selected, which side of a contour is kept and the depth of the last cut; and, if there are cuts, a button
 /// that removes them.
-pub(super) fn cuts(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+pub(super) fn cuts(ui: &mut Ui, state: &PanelState, width: f32, execute: Execute) {
     let is_chosen = state.controls.tool() == Tool::Cut;
     let is_brush = state.controls.tool() == Tool::Brush;
     if !is_chosen && !is_brush && state.controls.settings().cuts.is_empty() {
@@ -72,7 +72,7 @@ pub(super) fn cuts(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dy
 }
 
 /// Shows, while the tool for curved planes is selected, what to do next; and, if there is a curved plane, a button that removes it.
-pub(super) fn curve(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+pub(super) fn curve(ui: &mut Ui, state: &PanelState, width: f32, execute: Execute) {
     let (is_chosen, line) = (state.controls.tool() == Tool::Curve, state.controls.line());
     let has_curve = state.controls.settings().planes.curve.is_some();
     if !is_chosen && !has_curve {
@@ -88,10 +88,7 @@ pub(super) fn curve(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut d
                 (None, true) => texts::CURVE_STEP_CHANGE,
                 (None, false) => texts::CURVE_STEP_FIRST,
             };
-            names::group(ui, step, |ui| {
-                names::announce(ui, step, false);
-                ui.add(Label::new(RichText::new(step).size(SMALL_TEXT).color(ACCENT)).wrap());
-            });
+            say_step(ui, step, ACCENT);
         }
         let size = vec2(width, ROW_HEIGHT);
         if line.is_some_and(|line| line.points.len() > 1) {
@@ -112,7 +109,7 @@ pub(super) fn curve(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut d
 
 /// Shows, while the tool for the region is selected, the switch of the start curve, the depths of its handles and their number; with other tools
 /// only the switch, if the start curve is bent.
-pub(super) fn start_line(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+pub(super) fn start_line(ui: &mut Ui, state: &PanelState, width: f32, execute: Execute) {
     let Some(scene) = state.scene.filter(|scene| scene.renders()) else { return };
     let points = state.controls.settings().region.start_curve.as_deref();
     let is_chosen = state.controls.tool() == Tool::Region;
@@ -135,32 +132,16 @@ pub(super) fn start_line(ui: &mut Ui, state: &PanelState, width: f32, execute: &
                 execute(Command::MoveStartHandle(n, [*lateral, depth]));
             }
         }
-        let half = vec2((width - ui.spacing().item_spacing.x) / 2.0, ROW_HEIGHT);
-        ui.horizontal(|ui| {
-            for (command, [word, name], is_there, hint) in [
-                (
-                    Command::AddStartHandle(None),
-                    [texts::ADD, texts::ADD_HANDLE],
-                    points.len() < MAX_START_POINTS,
-                    texts::ADD_HANDLE_HINT,
-                ),
-                (
-                    Command::RemoveStartHandle(None),
-                    [texts::REMOVE, texts::REMOVE_HANDLE],
-                    points.len() > MIN_START_POINTS,
-                    texts::REMOVE_HANDLE_HINT,
-                ),
-            ] {
-                let button = ui.add_enabled(is_there, Button::new(word).min_size(half));
-                if button.tell(hint).on_disabled_hover_text(hint).named(name).clicked() {
-                    execute(command);
-                }
-            }
-        });
+        let (count, add, remove) = (points.len(), texts::ADD_HANDLE_HINT, texts::REMOVE_HANDLE_HINT);
+        let both = [
+            (Command::AddStartHandle(None), texts::ADD_HANDLE, count < MAX_START_POINTS, add),
+            (Command::RemoveStartHandle(None), texts::REMOVE_HANDLE, count > MIN_START_POINTS, remove),
+        ];
+        add_and_remove(ui, width, both, execute);
     });
 }
 
-pub(super) fn brush_radius(ui: &mut Ui, state: &PanelState, execute: &mut dyn FnMut(Command)) {
+pub(super) fn brush_radius(ui: &mut Ui, state: &PanelState, execute: Execute) {
     let hint = texts::RADIUS_OF_BRUSH_HINT;
     if let Some(radius) = plain_slider(ui, texts::RADIUS_OF_BRUSH, state.controls.brush_radius(), BRUSH_RADII, hint) {
         execute(Command::BrushRadius(radius));

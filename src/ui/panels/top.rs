@@ -5,7 +5,7 @@ use super::icons::{self, Icon};
 use super::names::{self, Tell};
 use super::rail::{icon_button, paint};
 use super::widgets::row_of;
-use super::{PanelState, ROW_HEIGHT, TEXT_SIZE};
+use super::{Execute, PanelState, ROW_HEIGHT, TEXT_SIZE};
 use crate::command::Command;
 use crate::scene::{Layout, Mode, Settings};
 use crate::texts;
@@ -36,7 +36,7 @@ fn is_view(settings: &Settings, view: Command) -> bool {
 }
 
 /// What each button does: its icon, name, command and explanation.
-type Item = (Icon, &'static str, Command, &'static str);
+pub(super) type Item = (Icon, &'static str, Command, &'static str);
 const OPEN: Item = (icons::OPEN, texts::OPEN, Command::OpenFiles, texts::OPEN_HINT);
 const SAVE: Item = (icons::SAVE, texts::SAVE_WORKSPACE, Command::SaveWorkspace, texts::SAVE_WORKSPACE_HINT);
 const UNDO: Item = (icons::UNDO, texts::UNDO, Command::Undo, texts::UNDO_HINT);
@@ -45,7 +45,7 @@ const FIND: Item = (icons::SEARCH, texts::FIND, Command::Find, texts::FIND_HINT)
 const TIMES: Item = (icons::TIMES, texts::TIMES, Command::ToggleTimes, texts::TIMES_HINT);
 const FULL_SCREEN: Item = (icons::FULL_SCREEN, texts::FULL_SCREEN, Command::ToggleFullScreen, texts::FULL_SCREEN_HINT);
 const HELP: Item = (icons::HELP, texts::HELP, Command::ToggleHelp, texts::HELP_HINT);
-const INSPECTOR: Item = (icons::INSPECTOR, texts::INSPECTOR, Command::ToggleDrawer, texts::DRAWER_HINT);
+pub(super) const INSPECTOR: Item = (icons::INSPECTOR, texts::INSPECTOR, Command::ToggleDrawer, texts::DRAWER_HINT);
 
 /// Width of a button with its icon alone, with a text, and of the search with its text, points.
 const ICON: f32 = 38.0;
@@ -60,7 +60,7 @@ const NARROW: f32 = 760.0;
 /// Widths of a tab, points.
 const TAB: [f32; 2] = [72.0, 190.0];
 
-pub(super) fn show(ui: &mut Ui, state: &PanelState, height: f32, execute: &mut dyn FnMut(Command)) {
+pub(super) fn show(ui: &mut Ui, state: &PanelState, height: f32, execute: Execute) {
     let panel = Panel::top("top").exact_size(height).resizable(false).show_separator_line(false);
     panel.frame(Frame::new().fill(PANEL)).show(ui, |ui| {
         names::name(ui, Role::Toolbar, texts::TOP_BAR);
@@ -107,7 +107,7 @@ pub(super) fn show(ui: &mut Ui, state: &PanelState, height: f32, execute: &mut d
     });
 }
 
-fn place(row: Rect, left: f32, width: f32) -> Rect {
+pub(super) fn place(row: Rect, left: f32, width: f32) -> Rect {
     Rect::from_min_size(pos2(left, row.top()), vec2(width, row.height()))
 }
 
@@ -121,13 +121,14 @@ fn name_program(ui: &Ui, row: Rect) -> f32 {
     painter.text(at, Align2::LEFT_CENTER, texts::PROGRAM, FontId::proportional(TEXT_SIZE), TEXT).right()
 }
 
-fn show_item(
+/// Shows a button of a bar in this area. `has_text`: its name stands beside its icon.
+pub(super) fn show_item(
     ui: &mut Ui,
     state: &PanelState,
     (icon, name, command, hint): Item,
     has_text: bool,
     area: Rect,
-    execute: &mut dyn FnMut(Command),
+    execute: Execute,
 ) {
     let [can_undo, can_redo] = state.controls.can_undo();
     let is_enabled = match command {
@@ -161,7 +162,7 @@ fn short(name: &'static str) -> &'static str {
 }
 
 /// The views as parts of one button: the text on each, and its width.
-fn show_views(ui: &mut Ui, state: &PanelState, area: Rect, segments: &[(&str, f32)], execute: &mut dyn FnMut(Command)) {
+fn show_views(ui: &mut Ui, state: &PanelState, area: Rect, segments: &[(&str, f32)], execute: Execute) {
     let settings = state.controls.settings();
     ui.scope_builder(UiBuilder::new().max_rect(area), |ui| {
         names::name(ui, Role::Group, texts::VIEW);
@@ -191,7 +192,7 @@ fn show_views(ui: &mut Ui, state: &PanelState, area: Rect, segments: &[(&str, f3
 }
 
 /// The recordings that are open, as tabs, in order; those that have no room are reached by the last button.
-fn show_tabs(ui: &mut Ui, state: &PanelState, area: Rect, execute: &mut dyn FnMut(Command)) {
+fn show_tabs(ui: &mut Ui, state: &PanelState, area: Rect, execute: Execute) {
     let count = state.recordings.len();
     if count < 2 {
         let name = state.origin.or(state.recordings.first().map(|recording| recording.name.as_str()));
@@ -255,7 +256,7 @@ fn clipped(ui: &Ui, text: &str, area: Rect) {
 }
 
 /// Shows the buttons of the bar at the top in the inspector, if the window has no such bar.
-pub(super) fn show_buttons(ui: &mut Ui, state: &PanelState, width: f32, execute: &mut dyn FnMut(Command)) {
+pub(super) fn show_buttons(ui: &mut Ui, state: &PanelState, width: f32, execute: Execute) {
     if state.room.has_top {
         return;
     }

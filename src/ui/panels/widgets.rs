@@ -2,15 +2,15 @@
 
 use super::colours::{ABSENT, ACCENT, BACKGROUND, BUTTON, EDGE, MESSAGE, ON_SELECTED, SELECTED, TEXT, WEAK_TEXT};
 use super::names::{self, Tell};
-use super::{PanelState, ROW_HEIGHT, TEXT_SIZE, heading};
+use super::{Execute, PanelState, ROW_HEIGHT, SMALL_TEXT, TEXT_SIZE, heading};
 use crate::command::Command;
 use crate::scene::Settings;
 use crate::sliders::{self, SLIDERS};
 use crate::texts;
 use egui::accesskit::Role;
 use egui::{
-    Align, Button, Color32, FontId, Frame, Margin, PointerButton, Rect, RichText, Sense, Slider, Stroke, StrokeKind,
-    Ui, WidgetInfo, WidgetType, pos2, vec2,
+    Align, Button, Color32, FontId, Frame, Label, Margin, PointerButton, Rect, RichText, Sense, Slider, Stroke,
+    StrokeKind, Ui, WidgetInfo, WidgetType, pos2, vec2,
 };
 
 /// Distance between two messages, points.
@@ -34,7 +34,7 @@ pub(super) fn front(keys: &[&str], settings: &Settings) -> Option<usize> {
 }
 
 /// Shows the slider with the index `number`: name, rail, and value, which can be typed after a click.
-pub(super) fn slider(ui: &mut Ui, state: &PanelState, number: usize, name: &str, execute: &mut dyn FnMut(Command)) {
+pub(super) fn slider(ui: &mut Ui, state: &PanelState, number: usize, name: &str, execute: Execute) {
     let slider = &SLIDERS[number];
     let settings = state.controls.settings();
     let [low, high] = state.scene.map_or(slider.range, |scene| slider.range_in(scene));
@@ -195,6 +195,28 @@ pub(super) fn row_of<T: Copy>(
                 }
             });
         }
+    });
+}
+
+/// Shows two buttons side by side, one that adds and one that removes, together `width` points wide: of each its command, its name, whether it can be
+/// pressed, and its hint.
+pub(super) fn add_and_remove(ui: &mut Ui, width: f32, both: [(Command, &str, bool, &str); 2], execute: Execute) {
+    let half = vec2((width - ui.spacing().item_spacing.x) / 2.0, ROW_HEIGHT);
+    ui.horizontal(|ui| {
+        for (word, (command, name, is_enabled, hint)) in [texts::ADD, texts::REMOVE].into_iter().zip(both) {
+            let button = ui.add_enabled(is_enabled, Button::new(word).min_size(half));
+            if button.tell(hint).on_disabled_hover_text(hint).named(name).clicked() {
+                execute(command);
+            }
+        }
+    });
+}
+
+/// Shows what to do next with a tool, and announces it.
+pub(super) fn say_step(ui: &mut Ui, step: &str, colour: Color32) {
+    names::group(ui, step, |ui| {
+        names::announce(ui, step, false);
+        ui.add(Label::new(RichText::new(step).size(SMALL_TEXT).color(colour)).wrap());
     });
 }
 

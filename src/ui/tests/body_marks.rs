@@ -2,8 +2,8 @@
 
 use super::shown::Shown;
 use super::*;
-use crate::command::binding;
 use crate::input::Key;
+use crate::keys::binding;
 use crate::measure::body_marks::{centre_of, drawn, probe_of};
 use crate::panels::accesskit::{Action, Role};
 use crate::panels::colours::{BODY, MEASURE};

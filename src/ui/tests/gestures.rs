@@ -1,9 +1,10 @@
 //! Known answers for gestures of a mouse and of fingers.
 
 use super::*;
-use crate::command::{HeldKeys, Viewpoint};
+use crate::command::Viewpoint;
 use crate::gestures::DEGREES_PER_HEIGHT;
 use crate::input::Phase;
+use crate::keys::HeldKeys;
 use crate::picking::Picker;
 use crate::view::{self, face_axis, nearest_face};
 

@@ -1,9 +1,9 @@
 //! Gestures by keys alone: each does what the mouse does at the same places.
 
 use super::*;
-use crate::command::HeldKeys;
 use crate::input::Key;
 use crate::keyboard_pointer::KeyboardPointer;
+use crate::keys::HeldKeys;
 use crate::picking::Picker;
 use crate::scene::MeasureKind;
 

@@ -1,8 +1,9 @@
 //! Property tests: after any sequence of commands and inputs the settings can be drawn, and numbers are finite.
 
 use super::*;
-use crate::command::{HeldKeys, KEY_BINDINGS, Viewpoint};
+use crate::command::{KEY_BINDINGS, Viewpoint};
 use crate::input::Phase;
+use crate::keys::HeldKeys;
 use crate::scene::{Body, BodyMark, ColourMap, TransferName};
 use proptest::prelude::*;
 

@@ -2,8 +2,8 @@
 
 use super::shown::Shown;
 use super::*;
-use crate::command::binding;
 use crate::input::Key;
+use crate::keys::binding;
 use crate::panels::colours::START;
 use crate::panels::drawn::Kind;
 use crate::region_box::{StartLine, start_line};

@@ -1,7 +1,5 @@
 //! The comparison of two volumes.
 
-use std::fmt::Display;
-
 pub(crate) const COMPARISON: &str = "Comparison";
 pub(crate) const COMPARED_TILES: &str = "Tiles";
 pub(crate) const COMPARED_TILES_HINT: &str = "All pictures beside each other.";
@@ -10,12 +8,6 @@ pub(crate) const COMPARED_DIFFERENCE_HINT: &str =
     "Also their difference in brightness: orange where A is brighter, blue where B is, in levels of 255.";
 pub(crate) const COMPARED_WIPE: &str = "Wipe";
 pub(crate) const COMPARED_WIPE_HINT: &str = "One picture over the other: drag the line between them.";
-pub(crate) const FIND_TILES: &str = "Compare: all pictures beside each other";
-pub(crate) const FIND_DIFFERENCE: &str = "Compare: show the difference";
-pub(crate) const FIND_WIPE: &str = "Compare: wipe from one picture to the other";
-pub(crate) const FIND_FURTHER: &str = "Compare: add the next open recording";
-pub(crate) const FIND_ALIGN: &str = "Compare: align both volumes";
-pub(crate) const FIND_LINK_LOOK: &str = "Compare: link windows, filters and light";
 pub(crate) const WIPE_LINE: &str = "Line of the wipe";
 pub(crate) const WIPE_LINE_HINT: &str = "Drag: A is on its left, B on its right.";
 /// Stands before the names of the links.
@@ -35,9 +27,7 @@ pub(crate) const ALIGNING: &str = "Aligning";
 pub(crate) const ADD_COMPARED: &str = "Add";
 pub(crate) const ADD_COMPARED_HINT: &str = "The next open recording beside the others: up to four tiles.";
 pub(crate) const WHY_NO_FURTHER: &str = "no further recording is open";
-pub(crate) fn why_no_more_tiles(most: usize) -> String {
-    format!("there are {most} tiles, which is as many as there can be")
-}
+text!(why_no_more_tiles(most) = "there are {most} tiles, which is as many as there can be");
 pub(crate) fn moved_by([shift, angle]: [f64; 2]) -> String {
     format!(" \u{b7} moved {shift:.1} mm, {angle:.1}°")
 }
@@ -45,15 +35,12 @@ pub(crate) const END_COMPARISON: &str = "End the comparison";
 pub(crate) const END_COMPARISON_HINT: &str = "Shows A alone (P).";
 pub(crate) const NOT_DRAWN_YET: &str = "Not drawn yet";
 pub(crate) const WHY_NOTHING_TO_COMPARE: &str = "there is no whole volume yet";
-pub(crate) fn compared_as_it_was(name: impl Display) -> String {
-    format!("{name}, as it was")
-}
-pub(crate) fn not_compared(fault: impl Display) -> String {
-    format!("Not compared: {fault}")
-}
+text!(compared_as_it_was(name) = "{name}, as it was");
+text!(not_compared(fault) = "Not compared: {fault}");
 pub(crate) fn aligned([shift, angle]: [f64; 2], correlation: f64) -> String {
     format!("Aligned: B is moved by {shift:.1} mm and turned by {angle:.1}°; correlation {correlation:.2}")
 }
-pub(crate) fn hardly_aligned(correlation: f64) -> String {
-    format!("Aligned, but the volumes are hardly alike (correlation {correlation:.2}): look whether B lies on A")
-}
+text!(
+    hardly_aligned(correlation) =
+        "Aligned, but the volumes are hardly alike (correlation {correlation:.2}): look whether B lies on A"
+);

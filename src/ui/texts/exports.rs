@@ -1,7 +1,5 @@
 //! Texts about the formats of an export.
 
-use std::fmt::Display;
-
 pub(crate) const VOLUME_NRRD: &str = "Volume, NRRD";
 pub(crate) const VOLUME_NRRD_HINT: &str = "The scan-converted volume in its place, for 3D Slicer and ITK.";
 pub(crate) const VOLUME_NIFTI: &str = "Volume, NIfTI";
@@ -36,13 +34,7 @@ pub(crate) const LABELS_NRRD: &str = "Labels, .seg.nrrd";
 pub(crate) const LABELS_NRRD_HINT: &str = "What the tool Labels shows, as a segmentation of 3D Slicer.";
 pub(crate) const WHY_NO_REPORT: &str =
     "a report names the file of its volumes, and these are live: save the loop (Ctrl+R), and open it";
-pub(crate) fn why_export_not_started(e: impl Display) -> String {
-    format!("the export cannot be started: {e}")
-}
-pub(crate) fn why_export_lost(e: impl Display) -> String {
-    format!("the export was lost: {e}")
-}
+text!(why_export_not_started(e) = "the export cannot be started: {e}");
+text!(why_export_lost(e) = "the export was lost: {e}");
 pub(crate) const WHY_EXPORT_ENDED: &str = "it ended early";
-pub(crate) fn why_no_program(e: impl Display) -> String {
-    format!("this program's file is not known: {e}")
-}
+text!(why_no_program(e) = "this program's file is not known: {e}");

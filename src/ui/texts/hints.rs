@@ -86,3 +86,23 @@ pub(crate) fn of_measure(kind: MeasureKind) -> &'static str {
         MeasureKind::Arrow => "Arrow: click what it points to, then its other end, then type. (Y)",
     }
 }
+
+/// What to do next to measure: `set` points are set, and a volume has contours or none.
+pub(crate) fn of_step(kind: MeasureKind, set: usize, has_contours: bool) -> &'static str {
+    match (kind, set) {
+        (MeasureKind::Distance | MeasureKind::Surface, 0) => "Click the first end.",
+        (MeasureKind::Distance | MeasureKind::Surface, _) => "Click the other end.",
+        (MeasureKind::Angle, 0) => "Click the end of a leg.",
+        (MeasureKind::Angle, 1) => "Click the vertex.",
+        (MeasureKind::Angle, _) => "Click the end of the other leg.",
+        (MeasureKind::Ellipse, 0) => "Click one end of the long axis.",
+        (MeasureKind::Volume, 0) if has_contours => "Step or turn the plane and trace again, or press Enter.",
+        (MeasureKind::Trace | MeasureKind::Volume, 0) => "Drag round the outline on a plane.",
+        (MeasureKind::Trace | MeasureKind::Volume, _) => "Enter closes the outline.",
+        (MeasureKind::Text, _) => "Click the place of the text, or type it at the pointer. Esc leaves.",
+        (MeasureKind::Arrow, 0) => "Click what the arrow points to.",
+        (MeasureKind::Ellipse, 1) | (MeasureKind::Arrow, _) => "Click its other end.",
+        (MeasureKind::Ellipse, _) => "Click the end of the short axis.",
+        (MeasureKind::Threshold, _) => "",
+    }
+}

@@ -2,12 +2,9 @@
 
 use crate::segment::bodies::Body;
 use crate::segment::volume::Measured;
-use std::fmt::Display;
 
 pub(crate) const LABELS: &str = "Labels";
-pub(crate) fn label(number: impl Display) -> String {
-    format!("Label {number}")
-}
+text!(label(number) = "Label {number}");
 pub(crate) const PAINT: &str = "Paint";
 pub(crate) const PAINT_HINT: &str = "Drag over a plane or over the surface: the label is painted. Ctrl erases.";
 pub(crate) const ERASE: &str = "Erase";
@@ -25,9 +22,7 @@ pub(crate) const CHOOSE_LABEL_HINT: &str =
     "Click: this label is painted. Its volume is that of its voxels; growing also says what the echoes measure.";
 pub(crate) const ADD_LABEL: &str = "Add a label";
 pub(crate) const ADD_LABEL_HINT: &str = "The new label is then painted.";
-pub(crate) fn label_measured(number: usize) -> String {
-    format!("Label volume {number}")
-}
+text!(label_measured(number) = "Label volume {number}");
 pub(crate) const LABEL_MEASURED_HINT: &str =
     "The body between the contours of this measurement gets the label. Beyond the outermost contours it is closed.";
 pub(crate) const FILLING: &str = "Filling the body between the contours";
@@ -44,18 +39,10 @@ pub(crate) const STILL_AT_WORK: &str =
     "Labels are still being prepared, or a body is being searched for: wait a moment";
 pub(crate) const WHY_NO_LABELS: &str = "nothing is labelled with the tool Labels (Shift+L)";
 pub(crate) const WHY_THREAD_ENDED: &str = "the search ended early";
-pub(crate) fn no_labels(why: impl Display) -> String {
-    format!("Labels cannot be edited: {why}")
-}
-pub(crate) fn too_many_voxels(most: impl Display) -> String {
-    format!("their lattice has more than {most} voxels")
-}
-pub(crate) fn not_grown(why: impl Display) -> String {
-    format!("Nothing is labelled: {why}")
-}
-pub(crate) fn volume_of_label(volume: f64) -> String {
-    format!("{volume:.2} cm\u{b3}")
-}
+text!(no_labels(why) = "Labels cannot be edited: {why}");
+text!(too_many_voxels(most) = "their lattice has more than {most} voxels");
+text!(not_grown(why) = "Nothing is labelled: {why}");
+text!(volume_of_label(volume) = "{volume:.2} cm\u{b3}");
 pub(crate) fn grown(body: &Body) -> String {
     let cm3 = |mm3: f64| mm3 / 1000.0;
     let by_echoes = match body.measured {

@@ -1,7 +1,5 @@
 //! Texts about measuring: tools, steps and reasons why something cannot be measured.
 
-use std::fmt::Display;
-
 // Tools, results and steps.
 pub(crate) const CALIPER: &str = "Caliper";
 pub(crate) const ANGLE: &str = "Angle";
@@ -18,28 +16,13 @@ pub(crate) const CLOSE_CONTOUR: &str = "Close contour";
 pub(crate) const END_TRACING_HINT: &str = "Ends what is being traced (Enter).";
 pub(crate) const TYPE_TEXT_HINT: &str = "Click to type a text for it.";
 pub(crate) const DELETE_MEASUREMENT_HINT: &str = "Deletes it (undo brings it back).";
-pub(crate) fn delete_measurement(number: impl Display) -> String {
-    format!("Delete measurement {number}")
-}
+text!(delete_measurement(number) = "Delete measurement {number}");
 pub const COPY: &str = "Copy";
 pub(crate) const COPY_HINT: &str = "Copies all results as CSV (Ctrl+C).";
 pub(crate) const SAVE_RESULTS_HINT: &str = "Saves all results as a CSV file.";
 pub const CLEAR: &str = "Clear";
 pub(crate) const CLEAR_HINT: &str = "Deletes all (undo brings them back).";
 pub(crate) const STEP_TYPE: &str = "Type, then Enter.";
-pub(crate) const STEP_FIRST_END: &str = "Click the first end.";
-pub(crate) const STEP_OTHER_END: &str = "Click the other end.";
-pub(crate) const STEP_FIRST_LEG: &str = "Click the end of a leg.";
-pub(crate) const STEP_VERTEX: &str = "Click the vertex.";
-pub(crate) const STEP_OTHER_LEG: &str = "Click the end of the other leg.";
-pub(crate) const STEP_LONG_AXIS: &str = "Click one end of the long axis.";
-pub(crate) const STEP_LONG_AXIS_END: &str = "Click its other end.";
-pub(crate) const STEP_SHORT_AXIS: &str = "Click the end of the short axis.";
-pub(crate) const STEP_NEXT_CONTOUR: &str = "Step or turn the plane and trace again, or press Enter.";
-pub(crate) const STEP_OUTLINE: &str = "Drag round the outline on a plane.";
-pub(crate) const STEP_CLOSE_OUTLINE: &str = "Enter closes the outline.";
-pub(crate) const STEP_TEXT: &str = "Click the place of the text, or type it at the pointer. Esc leaves.";
-pub(crate) const STEP_ARROW_TIP: &str = "Click what the arrow points to.";
 
 // Limits.
 pub(crate) const TOO_MANY_MEASUREMENTS: &str = "There are as many measurements as a scene can have: delete one first.";
@@ -53,33 +36,23 @@ pub(crate) const NO_PICTURE_TO_USE: &str = "There is no picture yet";
 pub(crate) const NO_SURFACE_HERE: &str = "There is no surface at this place";
 pub(crate) const FIRST_END_BEHIND_CAMERA: &str = "The first end is behind the camera: turn the view back";
 pub(crate) const MEASURING_BODY: &str = "Measuring the largest bright body in the region";
-pub(crate) fn no_body_measured(why: impl Display) -> String {
-    format!("No body is measured: {why}")
-}
+text!(no_body_measured(why) = "No body is measured: {why}");
 pub(crate) const BODY_IS_CUT: &str =
     "The measured body reaches the border of the region or of the echoes: a part of it may be missing";
 pub(crate) const NO_VOLUME_YET: &str = "There is no volume yet";
 pub(crate) const NO_VOLUME_IN_LOOP: &str = "No volume is in the cine loop: --cine keeps some";
 pub(crate) const NO_MEASUREMENTS_YET: &str = "There are no measurements yet";
 pub(crate) const RESULTS_COPIED: &str = "The results are copied as CSV";
-pub(crate) fn no_clipboard(fault: impl Display) -> String {
-    format!("There is no clipboard ({fault}): the results are saved instead")
-}
+text!(no_clipboard(fault) = "There is no clipboard ({fault}): the results are saved instead");
 pub(crate) const WHY_NO_MEASUREMENTS: &str = "there are no measurements yet";
-pub(crate) fn results_not_saved(fault: impl Display) -> String {
-    format!("The results were not saved: {fault}")
-}
+text!(results_not_saved(fault) = "The results were not saved: {fault}");
 pub(crate) const WHY_NO_ORIGIN: &str = "this view has none";
 pub(crate) const VOLUMES_ARE_LIVE: &str = "The volumes are live and in no file: save the loop too (Ctrl+R)";
-pub(crate) fn workspace_not_saved(fault: impl Display) -> String {
-    format!("The workspace was not saved: {fault}")
-}
+text!(workspace_not_saved(fault) = "The workspace was not saved: {fault}");
 
 // Body marks.
 pub(crate) const BODY_MARK: &str = "Body mark";
-pub fn body_mark(number: impl Display) -> String {
-    format!("Body mark {number}")
-}
+text!(body_mark(number) = "Body mark {number}");
 pub(crate) const TOO_MANY_BODY_MARKS: &str = "There are as many body marks as a picture can have: remove one first.";
 pub(crate) const BODY_MARK_FIRST_STEP: &str = "Choose a part of the body.";
 pub(crate) const BODY_MARK_STEP: &str =

@@ -8,21 +8,15 @@ use std::path::Path;
 pub fn saved(file: &Path) -> String {
     format!("Saved {}", std::path::absolute(file).unwrap_or_else(|_| file.into()).display())
 }
-pub(crate) fn not_saved(fault: impl Display) -> String {
-    format!("Not saved: {fault}")
-}
+text!(not_saved(fault) = "Not saved: {fault}");
 pub(crate) const SHADER_ERROR: &str = "Shader error: the last good shader is shown";
 pub(crate) const DEVICE_STALLED_ABOUT: &str =
     "It did not finish in time and was opened again. The volumes that arrived in between are not shown.";
 pub(crate) const DEVICE_STALLED: &str = "The graphics device stalled";
 pub(crate) const PREPARING_THE_DEVICE: &str = "Preparing the device";
-pub(crate) fn shaders_compiled(done: impl Display, count: impl Display) -> String {
-    format!("{done} of {count} shaders are compiled")
-}
+text!(shaders_compiled(done, count) = "{done} of {count} shaders are compiled");
 pub(crate) const WAITING_FOR_FRAME: &str = "Waiting for the first frame";
-pub(crate) fn frames_of_first_volume(done: impl Display, count: impl Display) -> String {
-    format!("{done} of {count} frames of the first volume")
-}
+text!(frames_of_first_volume(done, count) = "{done} of {count} frames of the first volume");
 pub(crate) const DRAWING_FIRST_PICTURE: &str = "Drawing the first picture";
 
 // The device.
@@ -30,96 +24,54 @@ pub(crate) const DEVICE_OPENED_AGAIN: &str = "The device was lost and opened aga
 
 // Opening files.
 pub(crate) const FOLDER_ABOVE: &str = "..  (the folder above)";
-pub(crate) fn is_not_there(path: &str) -> String {
-    format!("There is no file and no folder {path}")
-}
-pub(crate) fn files_as_series(count: usize) -> String {
-    format!("all {count} DICOM files of this folder as one recording")
-}
+text!(is_not_there(path) = "There is no file and no folder {path}");
+text!(files_as_series(count) = "all {count} DICOM files of this folder as one recording");
 pub(crate) const OPENS_NO_OTHER_FILES: &str = "This view opens no other files";
 pub(crate) const SAVE_THE_WORKSPACE_FIRST: &str =
     "Measurements, cuts or labels are not saved: save the workspace first (Ctrl+S)";
-pub(crate) fn loses_work(name: impl Display) -> String {
-    format!(
-        "Measurements, cuts or labels of {name} are not saved: save the workspace first (Ctrl+S), or close it again to lose them"
-    )
-}
+text!(
+    loses_work(name) = "Measurements, cuts or labels of {name} are not saved: save the workspace first (Ctrl+S), or close it again to lose them"
+);
 pub(crate) const SAVE_THE_LOOP_FIRST: &str = "The loop is not saved: save it first (Ctrl+R)";
-pub fn reading(name: impl Display) -> String {
-    format!("Reading {name}")
-}
-pub fn percent(share: impl Display) -> String {
-    format!("{share} %")
-}
-pub(crate) fn files_of_folder(done: impl Display, count: impl Display) -> String {
-    format!("{done} of {count} files")
-}
+text!(reading(name) = "Reading {name}");
+text!(percent(share) = "{share} %");
+text!(files_of_folder(done, count) = "{done} of {count} files");
 pub(crate) const READING_SHARE: &str = "Read so far";
 pub(crate) const CANCEL_READING: &str = "Cancel";
 pub(crate) const CANCEL_READING_HINT: &str = "Reads no further; what is shown stays (Esc).";
-pub(crate) fn not_read_further(name: impl Display) -> String {
-    format!("{name} is not read further")
-}
+text!(not_read_further(name) = "{name} is not read further");
 pub(crate) const READING_CANCELLED: &str = "Reading was cancelled";
 pub(crate) const READING_CANCELLED_ABOUT: &str = "Ctrl+O opens a recording.";
-pub(crate) fn too_many_recordings(most: impl Display) -> String {
-    format!("{most} recordings are open: close one first")
-}
-pub fn is_closed(name: impl Display) -> String {
-    format!("{name} is closed")
-}
+text!(too_many_recordings(most) = "{most} recordings are open: close one first");
+text!(is_closed(name) = "{name} is closed");
 pub(crate) const ONLY_RECORDING: &str = "No other recording is open";
 pub(crate) const STANDARD_INPUT: &str = "Standard input";
-pub(crate) fn cannot_be_opened(name: impl Display, e: impl Display) -> String {
-    format!("{name} cannot be opened: {e}")
-}
+text!(cannot_be_opened(name, e) = "{name} cannot be opened: {e}");
 pub(crate) const WHY_FILE_NOT_READ: &str = "it ended before the file was read";
-pub fn not_opened(fault: impl Display) -> String {
-    format!("Not opened: {fault}")
-}
+text!(not_opened(fault) = "Not opened: {fault}");
 
 // Presets of the user.
 pub(crate) const OWN_PRESET_HINT: &str = "A preset of your own.";
 pub(crate) const PRESET_DOES_NOT_FIT: &str = "This preset does not fit the volume";
-pub(crate) fn too_many_presets(max_presets: impl Display) -> String {
-    format!("{max_presets} presets are kept: delete one first")
-}
-pub(crate) fn name_is_taken(name: impl Display) -> String {
-    format!("{name} is the name of another preset")
-}
+text!(too_many_presets(max_presets) = "{max_presets} presets are kept: delete one first");
+text!(name_is_taken(name) = "{name} is the name of another preset");
 pub(crate) const WHY_PRESET_IS_GONE: &str = "this preset is gone";
-pub(crate) fn preset_is_called(name: impl Display) -> String {
-    format!("The preset is called {name}")
-}
-pub(crate) fn preset_is_replaced(name: impl Display) -> String {
-    format!("{name} has the present look. Undo in the list brings the earlier one back")
-}
-pub(crate) fn preset_is_kept(name: impl Display) -> String {
-    format!("{name} is kept")
-}
+text!(preset_is_called(name) = "The preset is called {name}");
+text!(preset_is_replaced(name) = "{name} has the present look. Undo in the list brings the earlier one back");
+text!(preset_is_kept(name) = "{name} is kept");
 pub(crate) const WHY_NO_PRESETS: &str = "this view keeps no presets";
-pub(crate) fn preset_is_deleted(name: impl Display) -> String {
-    format!("{name} is deleted. Undo in the list brings it back")
-}
+text!(preset_is_deleted(name) = "{name} is deleted. Undo in the list brings it back");
 pub(crate) const PRESETS_CHANGED_ELSEWHERE: &str = "The presets were changed elsewhere: nothing is taken back";
 pub(crate) const PRESETS_RESTORED: &str = "The presets are as they were";
 
 // What cannot be saved.
 pub(crate) const WHY_NO_PICTURE: &str = "there is no picture yet";
-pub(crate) fn picture_not_saved(fault: impl Display) -> String {
-    format!("The picture was not saved: {fault}")
-}
+text!(picture_not_saved(fault) = "The picture was not saved: {fault}");
 pub(crate) const WHY_NO_VOLUMES: &str = "there are no volumes yet";
-pub(crate) fn loop_not_saved(fault: impl Display) -> String {
-    format!("The loop was not saved: {fault}")
-}
+text!(loop_not_saved(fault) = "The loop was not saved: {fault}");
 pub(crate) const WHY_NO_VOLUME: &str = "there is no volume yet";
-pub(crate) fn exporting(name: impl Display) -> String {
-    format!("Exporting: {name}")
-}
-pub(crate) fn not_exported(fault: impl Display) -> String {
-    format!("Not exported: {fault}")
-}
+text!(exporting(name) = "Exporting: {name}");
+text!(not_exported(fault) = "Not exported: {fault}");
 
 // The brush.
 pub(crate) const BRUSH_NEEDS_SURFACE: &str = "The brush needs a surface: choose the mode Surface or Mixed";
@@ -155,24 +107,14 @@ pub(crate) const NO_FRAMES_ON_STANDARD_INPUT_ABOUT: &str = "It is open but nothi
 pub(crate) const NO_FRAMES_FROM_THE_PROBE: &str = "No frames from the probe";
 pub(crate) const NO_FRAMES_FROM_THE_PROBE_ABOUT: &str = "It is connected but sends nothing.";
 pub(crate) const WHY_SOURCE_PANICKED: &str = "the thread that opens the source panicked";
-pub(crate) fn why_no_thread_for_source(e: impl Display) -> String {
-    format!("a thread for the source cannot be started: {e}")
-}
+text!(why_no_thread_for_source(e) = "a thread for the source cannot be started: {e}");
 pub(crate) const WHY_SOURCE_ENDED: &str = "the source ended";
-pub(crate) fn why_no_thread(e: impl Display) -> String {
-    format!("a thread cannot be started: {e}")
-}
+text!(why_no_thread(e) = "a thread cannot be started: {e}");
 
 // Saving in the background.
-pub(crate) fn still_exporting(name: impl Display) -> String {
-    format!("{name} is still being exported")
-}
-pub(crate) fn still_saving(max_pending: impl Display) -> String {
-    format!("{max_pending} files are still being saved: wait a moment")
-}
-pub(crate) fn why_no_folder(folder: impl Display, e: impl Display) -> String {
-    format!("{folder}: cannot be created: {e}")
-}
+text!(still_exporting(name) = "{name} is still being exported");
+text!(still_saving(max_pending) = "{max_pending} files are still being saved: wait a moment");
+text!(why_no_folder(folder, e) = "{folder}: cannot be created: {e}");
 
 // The ladder of quality, for the times.
 pub(crate) const FULL_QUALITY: &str = "full quality";
@@ -188,14 +130,9 @@ pub fn render_start(outcome: impl Display) -> String {
 
 // Input devices, where there is no desktop.
 pub(crate) const WHY_DEVICES_LOST: &str = "the reader panicked";
-pub(crate) fn devices_lost(why: impl Display) -> String {
-    format!("input devices: {why}")
-}
-pub(crate) fn devices_not_read(count: impl Display) -> String {
-    format!(
+text!(devices_lost(why) = "input devices: {why}");
+text!(
+    devices_not_read(count) =
         "{count} input devices cannot be read: this user is not in the group input (as root: usermod -aG input USER)"
-    )
-}
-pub(crate) fn device_not_grabbed(name: impl Display, path: impl Display, fault: impl Display) -> String {
-    format!("{name} ({path}) cannot be grabbed: {fault}")
-}
+);
+text!(device_not_grabbed(name, path, fault) = "{name} ({path}) cannot be grabbed: {fault}");

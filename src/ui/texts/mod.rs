@@ -1,6 +1,15 @@
 //! Every text of the window, in English: a translation is another copy of this folder. Names of modes are in [`Mode`](crate::scene::Mode), names and
 //! hints of sliders are at their settings; faults that the panels show are worded by the modules that find them.
 
+/// A text with values in it: `text!(name(value) = "text with {value}");`
+macro_rules! text {
+    ($name:ident($($value:ident),+) = $text:literal) => {
+        pub(crate) fn $name($($value: impl std::fmt::Display),+) -> String {
+            format!($text)
+        }
+    };
+}
+
 mod comparing;
 mod exports;
 mod first_steps;

@@ -61,21 +61,15 @@ pub(crate) const NEXT_RECORDING: &str = "Next recording";
 pub(crate) const NEXT_RECORDING_HINT: &str = "Shows the next of the recordings that are open (Ctrl+Page down).";
 pub(crate) const SAVE_WORKSPACE: &str = "Save workspace";
 pub(crate) const TYPE_VALUE_HINT: &str = "A click types the value; Enter sets it, Esc leaves it.";
-pub(crate) fn value_of(name: impl Display) -> String {
-    format!("Value of {name}")
-}
+text!(value_of(name) = "Value of {name}");
 pub(crate) const LIVE: &str = "LIVE";
 pub(crate) const WAITING: &str = "WAITING";
 pub(crate) const NEWEST: &str = "NEWEST";
 pub(crate) const HAS_ENDED_BUTTON: &str = "ENDED";
 pub(crate) const TO_FREEZE: &str = "Space: freeze";
 pub(crate) const GO_LIVE: &str = "Space: go live";
-pub(crate) fn seconds(seconds: impl Display) -> String {
-    format!("{seconds:.1} s")
-}
-pub(crate) fn played_part(first: usize, last: usize) -> String {
-    format!("loop {first} to {last}")
-}
+text!(seconds(seconds) = "{seconds:.1} s");
+text!(played_part(first, last) = "loop {first} to {last}");
 
 /// States of the picture, in short.
 pub(crate) const STATE_FROZEN: &str = "Frozen";
@@ -83,9 +77,7 @@ pub(crate) const STATE_LIVE: &str = "Live";
 pub(crate) const STATE_DRAWING: &str = "drawing ...";
 pub(crate) const IS_DRAWN: &str = "The next picture is being drawn. ";
 pub(crate) const STATE_PLAYING: &str = "Playing";
-pub(crate) fn volume_in_loop(number: impl Display, count: impl Display) -> String {
-    format!("volume {number} of {count}")
-}
+text!(volume_in_loop(number, count) = "volume {number} of {count}");
 
 // The search.
 pub(crate) const FIND: &str = "Find a command";
@@ -93,21 +85,9 @@ pub(crate) const FIND_HINT: &str = "Finds every command and control by its name 
 pub(crate) const HOW_TO_FIND: &str = "Type a word: measure, threshold, export ...";
 pub(crate) const FOUND: &str = "Found";
 pub(crate) const CLOSE_SEARCH_HINT: &str = "Closes the search (Esc).";
-pub(crate) fn look(name: impl Display) -> String {
-    format!("Look: {name}")
-}
-pub(crate) fn export_as(name: impl Display) -> String {
-    format!("Export: {name}")
-}
-pub(crate) fn control_in(group: &str, hint: &str) -> String {
-    format!("{group}: {hint}")
-}
-pub(crate) const SAVE_RESULTS: &str = "Save the results (CSV)";
-pub(crate) const CLEAR_RESULTS: &str = "Clear all measurements";
-pub(crate) const SAVES_BAR: &str = "Bar on saved pictures: on";
-pub(crate) const SAVES_NO_BAR: &str = "Bar on saved pictures: off";
-pub(crate) const REFERENCE_PICTURE_ON: &str = "Reference picture of slices: on";
-pub(crate) const REFERENCE_PICTURE_OFF: &str = "Reference picture of slices: off";
+text!(look(name) = "Look: {name}");
+text!(export_as(name) = "Export: {name}");
+text!(control_in(group, hint) = "{group}: {hint}");
 
 pub(crate) const VIEW_FROM: &str = "View from";
 pub(crate) const PLANE_HINT: &str = "The plane that is shown and moved.";
@@ -123,12 +103,8 @@ pub(crate) const SAVE_WORKSPACE_HINT: &str = "Saves settings, recording and meas
 pub(crate) const EXPORT_HINT: &str =
     "Exports the volume that is shown: as a volume, a surface to print, or a turntable (Ctrl+E).";
 pub(crate) const RECORDINGS: &str = "Recordings";
-pub(crate) fn recording_hint(path: impl Display) -> String {
-    format!("{path}: shows it as it was left (Ctrl+Page up, Ctrl+Page down).")
-}
-pub(crate) fn close_recording(name: impl Display) -> String {
-    format!("Close {name}")
-}
+text!(recording_hint(path) = "{path}: shows it as it was left (Ctrl+Page up, Ctrl+Page down).");
+text!(close_recording(name) = "Close {name}");
 pub(crate) const CLOSE_RECORDING_HINT: &str = "Takes it from the list; its file stays, its settings and measurements are forgotten (Ctrl+W: the one that is shown).";
 pub(crate) const EXPORT: &str = "Export";
 pub const CUTS: &str = "Cuts";
@@ -136,15 +112,9 @@ pub(crate) const KEEP_INSIDE_HINT: &str = "The next contour takes away what is o
 pub(crate) const KEEP_INSIDE: &str = "Keep inside";
 pub(crate) const REMOVE_ALL_CUTS: &str = "Remove all cuts";
 pub(crate) const REMOVE_ALL_CUTS_HINT: &str = "Renderings show everything again (Shift+F; undo brings the cuts back).";
-pub fn millimetres(length: impl Display) -> String {
-    format!("{length:.1} mm")
-}
-pub(crate) fn bar_length(length: impl Display) -> String {
-    format!("{length} mm")
-}
-pub(crate) fn whole_millimetres(length: impl Display) -> String {
-    format!("{length:.0} mm")
-}
+text!(millimetres(length) = "{length:.1} mm");
+text!(bar_length(length) = "{length} mm");
+text!(whole_millimetres(length) = "{length:.0} mm");
 pub(crate) const RADIUS_OF_BRUSH: &str = "Radius of brush";
 pub(crate) const RADIUS_OF_BRUSH_HINT: &str = "How far from the surface under the pointer the brush removes.";
 pub(crate) const UNDO: &str = "Undo";
@@ -175,18 +145,12 @@ pub(crate) const BAR_ON_SAVED_PICTURES_HINT: &str =
     "Saved pictures carry the patient's sides, and a bar with scale, depth, mode and time.";
 pub(crate) const BAR_ON_SAVED_PICTURES: &str = "Bar on saved pictures";
 pub(crate) const ADVANCED: &str = "Advanced";
-pub(crate) fn advanced_group(name: impl Display) -> String {
-    format!("Advanced: {name}")
-}
-pub(crate) fn advanced_hint(name: impl Display) -> String {
-    format!("More controls: {name}. A click opens or closes the group.")
-}
+text!(advanced_group(name) = "Advanced: {name}");
+text!(advanced_hint(name) = "More controls: {name}. A click opens or closes the group.");
 pub(crate) const NO_SUCH_CONTROL: &str = "This mode has no such control.";
 pub(crate) const AUTOMATIC: &str = "auto";
 pub(crate) const THROUGH_ALL: &str = "through all";
-pub(crate) fn slider_hint(hint: impl Display) -> String {
-    format!("{hint} Double click: as at the start.")
-}
+text!(slider_hint(hint) = "{hint} Double click: as at the start.");
 pub(crate) const LIGHT_BALL_HINT: &str = "Drag here to move the lamp; on the picture, drag with Ctrl.";
 pub(crate) const LIGHT_BALL: &str = "Light ball";
 /// The position of the light, as degrees from the front.
@@ -230,26 +194,18 @@ pub(crate) const PREVIOUS_VOLUME_HINT: &str = "Shows the previous volume (Left).
 pub(crate) const NEXT_VOLUME: &str = "Next volume";
 pub(crate) const NEXT_VOLUME_HINT: &str = "Shows the next volume (Right).";
 pub(crate) const SPEED_HINT: &str = "Speed of the loop; 1x is that of the acquisition (Ctrl+Left, Ctrl+Right).";
-pub fn speed(speed: impl Display) -> String {
-    format!("Speed {speed}")
-}
+text!(speed(speed) = "Speed {speed}");
 pub(crate) const BACK_AND_FORTH: &str = "Back and forth";
 pub(crate) const BACK_AND_FORTH_HINT: &str = "The loop plays back and forth. A click: forwards (Ctrl+Enter).";
 pub(crate) const FORWARDS: &str = "Forwards";
 pub(crate) const FORWARDS_HINT: &str = "The loop plays forwards. A click: back and forth (Shift+Enter).";
 pub(crate) const VOLUME_OF_THE_LOOP_HINT: &str = "The volumes of the loop, oldest first. Drag its ends to play a part of it; a double click plays all (Shift+Home, Shift+End, Ctrl+Home).";
 pub(crate) const VOLUME_OF_THE_LOOP: &str = "Volume of the loop";
-pub(crate) fn place_in_loop(place: impl Display, count: impl Display) -> String {
-    format!("{place} of {count}")
-}
+text!(place_in_loop(place, count) = "{place} of {count}");
 
 // Lists of files and formats.
-pub(crate) fn open_file_hint(name: impl Display) -> String {
-    format!("Opens {name}.")
-}
-pub(crate) fn open_folder_hint(name: impl Display) -> String {
-    format!("Lists the folder {name}")
-}
+text!(open_file_hint(name) = "Opens {name}.");
+text!(open_folder_hint(name) = "Lists the folder {name}");
 pub(crate) const FOLDER_ABOVE_HINT: &str = "Lists the folder above.";
 pub(crate) const RECENT: &str = "Recent";
 pub(crate) const PATH: &str = "Path";
@@ -258,9 +214,7 @@ pub(crate) const HOW_TO_TYPE_A_PATH: &str = "Tab completes the path, Enter opens
 pub(crate) const CLOSE_OPEN_HINT: &str = "Closes this list.";
 pub(crate) const NO_RECORDING_HERE: &str = "There is no recording and no workspace here.";
 pub(crate) const VOLUME_SHOWN: &str = "The volume that is shown";
-pub(crate) fn is_being_exported(name: impl Display) -> String {
-    format!("{name} is being exported")
-}
+text!(is_being_exported(name) = "{name} is being exported");
 /// How much of it is done, rounded down: 100 % is said of what is complete.
 fn per_cent(done: u64, of: u64) -> String {
     format!("{} %", 100 * done.min(of) / of.max(1))
@@ -310,100 +264,52 @@ pub(crate) const WITH_THREE_PLANES: &str = " with three planes";
 pub(crate) const BESIDE_THE_VOLUME: &str = " beside the volume";
 pub(crate) const IS_FROZEN: &str = "frozen";
 pub(crate) const IS_LIVE: &str = "live";
-pub(crate) fn behind(time: impl Display) -> String {
-    format!("{time} behind")
-}
+text!(behind(time) = "{time} behind");
 pub(crate) const HAS_ENDED: &str = "the source has ended";
-pub(crate) fn volume_of_loop(number: impl Display, count: impl Display) -> String {
-    format!("Volume {number} of {count}. ")
-}
+text!(volume_of_loop(number, count) = "Volume {number} of {count}. ");
 pub(crate) fn count_of_measurements(count: usize) -> String {
     format!("{count} measurement{}.", if count == 1 { "" } else { "s" })
 }
-pub(crate) fn with_curved_plane(plane: impl Display) -> String {
-    format!(", with the section along a line on plane {plane}")
-}
-pub(crate) fn of_plane(plane: impl Display) -> String {
-    format!(", plane {plane}")
-}
-pub(crate) fn seen_from(side: impl Display) -> String {
-    format!(" from the {side}")
-}
-pub(crate) fn turned_to(azimuth: impl Display, elevation: impl Display) -> String {
-    format!(", turned to azimuth {azimuth:.0}° and elevation {elevation:.0}°")
-}
+text!(with_curved_plane(plane) = ", with the section along a line on plane {plane}");
+text!(of_plane(plane) = ", plane {plane}");
+text!(seen_from(side) = " from the {side}");
+text!(turned_to(azimuth, elevation) = ", turned to azimuth {azimuth:.0}° and elevation {elevation:.0}°");
 
 // Times, gestures, the help, and the question before the end.
-pub fn milliseconds(ms: impl Display) -> String {
-    format!("{ms:.1} ms")
-}
-pub(crate) fn picture_time(time: impl Display) -> String {
-    format!("picture {time}")
-}
+text!(milliseconds(ms) = "{ms:.1} ms");
+text!(picture_time(time) = "picture {time}");
 pub(crate) const NO_BUDGET: &str = "no budget";
-pub fn budget(ms: impl Display) -> String {
-    format!("budget {ms:.0} ms")
-}
-pub(crate) fn picture_times(p50: impl Display, p95: impl Display, budget: impl Display) -> String {
-    format!("p50 {p50}  p95 {p95}  {budget}")
-}
-pub fn rates(volumes: impl Display, frames: impl Display, pictures: impl Display) -> String {
-    format!("{volumes:.2} volumes/s   {frames:.0} frames/s   {pictures:.1} pictures/s")
-}
-pub fn acquisition(ms: impl Display, share: impl Display) -> String {
-    format!("acquisition: {ms:.0} ms a volume; {share:.0} % of that rate")
-}
-pub(crate) fn frame_to_picture(p95: impl Display) -> String {
-    format!("frame to picture p95 {p95}")
-}
-pub(crate) fn input_to_picture(p50: impl Display, p95: impl Display) -> String {
-    format!("input to picture p50 {p50}  p95 {p95}")
-}
-pub(crate) fn presentation_to_monitor(p50: impl Display, p95: impl Display) -> String {
-    format!("presentation to monitor p50 {p50}  p95 {p95}")
-}
-pub fn losses(dropped: impl Display, lost: impl Display) -> String {
-    format!("{dropped} volumes dropped, {lost} frames lost")
-}
+text!(budget(ms) = "budget {ms:.0} ms");
+text!(picture_times(p50, p95, budget) = "p50 {p50}  p95 {p95}  {budget}");
+text!(rates(volumes, frames, pictures) = "{volumes:.2} volumes/s   {frames:.0} frames/s   {pictures:.1} pictures/s");
+text!(acquisition(ms, share) = "acquisition: {ms:.0} ms a volume; {share:.0} % of that rate");
+text!(frame_to_picture(p95) = "frame to picture p95 {p95}");
+text!(input_to_picture(p50, p95) = "input to picture p50 {p50}  p95 {p95}");
+text!(presentation_to_monitor(p50, p95) = "presentation to monitor p50 {p50}  p95 {p95}");
+text!(losses(dropped, lost) = "{dropped} volumes dropped, {lost} frames lost");
 pub(crate) const NO_TIMES: &str = "no times: the device has no time stamps, or no pass ran";
-pub(crate) fn more_passes(more: impl Display) -> String {
-    format!("{more} more")
-}
+text!(more_passes(more) = "{more} more");
 pub(crate) const TIMES_LEGEND: &str = "ms per run; bars: share of the device time";
-pub(crate) const DRAG_GESTURE: &str = "drag";
-pub(crate) const DRAG_DOES: &str = "use the tool: turn, light, region, clip, cut, brush, crosshair, curve";
-pub(crate) const SHIFT_DRAG: &str = "Shift + drag, right or middle drag";
-pub(crate) const SHIFT_DRAG_DOES: &str = "move the picture; over a plane: step it";
-pub(crate) const CTRL_DRAG: &str = "Ctrl + drag";
-pub(crate) const CTRL_DRAG_DOES: &str = "move the light";
-pub(crate) const WHEEL: &str = "wheel";
-pub(crate) const WHEEL_DOES: &str = "zoom; over a plane: step it";
-pub(crate) const TWO_FINGERS: &str = "two fingers";
-pub(crate) const TWO_FINGERS_DO: &str = "pinch to zoom, twist to roll, move to pan";
-pub(crate) const DOUBLE_CLICK: &str = "double click on a tile";
-pub(crate) const DOUBLE_CLICK_DOES: &str = "show that tile alone, and back";
-pub(crate) const REGION_DRAG: &str = "Region, then drag";
-pub(crate) const REGION_DRAG_DOES: &str = "move the nearest face of the box";
-pub(crate) const START_LINE_CLICK: &str = "Region, then double click the green line (3D + planes)";
-pub(crate) const START_LINE_CLICK_DOES: &str = "bend it; add or remove a handle";
-pub(crate) const REGION_DRAG_ON_PLANE: &str = "Region, then drag on a plane (3D + planes)";
-pub(crate) const REGION_DRAG_ON_PLANE_DOES: &str = "move a side of the box; from within: all of it";
-pub(crate) const LIGHT_BALL_DRAG: &str = "drag on the light ball (beside Lamp)";
-pub(crate) const LIGHT_BALL_DRAG_DOES: &str = "move the lamp";
-pub(crate) const CLIP_DRAG: &str = "Clip, then drag up";
-pub(crate) const CLIP_DRAG_DOES: &str = "cut away what is nearer to the viewer";
-pub(crate) const CUT_DRAG: &str = "Cut, then drag round";
-pub(crate) const CUT_DRAG_DOES: &str = "cut away what is within, along the view";
-pub(crate) const BRUSH_DRAG: &str = "Brush, then drag over it";
-pub(crate) const BRUSH_DRAG_DOES: &str = "remove what is near the surface there";
-pub(crate) const PLANES_CLICK: &str = "Crosshair, then click";
-pub(crate) const PLANES_CLICK_DOES: &str = "move the point where the three planes cross";
-pub(crate) const CURVE_CLICKS: &str = "Curve, then clicks on a plane, Enter";
-pub(crate) const CURVE_CLICKS_DO: &str = "curved plane along them; a drag: a straight line";
-pub(crate) const CURVE_DRAG: &str = "Curve, then drag a point of the line";
-pub(crate) const CURVE_DRAG_DOES: &str = "move it";
-pub(crate) const BODY_MARK_DRAG: &str = "Body mark, then drag, click or wheel on it";
-pub(crate) const BODY_MARK_DRAG_DOES: &str = "move it; put the probe there; turn the probe";
+/// Gestures on the picture, and what they do, in the help.
+pub(crate) const GESTURES_OF_HELP: [(&str, &str); 17] = [
+    ("drag", "use the tool: turn, light, region, clip, cut, brush, crosshair, curve"),
+    ("Shift + drag, right or middle drag", "move the picture; over a plane: step it"),
+    ("Ctrl + drag", "move the light"),
+    ("wheel", "zoom; over a plane: step it"),
+    ("two fingers", "pinch to zoom, twist to roll, move to pan"),
+    ("double click on a tile", "show that tile alone, and back"),
+    ("Region, then drag", "move the nearest face of the box"),
+    ("Region, then double click the green line (3D + planes)", "bend it; add or remove a handle"),
+    ("Region, then drag on a plane (3D + planes)", "move a side of the box; from within: all of it"),
+    ("drag on the light ball (beside Lamp)", "move the lamp"),
+    ("Clip, then drag up", "cut away what is nearer to the viewer"),
+    ("Cut, then drag round", "cut away what is within, along the view"),
+    ("Brush, then drag over it", "remove what is near the surface there"),
+    ("Crosshair, then click", "move the point where the three planes cross"),
+    ("Curve, then clicks on a plane, Enter", "curved plane along them; a drag: a straight line"),
+    ("Curve, then drag a point of the line", "move it"),
+    ("Body mark, then drag, click or wheel on it", "move it; put the probe there; turn the probe"),
+];
 pub(crate) const QUIT: &str = "quit";
 pub const KEYS: &str = "Keys";
 pub(crate) const GESTURES: &str = "Gestures";
@@ -479,9 +385,7 @@ pub(crate) const REMOVE_CURVE: &str = "Remove curved plane";
 pub(crate) const START_LINE: &str = "Start line";
 pub(crate) const CURVED_LINE: &str = "Curved line";
 pub(crate) const CURVED_LINE_HINT: &str = "Bends the line at which rendering starts: drag its green handles on plane A beside the rendering. Off: straight. (Shift+G)";
-pub(crate) fn start_handle(number: impl Display) -> String {
-    format!("Handle {number}")
-}
+text!(start_handle(number) = "Handle {number}");
 pub(crate) const START_HANDLE_HINT: &str =
     "How deep rendering starts at this handle of the start line, counted from the left.";
 pub(crate) const ADD: &str = "Add";

@@ -1,14 +1,11 @@
 //! Texts about the patient's sides and the probe's marker.
 
 use crate::scene::{ProbeMarker, Sides, VolumeAxis};
-use std::fmt::Display;
 
 pub const SIDES: &str = "Sides";
 pub(crate) const SIDES_HINT: &str =
     "The patient's sides as letters on every tile and in saved pictures, and the probe's marker.";
-pub(crate) fn sides_in_short(sides: impl Display) -> String {
-    format!("Sides: {sides}")
-}
+text!(sides_in_short(sides) = "Sides: {sides}");
 pub(crate) const EXCHANGE_LEFT_AND_RIGHT: &str = "Exchange L and R";
 pub(crate) const EXCHANGE_LEFT_AND_RIGHT_HINT: &str =
     "Left and right the other way round, as when the probe is turned. Nothing else changes.";

@@ -7,6 +7,7 @@ use crate::passes::Texels;
 use crate::probe::{Advance, Array, Axis, Geometry, Grid, Indices, Motion, Probe};
 use crate::scene::{Input, LabelVolume, Scene, Settings, VolumeFormat};
 use crate::source::StoredType;
+use crate::statistics::mix;
 use glam::{DAffine3, DQuat, DVec3, EulerRot};
 
 /// A scene to build: its name, geometry, input, and settings as TOML.
@@ -74,6 +75,9 @@ fn specs(shared_memory: u32) -> Vec<SceneSpec> {
 /// Scenes whose dispatches have more than eight workgroups along an axis, as those of real pictures have, and few along the others.
 fn wide_scenes() -> Vec<SceneSpec> {
     let mut scenes = Vec::new();
+    let mut add = |name: &str, geometry: &Geometry, toml: String| {
+        scenes.push(SceneSpec::new(name, geometry, BYTES, toml));
+    };
     for size in [[80, 5, 31], [5, 80, 31]] {
         for filters in [
             "median = true",
@@ -90,12 +94,7 @@ fn wide_scenes() -> Vec<SceneSpec> {
             let toml = format!(
                 "mode = 'vr'\npicture = {{ size = [9, 7] }}\nslices = {{ format = 'r32f', {filters} }}\nray.sampling = 'exact'\nplanes.smooth = {{}}"
             );
-            scenes.push(SceneSpec::new(
-                &format!("Cartesian of {size:?} voxels, {filters}"),
-                &cartesian(size),
-                BYTES,
-                toml,
-            ));
+            add(&format!("Cartesian of {size:?} voxels, {filters}"), &cartesian(size), toml);
         }
     }
     for size in [[160, 5, 31], [5, 160, 31]] {
@@ -106,12 +105,7 @@ fn wide_scenes() -> Vec<SceneSpec> {
             ("planes of all samples", "mode = 'vr'\nlayout = 'four'\nplanes.smooth = {}"),
         ] {
             let toml = format!("{rest}\nray.sampling = 'exact'\npicture.size = [9, 7]");
-            scenes.push(SceneSpec::new(
-                &format!("Cartesian of {size:?} voxels, {name}"),
-                &cartesian(size),
-                BYTES,
-                toml,
-            ));
+            add(&format!("Cartesian of {size:?} voxels, {name}"), &cartesian(size), toml);
         }
     }
     let sweep =
@@ -128,7 +122,7 @@ fn wide_scenes() -> Vec<SceneSpec> {
     ] {
         let sampling = if rest.contains("quads") { "" } else { "ray.sampling = 'exact'\n" };
         let toml = format!("{rest}\n{sampling}picture.size = [9, 7]\nslices.pixels = 75");
-        scenes.push(SceneSpec::new(&format!("fan of 31 slices, {name}"), &sweep, BYTES, toml));
+        add(&format!("fan of 31 slices, {name}"), &sweep, toml);
     }
     let small = Geometry::Sweep(wobbler());
     let others = [
@@ -161,7 +155,7 @@ fn wide_scenes() -> Vec<SceneSpec> {
         let toml = format!(
             "mode = 'vr'\nray = {{ tolerance = 0.5, step = 2, sampling = 'exact' }}\npicture.size = {size}\nslices.pixels = 24"
         );
-        scenes.push(SceneSpec::new(&format!("picture of {size}, steps by their error"), &small, BYTES, toml));
+        add(&format!("picture of {size}, steps by their error"), &small, toml);
     }
     // A workgroup takes 64 lines.
     for size in ["[520, 9]", "[9, 520]"] {
@@ -169,21 +163,16 @@ fn wide_scenes() -> Vec<SceneSpec> {
             "mode = 'sr'\nsurface = {{ detector = 'consistent', threshold = 0.02, rough = 1 }}\nray.sampling = 'exact'\n\
              picture.size = {size}\nslices.pixels = 24"
         );
-        scenes.push(SceneSpec::new(&format!("picture of {size}, consistent surface"), &small, BYTES, toml));
+        add(&format!("picture of {size}, consistent surface"), &small, toml);
     }
     for size in ["[79, 9]", "[9, 79]"] {
         let wide = ALL_FILTERS.replace("[37, 29]", size);
         for (name, toml) in MODES {
-            scenes.push(SceneSpec::new(
-                &format!("picture of {size}, {name}"),
-                &small,
-                BYTES,
-                format!("{toml}\n{wide}"),
-            ));
+            add(&format!("picture of {size}, {name}"), &small, format!("{toml}\n{wide}"));
         }
         for (name, toml) in others {
             let toml = format!("{toml}\npicture.size = {size}\nslices.pixels = 24");
-            scenes.push(SceneSpec::new(&format!("picture of {size}, {name}"), &small, BYTES, toml));
+            add(&format!("picture of {size}, {name}"), &small, toml);
         }
     }
     scenes
@@ -246,10 +235,7 @@ impl Noise {
     #[allow(clippy::should_implement_trait)]
     pub fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+        (mix(self.0) >> 11) as f64 / (1u64 << 53) as f64
     }
 
     pub fn range(&mut self, low: f64, high: f64) -> f64 {
@@ -375,10 +361,9 @@ pub fn wall(scene: &Scene, number: u32) -> Vec<Texels> {
 
 pub const TURNED: &str = "azimuth = 25, tilt = -15, roll = 40";
 
-/// A wobbler whose motor moves while a frame is acquired.
-fn moving() -> Probe {
-    let probe = wobbler();
-    Probe { advance: Advance::Same(0.7 * probe.slices.pitch()), ..probe }
+/// The given probe with a motor that moves by `share` of the slice pitch while a frame is acquired.
+pub(crate) fn moved(probe: Probe, share: f64) -> Probe {
+    Probe { advance: Advance::Same(share * probe.slices.pitch()), ..probe }
 }
 
 /// All variants of the geometry, by name.
@@ -387,7 +372,7 @@ pub fn geometries() -> Vec<(&'static str, Geometry)> {
     mixed.advance = Advance::Each((0..9).map(|k| if k < 4 { 0.02 } else { -0.02 }).collect());
     vec![
         ("fan", Geometry::Sweep(wobbler())),
-        ("fan, motor moving", Geometry::Sweep(moving())),
+        ("fan, motor moving", Geometry::Sweep(moved(wobbler(), 0.7))),
         ("fan, uneven", Geometry::Sweep(uneven(wobbler()))),
         ("fan, uneven and mixed", Geometry::Sweep(mixed)),
         ("linear array, translated", Geometry::Sweep(linear())),

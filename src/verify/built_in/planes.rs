@@ -13,6 +13,9 @@ pub(super) const TWO_CUTS: &str = "mode = 'vr'
 /// Scenes of planes, tomography and the block: each mode in every geometry, and extremes in one.
 pub(super) fn plane_scenes() -> Vec<SceneSpec> {
     let mut scenes = Vec::new();
+    let mut add = |name: &str, geometry: &Geometry, toml: String| {
+        scenes.push(SceneSpec::new(name, geometry, BYTES, toml));
+    };
     let base = "slices = { pixels = 33 }\nray = { sampling = 'exact' }";
     for (name, geometry) in geometries() {
         for (mode, rest) in [
@@ -21,7 +24,7 @@ pub(super) fn plane_scenes() -> Vec<SceneSpec> {
             ("cube", "picture = { size = [21, 25] }\ncamera = { azimuth = 35, elevation = -20, roll = 5 }".into()),
         ] {
             let toml = format!("mode = '{mode}'\n{base}\n{rest}");
-            scenes.push(SceneSpec::new(&format!("{name}, {mode}"), &geometry, BYTES, toml));
+            add(&format!("{name}, {mode}"), &geometry, toml);
         }
     }
     for toml in [
@@ -44,7 +47,7 @@ pub(super) fn plane_scenes() -> Vec<SceneSpec> {
         "mode = 'cube'\npicture = { size = [33, 25] }\ncamera = { azimuth = 90 }\ncube = { shading = 0, edges = false, inset = { left = 12 } }".into(),
         "mode = 'cube'\npicture = { size = [23, 25] }\ncamera = { field_of_view = 70, zoom = 20 }\ncube = { inset = { near = 10 } }".into(),
     ] {
-        scenes.push(SceneSpec::new(&toml.replace('\n', ", "), &Geometry::Sweep(wobbler()), BYTES, format!("{toml}\n{base}")));
+        add(&toml.replace('\n', ", "), &Geometry::Sweep(wobbler()), format!("{toml}\n{base}"));
     }
     let voxels = cartesian([17, 23, 9]);
     for (name, geometry, toml) in [
@@ -60,7 +63,7 @@ pub(super) fn plane_scenes() -> Vec<SceneSpec> {
         ),
         (
             "fan, motor moving, a cut beside planes",
-            &Geometry::Sweep(moving()),
+            &Geometry::Sweep(moved(wobbler(), 0.7)),
             "mode = 'sr'\nlayout = 'four'\n\
              cuts = [{ contour = [[-5, -4], [6, -4], [0, 9]], view = { at = [3, 25, -2], direction = [0.4, 1, -0.6], up = [0, 0, 1], eye = 60 } }]",
         ),
@@ -84,12 +87,16 @@ pub(super) fn plane_scenes() -> Vec<SceneSpec> {
     ] {
         let toml = format!("{toml}\npicture.size = [27, 31]\nray.sampling = 'exact'");
         let toml = if toml.contains("slices") { toml } else { format!("{toml}\nslices.pixels = 33") };
-        scenes.push(SceneSpec::new(name, geometry, BYTES, toml));
+        add(name, geometry, toml);
     }
     let lit = "light = { volume = { cell = 3, ground = {} } }\nregion.fade = 6";
     for (name, geometry, toml) in [
         ("fan, steps by their error", &Geometry::Sweep(wobbler()), "ray.tolerance = 0.5\nray.step = 2"),
-        ("fan, moving, steps by their error, lit", &Geometry::Sweep(moving()), &format!("ray.tolerance = 2\n{lit}")),
+        (
+            "fan, moving, steps by their error, lit",
+            &Geometry::Sweep(moved(wobbler(), 0.7)),
+            &format!("ray.tolerance = 2\n{lit}"),
+        ),
         (
             "translated, steps by their error, pre-integrated",
             &Geometry::Sweep(linear()),
@@ -136,19 +143,14 @@ pub(super) fn plane_scenes() -> Vec<SceneSpec> {
         let mode = if toml.contains("mode") { "" } else { "mode = 'vr'\n" };
         let toml = format!("{mode}{toml}\npicture.size = [27, 31]\nray.sampling = 'exact'\nslices.pixels = 33");
         let toml = if toml.contains("ray = {") { toml.replace("ray.sampling = 'exact'\n", "") } else { toml };
-        scenes.push(SceneSpec::new(name, geometry, BYTES, toml));
+        add(name, geometry, toml);
     }
     for (mode, size) in [("orthogonal", "[41, 33]"), ("cube", "[40, 30]")] {
         let toml = format!(
             "mode = '{mode}'\nslices.pixels = 33\nray = {{ sampling = 'exact', elevation = 'bspline' }}\npicture.size = {size}\n\
              camera = {{ azimuth = -140, elevation = 25 }}"
         );
-        scenes.push(SceneSpec::new(
-            &format!("{mode}, B-spline across slices"),
-            &Geometry::Sweep(wobbler()),
-            BYTES,
-            toml,
-        ));
+        add(&format!("{mode}, B-spline across slices"), &Geometry::Sweep(wobbler()), toml);
     }
     scenes
 }

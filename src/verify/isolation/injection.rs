@@ -8,29 +8,17 @@ use std::str::FromStr;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// How a check crashes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
-    /// An access to memory that is not there.
-    SegmentationFault,
-    /// A failed assertion of the driver.
-    Abort,
-    /// A wait that never ends.
-    Hang,
-    /// The driver ends the process.
-    Exit,
-    /// It fails once, and passes from then on.
-    Flake,
-    /// It fails unless the host waits for each submission.
-    Unsynchronized,
-}
+/// How a check crashes: an access to memory that is not there, a failed assertion of the driver, a wait that never ends, the driver ends the process,
+/// it fails once and passes from then on, it fails unless the host waits for each submission.
+const KINDS: [&str; 6] = ["segv", "abort", "hang", "exit", "flake", "unsynchronized"];
 
 /// A crash to inject into a worker process, as text: `segv:GROUP / NAME` for the check that crashes, or instead of `segv` `abort`, `hang`, `exit`
 /// (the process ends), `flake` (the check fails once) or `unsynchronized` (it fails unless the host waits for each submission). With `start` instead
 /// of a check the process crashes before it opens the device.
 #[derive(Clone, Debug)]
 pub struct InjectedCrash {
-    kind: Kind,
+    /// One of [`KINDS`].
+    kind: &'static str,
     /// Group and name.
     check: String,
     text: String,
@@ -41,15 +29,8 @@ impl FromStr for InjectedCrash {
 
     fn from_str(text: &str) -> Result<InjectedCrash, String> {
         let (kind, check) = text.split_once(':').ok_or("must be KIND:GROUP / NAME")?;
-        let kind = match kind {
-            "segv" => Kind::SegmentationFault,
-            "abort" => Kind::Abort,
-            "hang" => Kind::Hang,
-            "exit" => Kind::Exit,
-            "flake" => Kind::Flake,
-            "unsynchronized" => Kind::Unsynchronized,
-            _ => return Err(format!("'{kind}' is not one of segv, abort, hang, exit, flake, unsynchronized")),
-        };
+        let known = KINDS.into_iter().find(|known| *known == kind);
+        let kind = known.ok_or_else(|| format!("'{kind}' is not one of {}", KINDS.join(", ")))?;
         Ok(InjectedCrash { kind, check: check.trim().into(), text: text.into() })
     }
 }
@@ -79,8 +60,8 @@ impl InjectedCrash {
         *check = Check::new(check.group, check.name.clone(), move |dut| {
             crash(kind);
             let fails = match kind {
-                Kind::Flake => !has_failed.swap(true, Ordering::Relaxed),
-                Kind::Unsynchronized => !dut.waits,
+                "flake" => !has_failed.swap(true, Ordering::Relaxed),
+                "unsynchronized" => !dut.waits,
                 _ => false,
             };
             let faults = if fails { vec![Fault::new("injected".to_string())] } else { Vec::new() };
@@ -93,14 +74,15 @@ impl InjectedCrash {
 /// In place of a check.
 const START: &str = "start";
 
-fn crash(kind: Kind) {
+/// Returns for kinds that do not end the process.
+fn crash(kind: &str) {
     match kind {
-        Kind::SegmentationFault => signals::raise_segmentation_fault(),
-        Kind::Abort => std::process::abort(),
-        Kind::Exit => std::process::exit(7),
-        Kind::Hang => loop {
+        "segv" => signals::raise_segmentation_fault(),
+        "abort" => std::process::abort(),
+        "exit" => std::process::exit(7),
+        "hang" => loop {
             std::thread::sleep(Duration::from_secs(1));
         },
-        Kind::Flake | Kind::Unsynchronized => {}
+        _ => {}
     }
 }

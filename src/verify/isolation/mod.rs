@@ -137,7 +137,8 @@ impl<'a> Workers<'a> {
         let outcome = match reply {
             Ok(Message::Done(done)) => {
                 self.current = Some(worker);
-                return (done.received(), false);
+                let (outcome, pictures) = *done;
+                return (Outcome { pictures, ..outcome }, false);
             }
             Ok(_) => failed("the process that ran it answered something else".into()),
             Err(Ended::BySignal(signal)) => {

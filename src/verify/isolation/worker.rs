@@ -6,13 +6,10 @@
 
 use crate::gpu::calls;
 use crate::machine::Device;
-use crate::picture::Picture;
 use crate::report::{CheckName, Outcome, PictureComparison};
 use crate::terminal::Failure;
 use crate::tree::{self, FromNode, ToNode};
 use crate::{Check, DeviceUnderTest};
-use base64::Engine as _;
-use base64::prelude::BASE64_STANDARD;
 use std::io::{BufRead, Write};
 use std::sync::mpsc;
 use std::time::Duration;
@@ -32,8 +29,8 @@ pub(super) enum Message {
     Ready(Box<Ready>),
     /// First message of a worker without a device. `code`: the exit code that says why ([`Failure::exit_code`]).
     Refused { code: u8, message: String },
-    /// The outcome of a check that was run.
-    Done(Box<Done>),
+    /// The outcome of a check that was run, and its pictures, which the JSON of an outcome leaves out.
+    Done(Box<(Outcome, Vec<PictureComparison>)>),
 }
 
 /// What a worker says of itself: its device, and the checks that it can run.
@@ -45,73 +42,6 @@ pub struct Ready {
     /// Lines to print before the first check.
     pub lines: Vec<String>,
     pub checks: Vec<CheckName>,
-}
-
-/// An outcome together with its pictures, which the JSON of an outcome leaves out.
-#[derive(ToNode, FromNode)]
-pub(super) struct Done {
-    outcome: Outcome,
-    pictures: Vec<SentComparison>,
-}
-
-#[derive(ToNode, FromNode)]
-struct SentComparison {
-    what: String,
-    /// Actual, expected, difference.
-    pictures: [SentPicture; 3],
-    gain: u32,
-    fault: Option<usize>,
-}
-
-#[derive(ToNode, FromNode)]
-struct SentPicture {
-    width: u32,
-    height: u32,
-    /// In base64.
-    rgba: String,
-}
-
-impl SentPicture {
-    fn new(picture: &Picture) -> SentPicture {
-        let Picture { width, height, .. } = *picture;
-        SentPicture { width, height, rgba: BASE64_STANDARD.encode(&picture.rgba) }
-    }
-
-    /// None if it was damaged on its way.
-    fn received(self) -> Option<Picture> {
-        let rgba = BASE64_STANDARD.decode(self.rgba).ok()?;
-        let pixels = u64::from(self.width) * u64::from(self.height);
-        (rgba.len() as u64 == 4 * pixels).then_some(Picture { width: self.width, height: self.height, rgba })
-    }
-}
-
-impl Done {
-    fn new(mut outcome: Outcome) -> Done {
-        let sent = |shown: PictureComparison| SentComparison {
-            pictures: [&shown.actual, &shown.expected, &shown.difference].map(SentPicture::new),
-            what: shown.what,
-            gain: shown.gain,
-            fault: shown.fault,
-        };
-        let pictures = std::mem::take(&mut outcome.pictures).into_iter().map(sent).collect();
-        Done { outcome, pictures }
-    }
-
-    /// The outcome with its pictures.
-    pub(super) fn received(self) -> Outcome {
-        let received = |sent: SentComparison| {
-            let [actual, expected, difference] = sent.pictures.map(SentPicture::received);
-            Some(PictureComparison {
-                what: sent.what,
-                actual: actual?,
-                expected: expected?,
-                difference: difference?,
-                gain: sent.gain,
-                fault: sent.fault,
-            })
-        };
-        Outcome { pictures: self.pictures.into_iter().filter_map(received).collect(), ..self.outcome }
-    }
 }
 
 impl Message {
@@ -164,8 +94,9 @@ pub fn serve(dut: &mut DeviceUnderTest, checks: &[Check], ready: Ready) -> Resul
     let mut group = None;
     for Request { place, waits } in requests() {
         let Some(check) = checks.get(place) else { return Err(format!("there is no check {place}")) };
-        let outcome = if waits { check.run_waiting(dut) } else { check.run_after(&mut group, dut) };
-        Message::Done(Box::new(Done::new(outcome))).send()?;
+        let mut outcome = if waits { check.run_waiting(dut) } else { check.run_after(&mut group, dut) };
+        let pictures = std::mem::take(&mut outcome.pictures);
+        Message::Done(Box::new((outcome, pictures))).send()?;
     }
     Ok(())
 }

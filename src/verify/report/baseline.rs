@@ -6,11 +6,13 @@ use crate::baselines::{Threshold, differing, matched};
 use crate::profile::compare as profile;
 use crate::profile::compare::{Kind, Line, Series};
 use crate::text::escaped;
+use crate::tree::{All, Name};
 use std::collections::{BTreeMap, HashSet};
 use std::fmt::{Display, Formatter};
 
 /// How bad a change is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, All, Name)]
+#[tree(rename_all = "lowercase")]
 pub enum Class {
     /// The change fails the run: a check fails that did not before, an error now exceeds its tolerance, a time has grown beyond the threshold, or a
     /// time that was measured once has more than tripled.
@@ -18,18 +20,6 @@ pub enum Class {
     /// The change is reported, and does not fail the run.
     Changed,
     Better,
-}
-
-impl Class {
-    pub const ALL: [Class; 3] = [Class::Worse, Class::Changed, Class::Better];
-
-    pub fn word(self) -> &'static str {
-        match self {
-            Class::Worse => "worse",
-            Class::Changed => "changed",
-            Class::Better => "better",
-        }
-    }
 }
 
 /// A difference between an outcome and that of the earlier run.
@@ -132,7 +122,7 @@ pub fn compare(old: &Run, new: &Run, threshold: Threshold) -> BaselineComparison
         }
     }
     if !is_same_level {
-        let [was, is] = [old, new].map(|run| run.level.word());
+        let [was, is] = [old, new].map(|run| run.level.name());
         notes.push(format!(
             "the levels differ ({was} -> {is}), and with them the inputs of passes: an error that is another may say nothing of the device"
         ));
@@ -216,13 +206,13 @@ fn figures<'a>(old: &'a Outcome, new: &'a Outcome, pairs: &mut Vec<Pair<'a>>) ->
 fn described(run: &Run) -> String {
     let parts = [&run.date, &run.program, &run.device.name, &run.device.driver].map(|part| escaped(part));
     let [date, program, device, driver] = parts;
-    format!("the run of {date} ({program}, {}) on {device}, {driver}", run.level.word())
+    format!("the run of {date} ({program}, {}) on {device}, {driver}", run.level.name())
 }
 
 fn conditions(run: &Run) -> impl Iterator<Item = (&'static str, String)> {
     let others = [
         ("program", run.program.clone()),
-        ("level", run.level.word().into()),
+        ("level", run.level.name().into()),
         ("validation layer", if run.validation { "watching" } else { "not watching" }.into()),
     ];
     run.device.conditions().into_iter().chain(others).map(|(what, text)| (what, escaped(&text)))

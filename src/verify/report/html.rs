@@ -102,7 +102,7 @@ fn head(run: &Run, compared: Option<&BaselineComparison>) -> Markup {
         ("Clocks", clocks.map(escaped)),
         ("Program", Some(escaped(&run.program))),
         ("Date", Some(escaped(&run.date))),
-        ("Level", Some(run.level.word().into())),
+        ("Level", Some(run.level.name().into())),
         ("Validation layer", Some(if run.validation { "watching" } else { "not watching" }.into())),
     ];
     html! {
@@ -140,7 +140,7 @@ fn baseline(compared: &BaselineComparison) -> Markup {
             @for class in Class::ALL {
                 @let changes: Vec<_> = compared.changes.iter().filter(|c| c.class == class).collect();
                 @if !changes.is_empty() {
-                    h3 class=(class.word()) { (class.word()) " " span class="dim" { (changes.len()) } }
+                    h3 class=(class.name()) { (class.name()) " " span class="dim" { (changes.len()) } }
                     ul class="changes" {
                         @for change in changes {
                             li { span class="of" { (escaped(&change.group)) " / " (escaped(&change.name)) } " " span { (change.what) } }

@@ -37,7 +37,7 @@ fn suite_on(run: &Run, name: &str) -> TestSuite {
         ("driver", escaped(&run.device.driver)),
         ("api", escaped(&run.device.api)),
         ("program", escaped(&run.program)),
-        ("level", run.level.word().into()),
+        ("level", run.level.name().into()),
         ("validation", run.validation.to_string()),
         ("date", escaped(&run.date)),
     ];

@@ -11,17 +11,18 @@ pub mod prometheus;
 
 use crate::baselines::Stored;
 use crate::machine::Device;
+use crate::passes::Texels;
 use crate::picture::Picture;
 use crate::profile::statistics::{Sample, SampleError};
 use crate::text::escaped;
-use crate::tree::{FromNode, ToNode};
+use crate::tree::{FromNode, Name, ToNode};
 use baseline::{BaselineComparison, Class};
 use std::collections::{HashMap, HashSet};
 use std::fmt::Write as _;
 use std::time::Duration;
 
 /// How thoroughly a device is checked.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ToNode, FromNode)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, FromNode, Name, ToNode)]
 #[tree(rename_all = "lowercase")]
 pub enum Level {
     /// For CI: every pass, mode and path once.
@@ -213,17 +214,30 @@ pub struct Worst {
 }
 
 /// An actual picture, the expected one, and their difference.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, ToNode, FromNode)]
 pub struct PictureComparison {
     /// Short description of what is compared.
     pub what: String,
+    #[tree(with = "encoded")]
     pub actual: Picture,
+    #[tree(with = "encoded")]
     pub expected: Picture,
     /// The absolute difference of each channel, multiplied by `gain`; alpha is 255.
+    #[tree(with = "encoded")]
     pub difference: Picture,
     pub gain: u32,
     /// Index in [`Outcome::faults`] of the fault that the pictures show; None if they show none.
     pub fault: Option<usize>,
+}
+
+impl Worst {
+    /// A value of an output. `index`: of the value in the texels of the expected output, `values`; the number beyond tolerance is 0.
+    pub(crate) fn of(output: &str, values: &Texels, index: usize, [expected, got]: [f64; 2]) -> Worst {
+        let (texel, [w, h, _]) = (index / values.channels, values.size);
+        let at = [texel % w, texel / w % h, texel / w / h];
+        let (channel, texels) = (index % values.channels, values.values.len());
+        Worst { output: output.into(), at, channel, expected, got, beyond: 0, texels }
+    }
 }
 
 impl Fault {
@@ -239,20 +253,24 @@ impl Figure {
         Figure { what: what.into(), value, allowed: Some(allowed), unit, samples: Vec::new(), fleeting: false }
     }
 
+    /// A figure without a limit.
+    pub(crate) fn informative(what: impl Into<String>, value: f64, unit: Unit) -> Figure {
+        Figure { allowed: None, ..Figure::error(what, value, 0.0, unit) }
+    }
+
     /// The figure of times, ns, of the same work in the order of measurement.
     ///
     /// # Errors
     /// There is no time, or one is not finite.
     pub fn times(what: impl Into<String>, samples: Vec<f64>) -> Result<Figure, SampleError> {
         let value = Sample::new(&samples)?.median();
-        Ok(Figure { what: what.into(), value, allowed: None, unit: Unit::Ns, samples, fleeting: false })
+        Ok(Figure { samples, ..Figure::informative(what, value, Unit::Ns) })
     }
 
     /// The figure of a time that was measured once. A comparison with a baseline reports it only if it changed by a factor above 3 and by more than
     /// 0.1 s.
     pub fn single_time(what: impl Into<String>, time: Duration) -> Figure {
-        let value = time.as_nanos() as f64;
-        Figure { what: what.into(), value, allowed: None, unit: Unit::Ns, samples: Vec::new(), fleeting: false }
+        Figure::informative(what, time.as_nanos() as f64, Unit::Ns)
     }
 
     /// True for the figure of a time that was measured once.
@@ -273,23 +291,19 @@ impl Figure {
 }
 
 impl Outcome {
+    /// An outcome with nothing measured, found or noted, after 0 s.
+    pub(crate) fn new(CheckName { group, name }: CheckName, verdict: Verdict) -> Outcome {
+        let (figures, faults, notes, pictures) = Default::default();
+        Outcome { group, name, verdict, seconds: 0.0, figures, faults, notes, failed_before: 0, pictures }
+    }
+
     /// The outcome of a check that was not run. `why`: the fault if the verdict is failed, otherwise a note.
     pub(crate) fn unrun(check: &CheckName, verdict: Verdict, why: String) -> Outcome {
         let (faults, notes) = match verdict {
             Verdict::Failed => (vec![Fault::new(why)], Vec::new()),
             _ => (Vec::new(), vec![why]),
         };
-        Outcome {
-            group: check.group.clone(),
-            name: check.name.clone(),
-            verdict,
-            seconds: 0.0,
-            figures: Vec::new(),
-            faults,
-            notes,
-            failed_before: 0,
-            pictures: Vec::new(),
-        }
+        Outcome { faults, notes, ..Outcome::new(check.clone(), verdict) }
     }
 
     /// Runs a check that failed again, to find the cause. `again` runs it once more; `waiting` runs it while the host waits for each submission
@@ -344,15 +358,6 @@ impl Verdict {
             Verdict::Failed => "failed",
             Verdict::LeftOut => "left out",
             Verdict::Interrupted => "interrupted",
-        }
-    }
-}
-
-impl Level {
-    pub fn word(self) -> &'static str {
-        match self {
-            Level::Quick => "quick",
-            Level::Full => "full",
         }
     }
 }
@@ -454,6 +459,25 @@ mod any_number {
             _ => f64::from_node(node.clone())
                 .map_err(|_| node.invalid("a number, \"NaN\", \"Infinity\" or \"-Infinity\"")),
         }
+    }
+}
+
+/// Pictures as their size and their pixels in base64.
+mod encoded {
+    use crate::picture::Picture;
+    use crate::tree::{FromNode, Node, NodeError, ToNode};
+    use base64::Engine as _;
+    use base64::prelude::BASE64_STANDARD;
+
+    pub fn to_node(picture: &Picture) -> Node {
+        ((picture.width, picture.height), BASE64_STANDARD.encode(&picture.rgba)).to_node()
+    }
+
+    pub fn from_node(node: Node) -> Result<Picture, NodeError> {
+        let ((width, height), text) = <((u32, u32), String)>::from_node(node.clone())?;
+        let rgba = BASE64_STANDARD.decode(text).map_err(|_| node.invalid("a picture"))?;
+        let is_whole = rgba.len() as u64 == 4 * u64::from(width) * u64::from(height);
+        is_whole.then_some(Picture { width, height, rgba }).ok_or_else(|| node.invalid("a picture"))
     }
 }
 
@@ -564,7 +588,7 @@ pub fn summary(run: &Run) -> String {
         escaped(&device.name),
         escaped(&device.driver),
         escaped(&device.api),
-        run.level.word(),
+        run.level.name(),
     )
 }
 
@@ -579,7 +603,7 @@ pub fn comparison(compared: &BaselineComparison) -> String {
         let changes: Vec<_> = compared.changes.iter().filter(|c| c.class == class).collect();
         let listed = if class == Class::Worse { changes.len() } else { changes.len().min(MAX_CHANGES) };
         if listed > 0 {
-            let _ = writeln!(text, "{}:", class.word());
+            let _ = writeln!(text, "{}:", class.name());
         }
         for change in &changes[..listed] {
             let _ = writeln!(text, "  {change}");

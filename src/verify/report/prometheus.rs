@@ -14,7 +14,7 @@ pub fn prometheus(run: &Run, compared: Option<&BaselineComparison>) -> String {
         &device.driver,
         &device.api,
         &run.program,
-        &run.level.word().to_string(),
+        &run.level.name().to_string(),
         &run.validation.to_string(),
     ];
     let words = [

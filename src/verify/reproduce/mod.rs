@@ -5,7 +5,7 @@ mod amber;
 
 use super::DeviceUnderTest;
 use super::compare::{ExtraTolerance, tolerance_of};
-use super::each_pass::{KINDS, POISON, dispatch_args_of, inputs_of, run_with_reference, seed_of};
+use super::each_pass::{KINDS, POISON, dispatch_args_of, inputs_of, run_with_reference, seed_of, untouched};
 use crate::files;
 use crate::gpu::GpuError;
 use crate::gpu::pass_runner::PassRunner;
@@ -229,12 +229,7 @@ fn case_of(
     inputs: &Arrays,
 ) -> Result<Case, GpuError> {
     let scene = &runner.adapted(choice.scene);
-    let mut expected = Arrays::default();
-    let writes = pass.writes(scene, args);
-    for bind in &writes {
-        let channels = bind.slot.format(scene).channels();
-        expected.insert(bind.name, Texels::untouched(bind.slot.array_size(scene), channels));
-    }
+    let (mut expected, writes) = (untouched(scene, pass, args), pass.writes(scene, args));
     pass.expected(choice.scene, args, inputs, &mut expected);
     let shader = runner.shader(scene, pass, args)?;
     let extra = ExtraTolerance::of(pass, scene, args, runner.filter_bits());

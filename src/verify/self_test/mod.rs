@@ -12,7 +12,7 @@ use crate::passes::fault_injection::InjectedFault;
 use crate::passes::{PASSES, Texels, is_hit};
 use crate::probe::Geometry;
 use crate::queues::oracle::SubmissionLog;
-use crate::report::{Fault, Level, Outcome, Verdict};
+use crate::report::{CheckName, Fault, Level, Outcome, Verdict};
 use crate::scene::Scene;
 use crate::{
     Check, DeviceUnderTest, Findings, credible_messages, each_pass, known_answers, memory, render, sampling,
@@ -54,17 +54,9 @@ impl Detection {
             Some(by) => (Verdict::Passed, Vec::new(), Some(format!("caught by {by}: {}", self.message))),
             None => (Verdict::Failed, vec![Fault::new(format!("not caught: {}", self.message))], None),
         };
-        Outcome {
-            group: "self-test".into(),
-            name: self.fault.clone(),
-            verdict,
-            seconds: self.seconds,
-            figures: Vec::new(),
-            faults,
-            notes: [Some(self.what.clone()), note].into_iter().flatten().chain(self.history()).collect(),
-            failed_before: 0,
-            pictures: Vec::new(),
-        }
+        let notes = [Some(self.what.clone()), note].into_iter().flatten().chain(self.history()).collect();
+        let check = CheckName { group: "self-test".into(), name: self.fault.clone() };
+        Outcome { seconds: self.seconds, faults, notes, ..Outcome::new(check, verdict) }
     }
 }
 

@@ -3,9 +3,7 @@
 use super::{Bytes, told};
 use echolume::low_level::probe::Grid;
 use echolume::low_level::source::StoredType;
-use echolume::low_level::source::freehand::{
-    Compounder, CompoundingOptions, Lattice, Overlap, Pose, Splat, TrackedFrame,
-};
+use echolume::low_level::source::freehand::{Compounder, CompoundingOptions, Lattice, Pose, TrackedFrame};
 use glam::{DAffine3, DVec3};
 
 const MOST_VOXELS: usize = 1 << 12;
@@ -23,8 +21,6 @@ pub fn compounder(bytes: &[u8]) -> String {
     let mut bytes = Bytes(bytes);
     let stored = |n: u8| [StoredType::U8, StoredType::U16, StoredType::F32][usize::from(n % 3)];
     let options = CompoundingOptions {
-        splat: [Splat::Nearest, Splat::Trilinear][usize::from(bytes.u8() % 2)],
-        overlap: [Overlap::Mean, Overlap::Latest, Overlap::Maximum][usize::from(bytes.u8() % 3)],
         max_hole: if bytes.u8() < 128 { 2.0 } else { bytes.number() },
         clip: (bytes.u8() > 200).then(|| std::array::from_fn(|_| usize::from(bytes.u8()) << (bytes.u8() % 8))),
         spacing: (bytes.u8() > 128).then(|| bytes.number()),

@@ -3,6 +3,7 @@
 use super::*;
 use ash::vk;
 use echolume::low_level::gpu::faults::InjectionPoint;
+use echolume::low_level::kiosk::chord::Chord;
 
 /// Prevents a console that ends with its probe, or does not find it again by itself.
 #[test]
@@ -42,7 +43,7 @@ fn a_lost_source_is_awaited_and_the_picture_stays() {
 #[test]
 fn a_kiosk_is_left_by_its_chord_alone_and_a_window_by_escape() {
     let device = Device::alone();
-    let chord = "ctrl+alt+q".parse().expect("keys");
+    let chord = Chord::parse("ctrl+alt+q").expect("keys");
     let (all, none) = (Modifiers { control: true, alt: true, shift: false }, Modifiers::default());
     for is_kiosk in [true, false] {
         let mut desk = Desk::new(&device, ConsoleOptions { is_kiosk, exit: is_kiosk.then_some(chord), ..options() });

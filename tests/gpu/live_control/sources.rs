@@ -30,7 +30,7 @@ fn after_a_slow_picture_a_live_source_shows_its_newest_volume_and_a_recording_ea
         let counted = count.clone();
         let wake: Wake = Arc::new(move || _ = counted.fetch_add(1, Ordering::Relaxed));
         let source = Box::new(Paced(Fed { said, is_recording: false }, waits));
-        let feed = Feed::waking(source, None, Some(wake)).expect("thread");
+        let feed = Feed::observed(source, None, Some(wake), None).expect("thread");
         let stream = Stream::new(&device, feed, settings("mode = 'mip'"), kept(Update::Whole));
         let mut bench = Bench { stream, say, faults: Vec::new() };
         bench.begin(header(0.3));

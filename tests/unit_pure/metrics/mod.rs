@@ -94,7 +94,7 @@ pub fn parsed(text: &str) -> Metrics {
         let (name, said) = help.strip_prefix("# HELP ").and_then(|rest| rest.split_once(' ')).expect("HELP first");
         let metric = table::ALL.iter().find(|metric| metric.name == name).unwrap_or_else(|| panic!("{name}"));
         assert_eq!(said, metric.help);
-        assert_eq!(lines.next(), Some(format!("# TYPE {name} {}", metric.kind.word()).as_str()));
+        assert_eq!(lines.next(), Some(format!("# TYPE {name} {}", metric.kind.name()).as_str()));
         let (names, mut found) = (sample_names(metric), Metrics::new());
         while let Some(line) = lines.next_if(|line| !line.starts_with('#')) {
             let (of, labels, value) = sample(line);

@@ -3,6 +3,7 @@
 use echolume::low_level::baselines::Stored;
 use echolume::low_level::machine::Device;
 use echolume::low_level::profile::{Acquisition, Ceiling, Ceilings, PassProfile, Profile, Sizes, settings_hash};
+use echolume::low_level::statistics::mix;
 
 /// Vigna's splitmix64: the same numbers everywhere.
 pub struct Random(pub u64);
@@ -10,10 +11,7 @@ pub struct Random(pub u64);
 impl Random {
     pub fn unit(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+        (mix(self.0) >> 11) as f64 / (1u64 << 53) as f64
     }
 
     /// Box and Muller.

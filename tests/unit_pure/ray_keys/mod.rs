@@ -14,6 +14,7 @@ use echolume::low_level::probe::{Advance, Array, Axis, Geometry, Grid, Indices, 
 use echolume::low_level::reference;
 use echolume::low_level::scene::load::Layers;
 use echolume::low_level::scene::{Edge, Mode, Scene, SurfaceColour};
+use echolume::low_level::statistics::mix;
 use glam::DVec3;
 use keys::{Key, Of, declared, keys};
 use rayon::prelude::*;
@@ -71,9 +72,7 @@ struct Draw(u64);
 impl Draw {
     fn unit(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let a = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let b = (a ^ (a >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((b ^ (b >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+        (mix(self.0) >> 11) as f64 / (1u64 << 53) as f64
     }
 
     fn of(&mut self, count: usize) -> usize {

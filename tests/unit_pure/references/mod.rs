@@ -12,6 +12,7 @@ use crate::common::scenes::{self, FLOATS};
 use echolume::low_level::passes::{Arrays, DispatchArgs, MISS, Pass, Texels, by_name};
 use echolume::low_level::probe::{Geometry, Grid};
 use echolume::low_level::scene::Scene;
+use echolume::low_level::statistics::mix;
 
 fn scene(size: [usize; 3], toml: &str) -> Scene {
     scenes::scene(voxels(size), FLOATS, toml)
@@ -61,10 +62,8 @@ fn rows<const W: usize, const H: usize>(rows: [[f64; W]; H]) -> Texels {
 
 /// A pseudo-random number in 0..1 from a seed.
 fn hash(seed: usize) -> f64 {
-    let mut z = (seed as u64).wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    let mixed = mix((seed as u64).wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15));
+    (mixed >> 11) as f64 / (1u64 << 53) as f64
 }
 
 fn noise(size: [usize; 2], seed: usize) -> Texels {

@@ -4,6 +4,7 @@
 use echolume::low_level::probe::{Geometry, Grid};
 use echolume::low_level::source::convert::Volume;
 use echolume::low_level::source::{Frame, StoredType};
+use echolume::low_level::statistics::mix;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -70,10 +71,7 @@ struct Random(u64);
 impl Random {
     fn uniform(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+        (mix(self.0) >> 11) as f64 / (1u64 << 53) as f64
     }
 
     /// By Box and Muller.

@@ -6,11 +6,7 @@ use crate::scene::{Bilateral, Scene};
 pub(crate) const DISTANCE: Pass = Pass {
     name: "bilateral_distance",
     shader: |_, _| "filter/bilateral.distance",
-    needed: |s| match (s.has_distance(), s.distance.bilateral) {
-        (false, _) => Err("no distance map in this mode"),
-        (true, None) => Err("not asked for"),
-        _ => Ok("asked for"),
-    },
+    needed: |s| s.distance.bilateral.map(|_| "asked for").ok_or("not asked for"),
     extent: |s, t| in_runs(ray_extent(s, t), 1),
     repeat: |s| settings(s).repeat,
     params: |s, t| {

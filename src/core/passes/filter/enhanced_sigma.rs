@@ -27,10 +27,7 @@ pub const SLICE: Pass = Pass {
 pub(crate) const DISTANCE: Pass = Pass {
     name: "enhanced_sigma_distance",
     shader: |_, _| "filter/enhanced_sigma.distance",
-    needed: |s| match s.has_distance() {
-        true => need(s.distance.enhanced_sigma),
-        false => Err("no distance map in this mode"),
-    },
+    needed: |s| need(s.distance.enhanced_sigma),
     params: |s, t| params(s.distance.enhanced_sigma, [least_distance(s), 0.0], t),
     constants: |s, _| constants(s, s.distance.enhanced_sigma, false),
     // A pixel in mm differs by 4e-6 between f32 and f64, a hundred times as much as one in 0..1.

@@ -23,10 +23,7 @@ pub const SLICE: Pass = Pass {
 pub(crate) const DISTANCE: Pass = Pass {
     name: "perona_malik_distance",
     shader: |_, _| "filter/perona_malik.distance",
-    needed: |s| match s.has_distance() {
-        true => need(s.distance.perona_malik, Scheme::Explicit),
-        false => Err("no distance map in this mode"),
-    },
+    needed: |s| need(s.distance.perona_malik, Scheme::Explicit),
     repeat: |s| repeat(s.distance.perona_malik),
     params: |s, t| params(s.distance.perona_malik, t),
     constants: |s, _| vec![constant(s.distance.perona_malik)],

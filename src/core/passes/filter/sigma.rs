@@ -33,7 +33,7 @@ pub const SLICE: Pass = Pass {
 pub(crate) const DISTANCE: Pass = Pass {
     name: "sigma_distance",
     shader: |_, _| "filter/sigma.distance",
-    needed: |s| if s.has_distance() { need(s.distance.sigma) } else { Err("no distance map in this mode") },
+    needed: |s| need(s.distance.sigma),
     extent: |s, t| in_runs(ray_extent(s, t), 1),
     repeat: |s| s.distance.sigma.unwrap_or_default().repeat,
     params: |s, t| params(s.distance.sigma, 0.0, t),

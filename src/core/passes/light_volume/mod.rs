@@ -13,7 +13,7 @@ use super::raycast::ray;
 use crate::passes::lookup_tables::transfer_of;
 use crate::passes::pass::*;
 use crate::passes::shade::wrap;
-use crate::scene::{LightVolume, Scene};
+use crate::scene::{LightVolume, Scene, windowed};
 use glam::DVec3;
 
 /// Density that fluid counts as where light is scattered: FLUID of diffuse.comp.
@@ -92,8 +92,7 @@ pub(crate) const MATTER: Pass = Pass {
                 let is_kept = scene.clips().all(|(normal, limit)| normal.dot(place) <= limit);
                 let Some(texel) = ray::texel_beyond_sweep(scene, place).filter(|_| is_kept) else { continue };
                 let value = ray::interpolated(scene, volume, texel);
-                let [low, high] = view.window;
-                let entry = ((value - low) / (high - low)).clamp(0.0, 1.0) * (table.len() - 1) as f64;
+                let entry = windowed(view.window, value) * (table.len() - 1) as f64;
                 let n = (entry as usize).min(table.len() - 2);
                 let absorption = table[n][3] + (table[n + 1][3] - table[n][3]) * (entry - n as f64);
                 dense += absorption;

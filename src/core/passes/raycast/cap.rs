@@ -5,11 +5,10 @@
 //! fluid. Where the disc reaches into fluid, the face ends half-way between the disc's darkest and brightest part. That is the middle of the edge,
 //! where the surface is, so that the two meet whatever the level is.
 
-use super::cube;
 use super::ray;
 use crate::passes::pass::*;
-use crate::scene::Scene;
 use crate::scene::cube::HalfSpace;
+use crate::scene::{Scene, windowed};
 use glam::DVec3;
 use std::f64::consts::FRAC_PI_6;
 
@@ -92,12 +91,10 @@ fn reference_pixel(scene: &Scene, volume: &Texels, x: usize, y: usize) -> Option
     let (origin, direction) = scene.rays.at(x as f64 + 0.5, y as f64 + 0.5);
     let level = scene.cap_level()?;
     let view = scene.cap_view();
-    let sides = DVec3::AXES.iter().flat_map(|axis| [(*axis, view.high), (-*axis, view.low)]);
-    let mut solid: Vec<_> = sides.map(|(normal, corner)| HalfSpace { normal, limit: normal.dot(corner) }).collect();
-    let sides = solid.len();
-    solid.extend(scene.clips().map(|(normal, limit)| HalfSpace { normal, limit }));
-    let (enter, _, face) = cube::entry(&solid, origin, direction)?;
-    let face = face.filter(|face| *face >= sides)?;
+    let solid: Vec<HalfSpace> = ray::solid(scene, view).collect();
+    let (enter, _, face) = ray::entry(solid.iter().copied(), origin, direction)?;
+    // A clip plane, and no side of the box.
+    let face = face.filter(|face| *face >= 6)?;
     let place = origin + direction * enter;
     let is_on_face = |place: &DVec3| solid.iter().enumerate().all(|(i, half)| i == face || half.room(*place) >= 0.0);
     let echo = |place: DVec3| ray::texel(scene, place).map(|at| ray::interpolated(scene, volume, at));
@@ -116,9 +113,8 @@ fn reference_pixel(scene: &Scene, volume: &Texels, x: usize, y: usize) -> Option
     let parts = (0..6).filter_map(|n| mean(&mut (0..3).map(|i| beside(1.0, 2 * n + 11 + i))));
     let (least, most) = parts.fold((middle, middle), |(least, most), part| (least.min(part), most.max(part)));
     let is_tissue = middle >= level && (least >= level || middle >= (least + most) / 2.0);
-    let [low, high] = view.window;
     let opacity = if scene.fades_caps() { scene.faded(place) } else { 1.0 };
-    is_tissue.then(|| [((own - low) / (high - low)).clamp(0.0, 1.0), opacity])
+    is_tissue.then(|| [windowed(view.window, own), opacity])
 }
 
 /// Axes of the plane with this unit normal (Duff et al. 2017, Building an orthonormal basis, revisited).

@@ -4,7 +4,7 @@ use super::ray;
 use crate::passes::pass::*;
 use crate::probe::{Array, Motion, Probe};
 use crate::scene::cube::HalfSpace;
-use crate::scene::{Mode, Scene};
+use crate::scene::{Mode, Scene, windowed};
 use glam::DVec3;
 
 /// Colour and strength of the lines where faces meet: a colour, because tissue is grey.
@@ -60,28 +60,9 @@ fn stride(scene: &Scene) -> f64 {
     0.5 * scene.grid.pitch[0].min(scene.grid.pitch[1])
 }
 
-/// Where a ray enters and leaves the intersection of half-spaces, mm along it, and the index of the one that it enters last; None if it begins
-/// inside. Returns None if the ray misses the intersection.
-pub(super) fn entry(block: &[HalfSpace], origin: DVec3, direction: DVec3) -> Option<(f64, f64, Option<usize>)> {
-    let (mut enter, mut leave, mut face) = (0.0f64, f64::MAX, None);
-    for (i, half) in block.iter().enumerate() {
-        let (towards, room) = (half.normal.dot(direction), half.room(origin));
-        if towards.abs() < 1e-12 {
-            if room < 0.0 {
-                return None;
-            }
-        } else if towards > 0.0 {
-            leave = leave.min(room / towards);
-        } else if room / towards > enter {
-            (enter, face) = (room / towards, Some(i));
-        }
-    }
-    (leave > enter).then_some((enter, leave, face))
-}
-
 fn reference_pixel(scene: &Scene, volume: &Texels, block: &[HalfSpace], x: f64, y: f64) -> [f64; 4] {
     let (origin, direction) = scene.rays.at(x, y);
-    let Some((enter, leave, face)) = entry(block, origin, direction) else { return [0.0; 4] };
+    let Some((enter, leave, face)) = ray::entry(block.iter().copied(), origin, direction) else { return [0.0; 4] };
     let steps = ((leave - enter) / stride(scene)).ceil().max(1.0);
     let step = (leave - enter) / steps;
     let at = |n: f64| enter + (n + 0.02) * step;
@@ -103,8 +84,7 @@ fn reference_pixel(scene: &Scene, volume: &Texels, block: &[HalfSpace], x: f64, 
         (None, _) => (None, direction),
     };
     let Some(texel) = ray::texel(scene, place) else { return [0.0; 4] };
-    let [low, high] = scene.settings.cube.window;
-    let value = ((ray::interpolated(scene, volume, texel) - low) / (high - low)).clamp(0.0, 1.0);
+    let value = windowed(scene.settings.cube.window, ray::interpolated(scene, volume, texel));
     let grey = value * (1.0 - scene.settings.cube.shading * (1.0 - normal.dot(direction).abs()));
     let near = match own {
         Some(own) if scene.settings.cube.edges => {

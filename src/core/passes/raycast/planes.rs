@@ -5,7 +5,7 @@ use super::ray;
 use crate::passes::pass::*;
 use crate::passes::postprocess;
 use crate::scene::planes::{Column, Tile, Tiling};
-use crate::scene::{Scene, Slab};
+use crate::scene::{Scene, Slab, windowed};
 use glam::DVec3;
 
 pub(crate) const PASS: Pass = Pass {
@@ -175,7 +175,6 @@ fn value(scene: &Scene, volume: &Texels, place: DVec3) -> Option<f64> {
     if !within || scene.planes_clips().any(|(normal, limit)| normal.dot(place) > limit) {
         return None;
     }
-    let [low, high] = scene.settings.planes.window;
     let at = ray::texel(scene, place)?;
-    Some(((ray::interpolated(scene, volume, at) - low) / (high - low)).clamp(0.0, 1.0))
+    Some(windowed(scene.settings.planes.window, ray::interpolated(scene, volume, at)))
 }

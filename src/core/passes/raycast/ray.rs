@@ -5,7 +5,8 @@ use crate::passes::lookup_tables::{is_non_uniform, line_parameter, sweep_border,
 use crate::passes::pass::*;
 use crate::passes::preprocess::packed_sampling;
 use crate::probe::{Advance, Array, Geometry, Motion, Probe};
-use crate::scene::{MAX_CLIPS, Scene, View};
+use crate::scene::cube::HalfSpace;
+use crate::scene::{MAX_CLIPS, Scene, View, windowed};
 use glam::DVec3;
 
 /// Whether the sweep look-up table, the table of slices (non-uniform sweep), and the line look-up table (intra-frame motion) are
@@ -14,12 +15,7 @@ fn tables(scene: &Scene) -> (bool, bool, bool) {
     match &scene.geometry {
         Geometry::Sweep(probe) => {
             let swept = !matches!(probe.motion, Motion::Still { .. });
-            let moving = match &probe.advance {
-                Advance::None => false,
-                Advance::Same(a) => *a != 0.0,
-                Advance::Each(table) => table.iter().any(|a| *a != 0.0),
-            };
-            (swept, swept && is_non_uniform(&scene.geometry), swept && moving)
+            (swept, swept && is_non_uniform(&scene.geometry), scene.moves_in_frames())
         }
         Geometry::Cartesian(_) => (false, false, false),
     }
@@ -42,25 +38,24 @@ pub(super) fn marching_reads(scene: &Scene, skipping: Skipping) -> Vec<Bind> {
     reads
 }
 
+/// How slices lie in space: SWEEP of the shaders.
+pub(in crate::passes) fn sweep(scene: &Scene) -> i32 {
+    scene.probe().map_or(0, |probe| match probe.motion {
+        Motion::Fan { .. } => 1,
+        Motion::Translated => 2,
+        Motion::Still { .. } => 3,
+    })
+}
+
 pub(in crate::passes) fn constants(scene: &Scene) -> Vec<(&'static str, i32)> {
-    let (sweep, array) = match &scene.geometry {
-        Geometry::Cartesian(_) => (0, 0),
-        Geometry::Sweep(probe) => (
-            match probe.motion {
-                Motion::Fan { .. } => 1,
-                Motion::Translated => 2,
-                Motion::Still { .. } => 3,
-            },
-            match probe.array {
-                Array::Linear => 0,
-                Array::Curved { .. } if probe.is_radial() => 2,
-                Array::Curved { .. } => 1,
-            },
-        ),
-    };
+    let array = scene.probe().map_or(0, |probe| match probe.array {
+        Array::Linear => 0,
+        Array::Curved { .. } if probe.is_radial() => 2,
+        Array::Curved { .. } => 1,
+    });
     let (_, non_uniform, moving) = tables(scene);
     vec![
-        ("SWEEP", sweep),
+        ("SWEEP", sweep(scene)),
         ("ARRAY", array),
         ("SAMPLING", !scene.filters_in_hardware() as i32),
         ("ELEVATION", scene.takes_bspline() as i32),
@@ -322,8 +317,7 @@ impl<'a> Ray<'a> {
             0 => interpolated(self.scene, self.volume, at),
             _ => self.filtered(n, edge / 2),
         };
-        let [low, high] = self.window;
-        Some(((value - low) / (high - low)).clamp(0.0, 1.0))
+        Some(windowed(self.window, value))
     }
 
     fn filtered(&self, n: f64, reach: i64) -> f64 {
@@ -347,9 +341,8 @@ impl<'a> Ray<'a> {
 
     /// The sample after the grey window, 0..1, at a distance in mm along the ray, without `ray.sliding`. None outside the insonified region.
     pub fn echo(&self, distance: f64) -> Option<f64> {
-        let [low, high] = self.window;
         let at = texel(self.scene, self.origin + self.direction * distance)?;
-        Some(((interpolated(self.scene, self.volume, at) - low) / (high - low)).clamp(0.0, 1.0))
+        Some(windowed(self.window, interpolated(self.scene, self.volume, at)))
     }
 }
 
@@ -373,29 +366,38 @@ fn spread_range(probe: &Probe) -> f64 {
 /// Distances (enter, leave) along a ray from `origin`, mm, between which it is in the box of `view` and on the kept side of all clip planes. `enter`
 /// is at least 0. The ray misses if leave < enter.
 pub fn span(scene: &Scene, view: View, origin: DVec3, direction: DVec3) -> (f64, f64) {
-    let (mut enter, mut leave) = (0.0f64, f64::MAX);
-    for axis in 0..3 {
-        let (low, high) = (view.low[axis] - origin[axis], view.high[axis] - origin[axis]);
-        if direction[axis] == 0.0 {
-            if low > 0.0 || high < 0.0 {
-                return (0.0, -1.0);
+    let found = entry(solid(scene, view), origin, direction);
+    found.map_or((0.0, -1.0), |(enter, leave, _)| (enter, leave))
+}
+
+/// Where a ray enters and leaves the intersection of half-spaces, mm along it, and the index of the one that it enters last; None if it begins
+/// inside. Returns None if the ray misses the intersection.
+pub(super) fn entry(
+    block: impl IntoIterator<Item = HalfSpace>,
+    origin: DVec3,
+    direction: DVec3,
+) -> Option<(f64, f64, Option<usize>)> {
+    let (mut enter, mut leave, mut face) = (0.0f64, f64::MAX, None);
+    for (i, half) in block.into_iter().enumerate() {
+        let (towards, room) = (half.normal.dot(direction), half.room(origin));
+        if towards.abs() < 1e-12 {
+            if room < 0.0 {
+                return None;
             }
-            continue;
-        }
-        let (a, b) = (low / direction[axis], high / direction[axis]);
-        enter = enter.max(a.min(b));
-        leave = leave.min(a.max(b));
-    }
-    for (normal, limit) in scene.clips() {
-        let (towards, room) = (normal.dot(direction), limit - normal.dot(origin));
-        match towards.abs() < 1e-12 {
-            true if room < 0.0 => return (0.0, -1.0),
-            true => {}
-            false if towards > 0.0 => leave = leave.min(room / towards),
-            false => enter = enter.max(room / towards),
+        } else if towards > 0.0 {
+            leave = leave.min(room / towards);
+        } else if room / towards > enter {
+            (enter, face) = (room / towards, Some(i));
         }
     }
-    (enter, leave)
+    (leave > enter).then_some((enter, leave, face))
+}
+
+/// The half-spaces whose intersection a view shows: the six sides of its box, then the clip planes.
+pub(super) fn solid(scene: &Scene, view: View) -> impl Iterator<Item = HalfSpace> {
+    let sides =
+        DVec3::AXES.into_iter().flat_map(move |axis| [(axis, axis.dot(view.high)), (-axis, -axis.dot(view.low))]);
+    sides.chain(scene.clips()).map(|(normal, limit)| HalfSpace { normal, limit })
 }
 
 /// Fractional texel indices of a place in space, mm. Beyond the first and the last slice the nearest of them counts. None beyond the first or last

@@ -3,7 +3,7 @@
 use super::detector::{judged, polarity};
 use super::ray::{Ray, interpolated, texel};
 use crate::passes::texels::{Texels, pixels};
-use crate::scene::{Mode, Scene, View};
+use crate::scene::{Mode, Scene, View, windowed};
 
 /// Most rays whose samples are looked at, and most samples of each.
 const RAYS: usize = 4096;
@@ -76,11 +76,10 @@ fn rays(scene: &Scene, volume: &Texels, survey: &mut Survey) {
 }
 
 /// The largest difference between the means of `half` samples and of the `half` before them, none of them outside.
-fn largest_edge(scene: &Scene, [low, high]: [f64; 2], samples: &[Option<f64>]) -> f64 {
+fn largest_edge(scene: &Scene, window: [f64; 2], samples: &[Option<f64>]) -> f64 {
     let half = scene.ring.half as usize;
-    let windowed = |value: f64| ((value - low) / (high - low)).clamp(0.0, 1.0);
     let differences = samples.windows(2 * half).filter_map(|ring| {
-        let sum = |half: &[Option<f64>]| half.iter().map(|v| v.map(windowed)).sum::<Option<f64>>();
+        let sum = |half: &[Option<f64>]| half.iter().map(|v| v.map(|v| windowed(window, v))).sum::<Option<f64>>();
         let (older, newer) = ring.split_at(half);
         Some(judged(polarity(scene), sum(newer)? - sum(older)?) / half as f64)
     });

@@ -9,25 +9,26 @@ pub enum Shape {
     Buffer(u32),
 }
 
+/// The format of a slot's texels. The numbers are those of SPIR-V's image formats; what no shader declares has one beyond them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Format {
-    R8,
-    R16,
-    R16f,
-    R32f,
-    Rg16,
-    Rg16f,
-    Rg32f,
-    Rgba16f,
-    Rgba32f,
-    Rgba8,
+    R8 = 15,
+    R16 = 14,
+    R16f = 9,
+    R32f = 3,
+    Rg16 = 12,
+    Rg16f = 7,
+    Rg32f = 6,
+    Rgba16f = 2,
+    Rgba32f = 1,
+    Rgba8 = 4,
     /// 8 bits a channel, blue first, as most windows store their pixels.
-    Bgra8,
+    Bgra8 = 1000,
     /// 32 bits of an unsigned integer.
-    R32u,
-    Rg32u,
+    R32u = 33,
+    Rg32u = 35,
     /// A buffer of 32-bit floats.
-    Floats,
+    Floats = 1001,
 }
 
 impl Format {

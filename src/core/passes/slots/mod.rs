@@ -44,7 +44,16 @@ pub(crate) struct Meaning {
 
 const GREY: &[&str] = &["value"];
 const COLOUR: &[&str] = &["red", "green", "blue", "alpha"];
+const VECTOR: &[&str] = &["x", "y", "z", "w"];
+const LIT: &[&str] = &["red", "green", "blue", "density"];
+const ABSORBING: &[&str] = &["red", "green", "blue", "absorption"];
 const COST: &str = "cost of a candidate above that of no surface";
+const AS_THE_SHADER: &str = "vectors as the shader takes them";
+const KIND: &str = "(64 kind + distance in bricks) / 255; kinds: 0 active, 1 empty, 2 homogeneous";
+const OF_SLICE_PIXEL: &str = "colour 0..1; absorption of one slice pixel";
+const DENSITY: &str = "share of the densest matter, 0..1";
+const LIGHT: &str = "light; 1 is that of an unshadowed light of strength 1";
+const ARRIVED: &str = "light: share of what came; share of the densest matter";
 /// Of samples of the recording.
 const SHARE_OF_RANGE: &str = "share of the range of the recording's samples, 0..1, before the grey window";
 
@@ -182,8 +191,7 @@ slots! {
     Conditioned = D::image("conditioned", |s| batch(s.line_lattice(), s), |_| Format::R32f).across_queues()
         .of(GREY, SHARE_OF_RANGE);
     /// The (sample, line) of every slice pixel, for scan conversion; -1 outside the sector.
-    ScanLut = D::image("scan_lut", one_slice, |_| Format::Rg32f)
-        .by_scene(lookup_tables::scan_lut, By(lattice_differs))
+    ScanLut = D::image("scan_lut", one_slice, |_| Format::Rg32f).by_scene(lookup_tables::scan_lut, By(lattice_differs))
         .across_queues().of(&["sample", "line"], "index from 0; -1 outside the sector");
     /// Slices between two filters of stage 1; each slice of a batch is a layer.
     SliceA = D::image("slice_a", slices, |_| Format::R32f).clear().across_queues().of(GREY, SHARE_OF_RANGE);
@@ -210,9 +218,8 @@ slots! {
     WholeVolume = D::image("whole_volume", volume, volume_format).multibuffered().clear().across_queues()
         .of(GREY, SHARE_OF_RANGE);
     /// 1 in texels of floating parts of the volume, otherwise 0.
-    Floating = D::image("floating", volume, |_| Format::R8)
-        .by_volume(floating::SEARCH, |a, b| a.floating_basis() != b.floating_basis())
-        .of(GREY, "1 in parts of the volume that float");
+    Floating = D::image("floating", volume, |_| Format::R8).by_volume(floating::SEARCH,
+        |a, b| a.floating_basis() != b.floating_basis()).of(GREY, "1 in parts of the volume that float");
     /// The volume that rays are cast through, unless parts of it are removed ([`Slot::CutVolume`]).
     Volume = D::image("volume", volume, volume_format).multibuffered().clear().across_queues().of(GREY, SHARE_OF_RANGE);
     /// The volume without what cuts or the render start remove. Rays are cast through it in place of [`Slot::Volume`].
@@ -226,10 +233,10 @@ slots! {
         .by_scene(cut::start_curve, By(|a, b| a.start_curve_differs(b))).of(GREY, "row of the volume, by column and slice");
     /// The cuts: the axes of their views, and the edges of their contours or the points of their brushes.
     Cuts = D::table("cuts", |s| Shape::Buffer(16 * cut::table_length(s) as u32), cut::table, ByContent)
-        .of(&["x", "y", "z", "w"], "vectors as the shader takes them");
+        .of(VECTOR, AS_THE_SHADER);
     /// The place of each slice in space: its angle or position, and how far the motor moves during its frame.
     SlicePlaces = D::table("slice_places", |s| Shape::Buffer(16 * s.slices()), cut::slice_places, ByContent)
-        .of(&["x", "y", "z", "w"], "vectors as the shader takes them");
+        .of(VECTOR, AS_THE_SHADER);
     /// For each texel of a slice, the share (0..1) of the frame's lines that fired before the line through it.
     LineShares = D::image("line_shares", one_slice, |_| Format::R32f).by_scene(cut::line_shares, By(lattice_differs))
         .of(GREY, "share of the frame's lines that fired before");
@@ -256,67 +263,39 @@ slots! {
     BrickRanges = D::image("brick_ranges", per_brick, |_| Format::Rg16).multibuffered()
         .of(&["smallest", "largest"], SHARE_OF_RANGE);
     /// The kind of each brick for the scene's mode: active, empty or homogeneous.
-    BrickKinds = D::image("brick_kinds", per_brick, |_| Format::R8)
-        .of(GREY, "(64 kind + distance in bricks) / 255; kinds: 0 active, 1 empty, 2 homogeneous");
+    BrickKinds = D::image("brick_kinds", per_brick, |_| Format::R8).of(GREY, KIND);
     /// Steps of the distance transform of bricks: the kind of each brick, and its distance to the nearest brick of another kind along x.
     /// `BrickDistancesXy` has the distance within x and y.
-    BrickDistancesX = D::image("brick_distances_x", per_brick, |_| Format::R8)
-        .of(GREY, "(64 kind + distance in bricks) / 255; kinds: 0 active, 1 empty, 2 homogeneous");
-    BrickDistancesXy = D::image("brick_distances_xy", per_brick, |_| Format::R8)
-        .of(GREY, "(64 kind + distance in bricks) / 255; kinds: 0 active, 1 empty, 2 homogeneous");
+    BrickDistancesX = D::image("brick_distances_x", per_brick, |_| Format::R8).of(GREY, KIND);
+    BrickDistancesXy = D::image("brick_distances_xy", per_brick, |_| Format::R8).of(GREY, KIND);
     /// The kind of each brick, and its distance to the nearest brick of another kind: for the surface detector. `VolumeBrickDistances` has them for
     /// modes that composite or take the mean.
-    SurfaceBrickDistances = D::image("surface_brick_distances", per_brick, |_| Format::R8)
-        .of(GREY, "(64 kind + distance in bricks) / 255; kinds: 0 active, 1 empty, 2 homogeneous");
-    VolumeBrickDistances = D::image("volume_brick_distances", per_brick, |_| Format::R8)
-        .of(GREY, "(64 kind + distance in bricks) / 255; kinds: 0 active, 1 empty, 2 homogeneous");
+    SurfaceBrickDistances = D::image("surface_brick_distances", per_brick, |_| Format::R8).of(GREY, KIND);
+    VolumeBrickDistances = D::image("volume_brick_distances", per_brick, |_| Format::R8).of(GREY, KIND);
     /// For each entry of the transfer function, the number of entries before it that are not transparent.
-    OpaqueBefore = D::table(
-        "opaque_before",
-        |s| Shape::Buffer(4 * (s.transfer_entries() as u32 + 1)),
-        lookup_tables::opaque_before,
-        ByContent,
-    ).of(GREY, "entries of the transfer function");
+    OpaqueBefore = D::table("opaque_before", |s| Shape::Buffer(4 * (s.transfer_entries() as u32 + 1)),
+        lookup_tables::opaque_before, ByContent).of(GREY, "entries of the transfer function");
     /// Position in the sweep, in mean distances of slices from slice 0, which is the slice index if slices are equidistant. The abscissa is the
     /// tangent of half the angle of a fan, otherwise mm. The table is the same for both directions of the motor.
-    SweepLut = D::table(
-        "sweep_lut",
-        entries,
-        lookup_tables::sweep_lut,
-        By(|a, b| !a.geometry.equals_except_direction(&b.geometry) || lattice(a) != lattice(b)),
-    ).of(GREY, "mean distances of slices");
+    SweepLut = D::table("sweep_lut", entries, lookup_tables::sweep_lut,
+        By(|a, b| !a.geometry.equals_except_direction(&b.geometry) || lattice(a) != lattice(b)))
+        .of(GREY, "mean distances of slices");
     /// Share (0..1) of a frame's lines that fired before a line, over the position of the line.
     LineLut = D::table("line_lut", entries, lookup_tables::line_lut, By(lattice_differs))
         .of(GREY, "share of the lines of a frame");
     /// Position of every slice, and the motor's travel during its frame.
-    SliceTable = D::table(
-        "slice_table",
-        |s| Shape::Buffer(8 * s.slices()),
-        lookup_tables::slice_table,
-        By(|a, b| a.geometry != b.geometry),
-    ).of(&["position", "advance"], "mean distances of slices");
+    SliceTable = D::table("slice_table", |s| Shape::Buffer(8 * s.slices()), lookup_tables::slice_table,
+        By(|a, b| a.geometry != b.geometry)).of(&["position", "advance"], "mean distances of slices");
     /// The transfer function: colour and absorption over the sample value.
-    Transfer = D::table(
-        "transfer",
-        |s| Shape::Buffer(16 * s.transfer_entries() as u32),
-        lookup_tables::transfer_table,
-        ByContent,
-    ).of(&["red", "green", "blue", "absorption"], "colour 0..1; absorption of one slice pixel");
+    Transfer = D::table("transfer", |s| Shape::Buffer(16 * s.transfer_entries() as u32), lookup_tables::transfer_table,
+        ByContent).of(ABSORBING, OF_SLICE_PIXEL);
     /// Integrals of the transfer function over the sample value up to each entry: of absorption times colour, and of absorption.
-    TransferIntegral = D::table(
-        "transfer_integral",
-        |s| Shape::Buffer(16 * s.transfer_entries() as u32),
-        lookup_tables::transfer_integral,
-        ByContent,
-    ).of(&["red", "green", "blue", "absorption"], "colour 0..1; absorption of one slice pixel");
+    TransferIntegral = D::table("transfer_integral", |s| Shape::Buffer(16 * s.transfer_entries() as u32),
+        lookup_tables::transfer_integral, ByContent).of(ABSORBING, OF_SLICE_PIXEL);
     /// The mean colour and absorption of a step between every two sample values. Whether two scenes differ in it is told by the transfer function,
     /// which is shorter.
-    PreIntegrated = D::table(
-        "pre_integrated",
-        |s| Shape::Buffer(16 * (s.transfer_entries().pow(2)) as u32),
-        lookup_tables::pre_integrated_table,
-        By(|a, b| Slot::Transfer.differs(a, b)),
-    ).of(&["red", "green", "blue", "absorption"], "colour 0..1; absorption of one slice pixel");
+    PreIntegrated = D::table("pre_integrated", |s| Shape::Buffer(16 * (s.transfer_entries().pow(2)) as u32),
+        lookup_tables::pre_integrated_table, By(|a, b| Slot::Transfer.differs(a, b))).of(ABSORBING, OF_SLICE_PIXEL);
     /// Light and opacity of a complete step between every two sample values, then the transfer function for the incomplete last step of a ray. They
     /// also depend on the length of the step.
     SelfAttenuated = D::table(
@@ -326,81 +305,56 @@ slots! {
         By(|a, b| Slot::Transfer.differs(a, b) || a.optical_step() != b.optical_step()),
     ).of(&["red", "green", "blue", "opacity"], "premultiplied colour and opacity of a step, 0..1");
     /// The tiles of a picture of planes: what each shows, and its lines.
-    Tiles = D::table(
-        "tiles",
-        |s| Shape::Buffer(16 * TILE_VECTORS * s.tile_count()),
-        lookup_tables::tile_table,
-        ByContent,
-    ).of(&["x", "y", "z", "w"], "vectors as the shader takes them");
+    Tiles = D::table("tiles", |s| Shape::Buffer(16 * TILE_VECTORS * s.tile_count()), lookup_tables::tile_table,
+        ByContent).of(VECTOR, AS_THE_SHADER);
     /// The columns of a curved plane: the place of each, and the vector through its slab.
     CurveColumns = D::table("curve_columns", curve_columns, lookup_tables::curve_table, ByContent)
-        .of(&["x", "y", "z", "w"], "vectors as the shader takes them");
+        .of(VECTOR, AS_THE_SHADER);
     /// The half-spaces that bound the block of mode cube.
-    Block = D::table(
-        "block",
-        |s| Shape::Buffer(16 * s.block().len() as u32),
-        lookup_tables::block_table,
-        ByContent,
-    ).of(&["x", "y", "z", "w"], "vectors as the shader takes them");
+    Block = D::table("block", |s| Shape::Buffer(16 * s.block().len() as u32), lookup_tables::block_table, ByContent)
+        .of(VECTOR, AS_THE_SHADER);
     /// The light volume: density and echo of the matter in each cell.
     LightMatter = D::image("light_matter", |s| Shape::Three(s.light_lattice().count), |_| Format::Rg16f)
         .of(&["density", "echo"], "share of the densest matter; share of the range of the recording's samples");
     /// The Gaussian pyramid of the light volume's density. At each level cells have twice the edge of the level before.
-    LightPyramid1 = D::image("light_pyramid_1", |s| light_level(s, 1), |_| Format::R16f)
-        .of(GREY, "share of the densest matter, 0..1");
-    LightPyramid2 = D::image("light_pyramid_2", |s| light_level(s, 2), |_| Format::R16f)
-        .of(GREY, "share of the densest matter, 0..1");
-    LightPyramid3 = D::image("light_pyramid_3", |s| light_level(s, 3), |_| Format::R16f)
-        .of(GREY, "share of the densest matter, 0..1");
-    LightPyramid4 = D::image("light_pyramid_4", |s| light_level(s, 4), |_| Format::R16f)
-        .of(GREY, "share of the densest matter, 0..1");
-    LightPyramid5 = D::image("light_pyramid_5", |s| light_level(s, 5), |_| Format::R16f)
-        .of(GREY, "share of the densest matter, 0..1");
-    LightPyramid6 = D::image("light_pyramid_6", |s| light_level(s, 6), |_| Format::R16f)
-        .of(GREY, "share of the densest matter, 0..1");
-    LightPyramid7 = D::image("light_pyramid_7", |s| light_level(s, 7), |_| Format::R16f)
-        .of(GREY, "share of the densest matter, 0..1");
-    LightPyramid8 = D::image("light_pyramid_8", |s| light_level(s, 8), |_| Format::R16f)
-        .of(GREY, "share of the densest matter, 0..1");
+    LightPyramid1 = D::image("light_pyramid_1", |s| light_level(s, 1), |_| Format::R16f).of(GREY, DENSITY);
+    LightPyramid2 = D::image("light_pyramid_2", |s| light_level(s, 2), |_| Format::R16f).of(GREY, DENSITY);
+    LightPyramid3 = D::image("light_pyramid_3", |s| light_level(s, 3), |_| Format::R16f).of(GREY, DENSITY);
+    LightPyramid4 = D::image("light_pyramid_4", |s| light_level(s, 4), |_| Format::R16f).of(GREY, DENSITY);
+    LightPyramid5 = D::image("light_pyramid_5", |s| light_level(s, 5), |_| Format::R16f).of(GREY, DENSITY);
+    LightPyramid6 = D::image("light_pyramid_6", |s| light_level(s, 6), |_| Format::R16f).of(GREY, DENSITY);
+    LightPyramid7 = D::image("light_pyramid_7", |s| light_level(s, 7), |_| Format::R16f).of(GREY, DENSITY);
+    LightPyramid8 = D::image("light_pyramid_8", |s| light_level(s, 8), |_| Format::R16f).of(GREY, DENSITY);
     /// Light that leaves the last layer of cells that a dispatch lit, towards the next layer of the light volume. Dispatches alternate between
     /// `LightFrontA` and `LightFrontB`.
-    LightFrontA = D::image("light_front_a", |s| light_layer(s, false), |_| Format::Rgba32f)
-        .of(COLOUR, "light; 1 is that of an unshadowed light of strength 1");
-    LightFrontB = D::image("light_front_b", |s| light_layer(s, false), |_| Format::Rgba32f)
-        .of(COLOUR, "light; 1 is that of an unshadowed light of strength 1");
+    LightFrontA = D::image("light_front_a", |s| light_layer(s, false), |_| Format::Rgba32f).of(COLOUR, LIGHT);
+    LightFrontB = D::image("light_front_b", |s| light_layer(s, false), |_| Format::Rgba32f).of(COLOUR, LIGHT);
     /// Light that arrives in each cell, and the density of its matter. The passes that scatter it alternate between `LightScattered` and
     /// `LightScatteredB`, so that this one stays.
     LightArriving = D::image("light_arriving", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f)
-        .of(&["red", "green", "blue", "density"], "light: share of what came; share of the densest matter");
+        .of(LIT, ARRIVED);
     LightScattered = D::image("light_scattered", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f)
-        .of(&["red", "green", "blue", "density"], "light: share of what came; share of the densest matter");
+        .of(LIT, ARRIVED);
     LightScatteredB = D::image("light_scattered_b", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f)
-        .of(&["red", "green", "blue", "density"], "light: share of what came; share of the densest matter");
+        .of(LIT, ARRIVED);
     /// Back light, in cells of twice the edge: what leaves the last layer of cells that a dispatch lit. Dispatches alternate between `BackFrontA` and
     /// `BackFrontB`. `BackLight` is the back light that arrives in each of these cells, and the density of its matter.
-    BackFrontA = D::image("back_front_a", |s| light_layer(s, true), |_| Format::Rgba32f)
-        .of(COLOUR, "light; 1 is that of an unshadowed light of strength 1");
-    BackFrontB = D::image("back_front_b", |s| light_layer(s, true), |_| Format::Rgba32f)
-        .of(COLOUR, "light; 1 is that of an unshadowed light of strength 1");
-    BackLight = D::image("back_light", |s| light_level(s, 1), |_| Format::Rgba16f)
-        .of(&["red", "green", "blue", "density"], "light: share of what came; share of the densest matter");
+    BackFrontA = D::image("back_front_a", |s| light_layer(s, true), |_| Format::Rgba32f).of(COLOUR, LIGHT);
+    BackFrontB = D::image("back_front_b", |s| light_layer(s, true), |_| Format::Rgba32f).of(COLOUR, LIGHT);
+    BackLight = D::image("back_light", |s| light_level(s, 1), |_| Format::Rgba16f).of(LIT, ARRIVED);
     /// In cells of twice the edge: the sum of ambient light, which comes from the side of the probe, and back light (red, green, blue), and the
     /// ambient light alone (alpha).
-    LightAmbient = D::image("light_ambient", |s| light_level(s, 1), |_| Format::Rgba16f)
-        .of(COLOUR, "light; 1 is that of an unshadowed light of strength 1");
+    LightAmbient = D::image("light_ambient", |s| light_level(s, 1), |_| Format::Rgba16f).of(COLOUR, LIGHT);
     /// Light that white matter in each cell scatters towards the viewer, by colour, and the ambient light that arrives there.
     LightShade = D::image("light_shade", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f)
-        .of(COLOUR, "light; 1 is that of an unshadowed light of strength 1");
+        .of(COLOUR, LIGHT);
     /// For each cell the direction towards weaker echoes, whose length (0..1) is its certainty, and the light for a highlight.
     LightNormals = D::image("light_normals", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f)
         .of(&["x", "y", "z", "highlight"], "direction, as long as it is certain; light");
     /// The medium of a still at the entries of the transfer function: albedo and extinction.
-    StillMedium = D::table(
-        "still_medium",
-        |s| Shape::Buffer(16 * s.transfer_entries() as u32),
-        lookup_tables::still_medium,
-        ByContent,
-    ).of(&["red", "green", "blue", "extinction"], "albedo of scattering, 0..1; extinction, 1/mm");
+    StillMedium = D::table("still_medium", |s| Shape::Buffer(16 * s.transfer_entries() as u32),
+        lookup_tables::still_medium, ByContent)
+        .of(&["red", "green", "blue", "extinction"], "albedo of scattering, 0..1; extinction, 1/mm");
     /// The largest extinction of each brick, for stills.
     StillMajorants = D::image("still_majorants", per_brick, |_| Format::R32f).of(GREY, "largest extinction of a brick, 1/mm");
     /// Sums over the paths of each pixel of a still: light and the number of paths that met matter. `StillSquaresA` has the sums of the squares of

@@ -3,7 +3,7 @@
 
 use crate::scene::number::Allowed::Range;
 use crate::scene::number::{ANGLE, Number, SHARE, number};
-use crate::tree::{FromNode, ToNode};
+use crate::tree::{All, Defaults, FromNode, ToNode};
 
 /// Most body marks of a scene.
 pub const MAX_BODY_MARKS: usize = 4;
@@ -11,7 +11,7 @@ pub const MAX_BODY_MARKS: usize = 4;
 pub const BODY_MARK_SIZES: [f64; 2] = [0.06, 0.5];
 
 /// A body mark. It keeps its place on the picture whatever the view.
-#[derive(Clone, Copy, Debug, PartialEq, FromNode, ToNode)]
+#[derive(Clone, Copy, Debug, PartialEq, Defaults, FromNode, ToNode)]
 #[tree(deny_unknown_fields, default)]
 pub struct BodyMark {
     /// The part of the body.
@@ -22,32 +22,23 @@ pub struct BodyMark {
     pub mirrored: bool,
     /// Its centre, as shares of the picture's width and height from the upper left corner. Near an edge of the picture the mark is drawn further
     /// inside, so that all of it is on the picture. Absent: 0.12, 0.8.
+    #[value([0.12, 0.8])]
     pub at: [f64; 2],
     /// The edge of its square, as a share of the picture's shorter edge, 0.06..=0.5. Absent: 0.18.
+    #[value(0.18)]
     pub size: f64,
     /// Where on the body the probe is: right and down from the centre of the mark; its edges are at -1 and 1. Absent: the centre.
     pub probe: [f64; 2],
     /// Where the marker of the probe points, degrees clockwise from up. -90 is the right side of a body that is seen from the front, and the left side of the
     /// head, which is seen from above. Absent: -90.
+    // Transverse, as most examinations begin.
+    #[value(-90.0)]
     pub angle: f64,
 }
 
-impl Default for BodyMark {
-    fn default() -> BodyMark {
-        BodyMark {
-            body: Body::default(),
-            mirrored: false,
-            at: [0.12, 0.8],
-            size: 0.18,
-            probe: [0.0, 0.0],
-            // Transverse, as most examinations begin.
-            angle: -90.0,
-        }
-    }
-}
-
 /// The part of the body that a body mark shows; all but the head are seen from the front.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode, ToNode)]
+// In the order of their buttons.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, All, FromNode, ToNode)]
 #[tree(rename_all = "kebab-case")]
 pub enum Body {
     /// The trunk from the ribs to the groins.
@@ -70,18 +61,6 @@ pub enum Body {
 }
 
 impl Body {
-    /// All parts, in the order of their buttons.
-    pub const ALL: [Body; 8] = [
-        Body::Abdomen,
-        Body::FetusCephalic,
-        Body::FetusBreech,
-        Body::FetusTransverse,
-        Body::Uterus,
-        Body::Head,
-        Body::Neck,
-        Body::Breast,
-    ];
-
     /// Name of the part of the body that the user reads.
     pub fn title(self) -> &'static str {
         match self {

@@ -2,10 +2,10 @@
 
 use crate::scene::number::Allowed::Range;
 use crate::scene::number::{Number, number};
-use crate::tree::{FromNode, ToNode};
+use crate::tree::{Defaults, FromNode, ToNode};
 
 /// The cine loop. The viewer plays it; `render --volumes loop` draws it.
-#[derive(Clone, Copy, Debug, PartialEq, FromNode, ToNode)]
+#[derive(Clone, Copy, Debug, PartialEq, Defaults, FromNode, ToNode)]
 #[tree(deny_unknown_fields, default)]
 pub struct Cine {
     /// The first volume that is played, by its number in the recording, from 0. Absent: the first one.
@@ -13,15 +13,10 @@ pub struct Cine {
     /// The last volume that is played. Absent: the last one.
     pub last: Option<u32>,
     /// How fast the viewer plays it, as a multiple of the speed of the acquisition, 0.1..=8.
+    #[value(1.0)]
     pub speed: f64,
     /// The loop is played to its last volume and back, also in a film. Otherwise it begins again after the last volume.
     pub back_and_forth: bool,
-}
-
-impl Default for Cine {
-    fn default() -> Cine {
-        Cine { first: None, last: None, speed: 1.0, back_and_forth: false }
-    }
 }
 
 impl Cine {

@@ -2,7 +2,7 @@
 
 use crate::scene::number::Allowed::Range;
 use crate::scene::number::{LARGEST, LENGTH, LENGTH_OR_0, Number, PLACE, number};
-use crate::tree::{FromNode, ToNode};
+use crate::tree::{Defaults, FromNode, ToNode};
 
 /// Most cuts of a scene.
 pub const MAX_CUTS: usize = 32;
@@ -55,25 +55,21 @@ impl Brush {
 }
 
 /// The view at which the contour of a cut was drawn.
-#[derive(Clone, Copy, Debug, PartialEq, FromNode, ToNode)]
+// The default is from the probe down, as a camera without angles looks.
+#[derive(Clone, Copy, Debug, PartialEq, Defaults, FromNode, ToNode)]
 #[tree(deny_unknown_fields)]
 pub struct CutView {
     /// A point of the contour's plane, its origin, in mm: lateral, depth (from the probe's face), elevation.
     pub at: [f64; 3],
     /// Direction of the view, away from the viewer, of any length but 0: the normal of the contour's plane.
+    #[value([0.0, 1.0, 0.0])]
     pub direction: [f64; 3],
     /// The upward direction of the view, not parallel to `direction`; only its part in the contour's plane counts.
+    #[value([0.0, 0.0, 1.0])]
     pub up: [f64; 3],
     /// Perspective: distance of the viewer's eye from the contour's plane, mm, in front of its origin. Absent: a parallel view.
     #[tree(default, skip_serializing_if = "Option::is_none")]
     pub eye: Option<f64>,
-}
-
-/// From the probe down, as a camera without angles looks.
-impl Default for CutView {
-    fn default() -> CutView {
-        CutView { at: [0.0; 3], direction: [0.0, 1.0, 0.0], up: [0.0, 0.0, 1.0], eye: None }
-    }
 }
 
 /// The side of a cut's contour that stays.

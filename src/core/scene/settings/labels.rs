@@ -4,30 +4,28 @@ use crate::scene::Settings;
 use crate::scene::labels::SharedLabels;
 use crate::scene::number::Allowed::Any;
 use crate::scene::number::{Group, Number, SHARE, number};
-use crate::tree::{FromNode, ToNode};
+use crate::tree::{Defaults, FromNode, ToNode};
 
 /// Labels: a segmentation that is shown with the echoes (`render --labels`, `view --labels`). Planes show the boundary of each label and a
 /// translucent fill, renderings a translucent shell. They lie over the finished picture, in the colours of the file; without a file nothing of this applies.
-#[derive(Clone, Debug, PartialEq, FromNode, ToNode)]
+#[derive(Clone, Debug, PartialEq, Defaults, FromNode, ToNode)]
 #[tree(deny_unknown_fields, default)]
 pub struct Labels {
     /// Opacity of the fill on planes.
+    #[value(0.25)]
     pub fill: f64,
     /// Draw the boundaries on planes.
+    #[value(true)]
     pub outline: bool,
     /// Opacity of the shell in renderings.
+    #[value(0.5)]
     pub shell: f64,
     /// Share of the shell's opacity that is left where it lies at least 1.5 voxels behind a rendered surface. 0 hides it there.
+    #[value(0.35)]
     pub behind: f64,
     /// The labels themselves, which are in a file of their own.
     #[tree(skip)]
     pub volume: Option<SharedLabels>,
-}
-
-impl Default for Labels {
-    fn default() -> Labels {
-        Labels { fill: 0.25, outline: true, shell: 0.5, behind: 0.35, volume: None }
-    }
 }
 
 fn has_labels(s: &Settings) -> bool {

@@ -3,7 +3,7 @@
 
 use crate::scene::number::Allowed::Range;
 use crate::scene::number::{Number, SHARE, number};
-use crate::tree::{FromNode, ToNode};
+use crate::tree::{All, FromNode, ToNode};
 
 /// Largest number of measurements and annotations of a scene.
 pub const MAX_MEASURES: usize = 64;
@@ -71,7 +71,8 @@ pub struct Made {
 }
 
 /// What is measured or marked.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode, ToNode)]
+// In the order of their buttons.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, All, FromNode, ToNode)]
 #[tree(rename_all = "lowercase")]
 pub enum MeasureKind {
     /// Caliper: the straight distance of two points.
@@ -123,19 +124,6 @@ impl Measurement {
 }
 
 impl MeasureKind {
-    /// All kinds, in the order of their buttons.
-    pub const ALL: [MeasureKind; 9] = [
-        MeasureKind::Distance,
-        MeasureKind::Angle,
-        MeasureKind::Ellipse,
-        MeasureKind::Trace,
-        MeasureKind::Surface,
-        MeasureKind::Volume,
-        MeasureKind::Threshold,
-        MeasureKind::Text,
-        MeasureKind::Arrow,
-    ];
-
     /// Name of the kind that the user reads.
     pub fn title(self) -> &'static str {
         match self {

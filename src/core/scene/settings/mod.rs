@@ -31,7 +31,7 @@ pub use unveil::*;
 use super::MAX_PICTURE;
 use super::number::Allowed::{Any, Range};
 use super::number::{Group, LARGEST, LENGTH_OR_0, Number, PLACE, SHARE, number};
-use crate::tree::{FromNode, ToNode};
+use crate::tree::{Defaults, FromNode, Name, ToNode};
 
 /// Fewest points of a curved render start (`region.start_curve`).
 pub const MIN_START_POINTS: usize = 3;
@@ -131,7 +131,7 @@ impl Settings {
 }
 
 /// What a pixel shows.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode, ToNode)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode, Name, ToNode)]
 #[tree(rename_all = "lowercase")]
 pub enum Mode {
     /// VR: volume rendering, emission and absorption through a transfer function.
@@ -200,17 +200,12 @@ pub enum Layout {
 }
 
 /// The picture.
-#[derive(Clone, Debug, PartialEq, FromNode, ToNode)]
+#[derive(Clone, Debug, PartialEq, Defaults, FromNode, ToNode)]
 #[tree(deny_unknown_fields, default)]
 pub struct Picture {
     /// Width and height in pixels.
+    #[value([512, 512])]
     pub size: [u32; 2],
-}
-
-impl Default for Picture {
-    fn default() -> Self {
-        Picture { size: [512, 512] }
-    }
 }
 
 /// The values of the samples. Applies to recordings that are opened to be rendered; a stream has the range that its source states.
@@ -258,21 +253,16 @@ pub struct Clip {
 /// of the section there, as planes show it (`planes.window`), without light. Fluid stays open, so that one looks into a cavity. What is drawn
 /// translucent, such as preset glass, has no cut faces, and neither have renderings of what is dark. Cut faces show the volume that is rendered, with
 /// its filters.
-#[derive(Clone, Copy, Debug, PartialEq, FromNode, ToNode)]
+#[derive(Clone, Copy, Debug, PartialEq, Defaults, FromNode, ToNode)]
 #[tree(deny_unknown_fields, default)]
 pub struct Cap {
     /// Show the echoes of cut faces.
+    #[value(true)]
     pub enabled: bool,
     /// The echo from which on there is tissue, before any grey window. It is compared with means over a disc of the cut face; the disc's radius is
     /// the length of an edge (`surface.edge`). Absent: of surfaces the echo at `surface.threshold` within `surface.window`, of volume rendering the
     /// least echo from which on all are opaque. A lower level fills darker tissue, too, such as the brain within a skull.
     pub level: Option<f64>,
-}
-
-impl Default for Cap {
-    fn default() -> Cap {
-        Cap { enabled: true, level: None }
-    }
 }
 
 /// The [`Number`]s of the settings. Within each [`Group`], those with a slider are in the order in which the viewer shows the sliders.

@@ -6,16 +6,17 @@ use crate::scene::number::Group::Planes as Group;
 use crate::scene::number::{ANGLE, Allowed, LARGEST, LENGTH, LENGTH_OR_0, Number, PLACE, SHARE, number};
 use crate::scene::planes::MAX_TILES;
 use crate::scene::{Mode, Scene, Settings};
-use crate::tree::{FromNode, ToNode};
+use crate::tree::{Defaults, FromNode, ToNode};
 
 /// Modes plane, orthogonal and tomography, and the planes of layouts four and beside. A position and three angles define one coordinate frame for all
 /// planes. A is the B-mode plane (lateral to the right, depth down), B is perpendicular to it (elevation to the right, depth down), C is the coronal
 /// plane (lateral to the right, elevation up). All tiles are centred on the middle of the region, so that scrolling does not shift them, and have the
 /// same scale unless the line of a curved plane is too long for it.
-#[derive(Clone, Debug, PartialEq, FromNode, ToNode)]
+#[derive(Clone, Debug, PartialEq, Defaults, FromNode, ToNode)]
 #[tree(deny_unknown_fields, default)]
 pub struct Planes {
     /// Grey window: samples in this interval are stretched to 0..1.
+    #[value([0.0, 1.0])]
     pub window: [f64; 2],
     /// The common point of the three planes: lateral, depth, elevation in mm as in `region`. Absent: the middle of the region.
     pub position: Option<[f64; 3]>,
@@ -30,12 +31,15 @@ pub struct Planes {
     /// How the samples through the slab are combined.
     pub slab: Slab,
     /// Zoom factor, 0.001..=1000; 1 fits the region into a tile.
+    #[value(1.0)]
     pub zoom: f64,
     /// The plane that mode plane shows, and that the slices of tomography are parallel to.
     pub plane: PlaneName,
     /// Columns of tomography; at most 64 tiles in all.
+    #[value(4)]
     pub columns: u32,
     /// Rows of tomography.
+    #[value(3)]
     pub rows: u32,
     /// Distance between the planes of neighbouring tiles, mm. The middle tile is at `position`; of an even number of tiles the middle two are equally
     /// far from it. From tile to tile A moves towards +elevation, B towards +lateral, C along depth. Absent: the planes divide the region evenly.
@@ -45,6 +49,7 @@ pub struct Planes {
     pub reference: bool,
     /// Draws cross-lines where the other planes cut a tile, and a frame in the plane's colour: A yellow, B magenta, C cyan. Tomography has
     /// thin grey lines between tiles.
+    #[value(true)]
     pub lines: bool,
     /// Layouts four and beside: Gaussian of a volume of their own that the planes are cut from. It is filtered by nothing else and has all of the
     /// sector: region, clip planes and filters of the rendering do not apply to it. Absent: the planes are cut from what is rendered. It takes a
@@ -71,29 +76,6 @@ pub struct Curve {
 
 /// Most points of the line of a curved plane.
 pub const MAX_CURVE_POINTS: usize = 64;
-
-impl Default for Planes {
-    fn default() -> Self {
-        Planes {
-            window: [0.0, 1.0],
-            position: None,
-            azimuth: 0.0,
-            tilt: 0.0,
-            roll: 0.0,
-            thickness: 0.0,
-            slab: Slab::Mean,
-            zoom: 1.0,
-            plane: PlaneName::A,
-            columns: 4,
-            rows: 3,
-            spacing: None,
-            reference: false,
-            lines: true,
-            smooth: None,
-            curve: None,
-        }
-    }
-}
 
 /// How the samples through a slab are combined. Only samples that are inside the insonified region and are not cut off by region or clip planes
 /// count.
@@ -123,25 +105,22 @@ pub enum PlaneName {
 }
 
 /// Mode cube: the region as a solid block. Its faces show the samples that they cut.
-#[derive(Clone, Debug, PartialEq, FromNode, ToNode)]
+#[derive(Clone, Debug, PartialEq, Defaults, FromNode, ToNode)]
 #[tree(deny_unknown_fields, default)]
 pub struct Cube {
     /// Grey window: samples in this interval are stretched to 0..1.
+    #[value([0.0, 1.0])]
     pub window: [f64; 2],
     /// Distance that each face is moved inwards, mm. Insets that leave nothing of the block are refused.
     pub inset: Inset,
     /// Tilt of each face about its middle.
     pub tilt: Tilt,
     /// Share of its brightness that a face loses where it is seen edge-on; 0 shows samples unchanged.
+    #[value(0.3)]
     pub shading: f64,
     /// Draws thin lines where two faces meet. The borders of the insonified region count as faces.
+    #[value(true)]
     pub edges: bool,
-}
-
-impl Default for Cube {
-    fn default() -> Self {
-        Cube { window: [0.0, 1.0], inset: Inset::default(), tilt: Tilt::default(), shading: 0.3, edges: true }
-    }
 }
 
 /// Inset of each face of the block, mm.

@@ -4,11 +4,11 @@ use crate::scene::number::Allowed::{Any, Odd, OneOf, Range};
 use crate::scene::number::Group::Filters;
 use crate::scene::number::{Allowed, LENGTH, LENGTH_OR_0, NOT_NEGATIVE, Number, number};
 use crate::scene::{MAX_DEVIATION, MAX_WINDOW};
-use crate::tree::{FromNode, ToNode};
+use crate::tree::{Defaults, FromNode, Name, ToNode};
 
 /// Conditioning of the samples of polar frames before scan conversion (thesis 4.3), in this order: time gain compensation, low pass and
 /// decimation, log compression. Everything is off by default.
-#[derive(Clone, Debug, PartialEq, FromNode, ToNode)]
+#[derive(Clone, Debug, PartialEq, Defaults, FromNode, ToNode)]
 #[tree(deny_unknown_fields, default)]
 pub struct Conditioning {
     /// Time gain compensation: gains at increasing depths. Linear in dB between them, constant beyond the first and the last.
@@ -16,6 +16,7 @@ pub struct Conditioning {
     /// Dynamic range of log compression, dB, for linear envelopes (20 dB per decade). Absent: the samples are compressed already.
     pub dynamic_range: Option<f64>,
     /// Dynamic range, dB, that 0..1 stands for in samples that are compressed already: a gain of so many dB adds 1 to a sample.
+    #[value(60.0)]
     pub compressed_range: f64,
     /// Standard deviation of the Gaussian low pass along each line, 0..=32 samples; 0 for none. Absent: half the decimation factor if
     /// lines are decimated, else none.
@@ -24,19 +25,6 @@ pub struct Conditioning {
     pub low_pass_mm: Option<f64>,
     /// Most samples per line. Longer lines are low-passed and decimated by the smallest integer factor that meets this.
     pub samples: Option<u32>,
-}
-
-impl Default for Conditioning {
-    fn default() -> Self {
-        Conditioning {
-            tgc: Vec::new(),
-            dynamic_range: None,
-            compressed_range: 60.0,
-            low_pass: None,
-            low_pass_mm: None,
-            samples: None,
-        }
-    }
 }
 
 /// A point of the time gain compensation curve.
@@ -78,16 +66,18 @@ impl Conditioning {
 }
 
 /// Stage 1: how a frame becomes a slice. The filters run in the order in which they are listed.
-#[derive(Clone, Debug, PartialEq, FromNode, ToNode)]
+#[derive(Clone, Debug, PartialEq, Defaults, FromNode, ToNode)]
 #[tree(deny_unknown_fields, default)]
 pub struct Slices {
     /// Pixels along the longer edge of a slice (sweeps only; a Cartesian volume keeps its voxels).
+    #[value(512)]
     pub pixels: u32,
     /// Median filter of 3x3 pixels.
     pub median: bool,
     /// A local estimator, applied as a filter. Absent: none.
     pub estimator: Option<Estimator>,
     /// Edge constant k of a Perona-Malik estimator, at least 0, in sample values of 0..1: differences above it are preserved.
+    #[value(0.1)]
     pub estimator_edge: f64,
     /// Sigma filter.
     pub sigma: Option<Sigma>,
@@ -111,27 +101,8 @@ pub struct Slices {
     pub still: bool,
 }
 
-impl Default for Slices {
-    fn default() -> Self {
-        Slices {
-            pixels: 512,
-            median: false,
-            estimator: None,
-            estimator_edge: 0.1,
-            sigma: None,
-            enhanced_sigma: None,
-            perona_malik: None,
-            smooth: None,
-            blur: Blur::default(),
-            format: VolumeFormat::Auto,
-            everything: false,
-            still: false,
-        }
-    }
-}
-
 /// Texel format of the volume: memory against error.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode, ToNode)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode, Name, ToNode)]
 #[tree(rename_all = "lowercase")]
 pub enum VolumeFormat {
     /// `r16f`. On a device that truncates what it stores as such (llvmpipe) `r16`, which is more accurate there in the same time, unless a filter
@@ -148,41 +119,25 @@ pub enum VolumeFormat {
     R32f,
 }
 
-impl VolumeFormat {
-    /// The format's name in settings.
-    pub fn name(self) -> &'static str {
-        match self {
-            VolumeFormat::Auto => "auto",
-            VolumeFormat::R8 => "r8",
-            VolumeFormat::R16 => "r16",
-            VolumeFormat::R16f => "r16f",
-            VolumeFormat::R32f => "r32f",
-        }
-    }
-}
-
 /// Lee's sigma filter: the mean of the pixels of a window whose values lie within 2 sigma of the centre. Where too few do, it is the mean of the four
 /// neighbours.
-#[derive(Clone, Copy, Debug, PartialEq, FromNode, ToNode)]
+#[derive(Clone, Copy, Debug, PartialEq, Defaults, FromNode, ToNode)]
 #[tree(deny_unknown_fields, default)]
 pub struct Sigma {
     /// Window size, pixels; odd.
+    #[value(7)]
     pub window: u32,
     /// Window size in mm, in place of `window`: the nearest odd number of pixels, at most 63; less than two are no filter. Not in `post`.
     pub window_mm: Option<f64>,
     /// Standard deviation of the noise. A neighbour counts within 2 sigma. In 0..1 on slices and pictures, in mm on distances; relative to
     /// the centre's value if the noise is multiplicative.
+    #[value(0.1)]
     pub sigma: f64,
     /// Model of the noise.
     pub noise: Noise,
     /// How often the filter runs, each time on its own result; thesis 5.3: one or two.
+    #[value(1)]
     pub repeat: u32,
-}
-
-impl Default for Sigma {
-    fn default() -> Self {
-        Sigma { window: 7, window_mm: None, sigma: 0.1, noise: Noise::Additive, repeat: 1 }
-    }
 }
 
 /// Noise model (Lee 1983): how the noise depends on the value.
@@ -198,12 +153,14 @@ pub enum Noise {
 
 /// The enhanced sigma filter (thesis 5.4): a sigma filter that estimates the centre first. Its window grows, ring by ring, until as many pixels are
 /// within 2 sigma of the estimate as the starting window holds, or until it has its largest size.
-#[derive(Clone, Copy, Debug, PartialEq, FromNode, ToNode)]
+#[derive(Clone, Copy, Debug, PartialEq, Defaults, FromNode, ToNode)]
 #[tree(deny_unknown_fields, default)]
 pub struct EnhancedSigma {
     /// Starting window size, pixels; odd.
+    #[value(5)]
     pub window: u32,
     /// Largest window size, pixels; odd. Thesis Tables 7-9: 17, 19, 19 (21 in Table 8), 21, 21, 23 for starts of 3, 5, 7, 9, 11, 13.
+    #[value(19)]
     pub largest: u32,
     /// Starting window size in mm, in place of `window`: the nearest odd number of pixels, at least 3 and at most 63. Not in `post`.
     pub window_mm: Option<f64>,
@@ -211,6 +168,7 @@ pub struct EnhancedSigma {
     pub largest_mm: Option<f64>,
     /// Standard deviation of the noise. A neighbour counts within 2 sigma of the centre. In 0..1 on slices and on the brightness of
     /// pictures, in mm on distances; relative to the centre if the noise is multiplicative.
+    #[value(0.1)]
     pub sigma: f64,
     /// Model of the noise.
     pub noise: Noise,
@@ -218,29 +176,14 @@ pub struct EnhancedSigma {
     pub centre: Option<Estimator>,
     /// Edge constant k of a Perona-Malik centre, at least 0: differences above it are preserved. In 0..1 on slices and on the brightness of pictures, in
     /// millimetres on distances, also if the noise is multiplicative.
+    #[value(0.1)]
     pub edge: f64,
     /// Records by how many rings each pixel's window grew (thesis Tables 7-9). Slices only.
     pub growth: bool,
 }
 
-impl Default for EnhancedSigma {
-    fn default() -> Self {
-        EnhancedSigma {
-            window: 5,
-            largest: 19,
-            window_mm: None,
-            largest_mm: None,
-            sigma: 0.1,
-            noise: Noise::Additive,
-            centre: None,
-            edge: 0.1,
-            growth: false,
-        }
-    }
-}
-
 /// Estimate of a pixel without noise from its neighbourhood (thesis 5.3.1).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode, ToNode)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode, Name, ToNode)]
 #[tree(rename_all = "kebab-case")]
 pub enum Estimator {
     /// Median of 3x3.
@@ -254,50 +197,28 @@ pub enum Estimator {
     NagaoMatsuyama,
 }
 
-impl Estimator {
-    /// The estimator's name in settings and tables.
-    pub fn name(self) -> &'static str {
-        match self {
-            Estimator::Median => "median",
-            Estimator::PeronaMalik => "perona-malik",
-            Estimator::GradientInverse => "gradient-inverse",
-            Estimator::NagaoMatsuyama => "nagao-matsuyama",
-        }
-    }
-}
-
 /// Anisotropic diffusion with four neighbours (Perona and Malik 1990; thesis 5-9..5-12).
-#[derive(Clone, Copy, Debug, PartialEq, FromNode, ToNode)]
+#[derive(Clone, Copy, Debug, PartialEq, Defaults, FromNode, ToNode)]
 #[tree(deny_unknown_fields, default)]
 pub struct PeronaMalik {
     /// Time stepping.
     pub scheme: Scheme,
     /// Edge constant k: differences above it are preserved. In 0..1 on slices and pictures, in mm on distances. Infinity preserves none
     /// (the heat equation), 0 preserves all.
+    #[value(0.1)]
     pub edge: f64,
     /// Conductance function: how the diffusion falls with the difference of neighbouring values.
     pub conductance: Conductance,
     /// Diffusion time of one step, pixels^2. Lambda of the explicit scheme is at most 1/4, where a checkerboard, the highest frequency, only flips
     /// its sign at each step; at 1/5 three fifths of it are left. Tau of AOS is at most 1e9, that of RKL1 at most 200.
+    #[value(0.2)]
     pub step: f64,
     /// Number of steps.
+    #[value(5)]
     pub repeat: u32,
     /// Width of the diffusion in mm: the standard deviation of the Gaussian that it is where no edge stops it. It takes the
     /// place of `repeat` in the explicit scheme, whose step is then at most `step`, and of `step` in the others. Not in `post`.
     pub width_mm: Option<f64>,
-}
-
-impl Default for PeronaMalik {
-    fn default() -> Self {
-        PeronaMalik {
-            scheme: Scheme::Explicit,
-            edge: 0.1,
-            conductance: Conductance::Quotient,
-            step: 0.2,
-            repeat: 5,
-            width_mm: None,
-        }
-    }
 }
 
 impl PeronaMalik {

@@ -4,11 +4,11 @@ use crate::scene::number::Allowed::{Any, OffOr, OneOf, Range};
 use crate::scene::number::Group::{Quality, Volume as Group};
 use crate::scene::number::{ANGLE, LENGTH, Number, PLACE, SHARE, number, start_depths};
 use crate::scene::{Mode, Settings};
-use crate::tree::{FromNode, ToNode};
+use crate::tree::{Defaults, FromNode, ToNode};
 
 /// The camera. With all angles zero it looks from the probe into the body, with lateral to the right. A single frame is seen from the side instead,
 /// like a B-mode picture.
-#[derive(Clone, Debug, PartialEq, FromNode, ToNode)]
+#[derive(Clone, Debug, PartialEq, Defaults, FromNode, ToNode)]
 #[tree(deny_unknown_fields, default)]
 pub struct Camera {
     /// Angle by which the direction of view turns towards +lateral, deg.
@@ -18,6 +18,7 @@ pub struct Camera {
     /// Clockwise rotation of the picture, deg.
     pub roll: f64,
     /// Zoom factor, 0.001..=1000; 1 fits the region into the picture.
+    #[value(1.0)]
     pub zoom: f64,
     /// Vertical field of view, deg; 0 is parallel projection.
     pub field_of_view: f64,
@@ -25,14 +26,8 @@ pub struct Camera {
     pub target: Option<[f64; 3]>,
 }
 
-impl Default for Camera {
-    fn default() -> Self {
-        Camera { azimuth: 0.0, elevation: 0.0, roll: 0.0, zoom: 1.0, field_of_view: 0.0, target: None }
-    }
-}
-
 /// The rays of every mode that casts some.
-#[derive(Clone, Debug, PartialEq, FromNode, ToNode)]
+#[derive(Clone, Debug, PartialEq, Defaults, FromNode, ToNode)]
 #[tree(deny_unknown_fields, default)]
 pub struct Ray {
     /// Distance between samples, mm. Absent: one slice pixel.
@@ -42,6 +37,7 @@ pub struct Ray {
     pub samples_per_voxel: Option<u32>,
     /// Early ray termination of VR: a ray ends when its transmittance is at most this. At most this share of the light from behind is lost; 0 never
     /// ends early.
+    #[value(1.0 / 512.0)]
     pub early_end: f64,
     /// How a sample is interpolated.
     pub sampling: Sampling,
@@ -58,8 +54,10 @@ pub struct Ray {
     /// Entries of the look-up table of the slice index, where no polynomial replaces it, and of the table of the lines. Linear interpolation between
     /// entries h apart is off by at most h^2/8 times the second derivative of the index: with 1025 entries by less than 1e-5 slices for a sweep of
     /// 142 frames over 85 deg.
+    #[value(1025)]
     pub entries: u32,
     /// Rays per pixel along each axis: the picture is rendered larger and averaged.
+    #[value(1)]
     pub rays: u32,
     /// Adaptive supersampling: all of `rays` only in pixels at edges, where the colour bends by more than two levels of 8 bits; one in each of the
     /// others. It may miss detail that is narrower than a pixel. Only in mode volume, and not with first-hit shading, cut faces or `still`: other
@@ -79,28 +77,8 @@ pub struct Ray {
     /// Pixels from ray to ray along each axis, for a view that moves: 2 casts one ray for four pixels. The pixels between are interpolated, but not across
     /// the edges of surfaces. Windows of filters of the distance map have fewer rays, so that they cover about the same part of the picture. Above 1
     /// `rays` must be 1.
+    #[value(1)]
     pub subsampling: u32,
-}
-
-impl Default for Ray {
-    fn default() -> Self {
-        Ray {
-            step: None,
-            samples_per_voxel: None,
-            early_end: 1.0 / 512.0,
-            sampling: Sampling::Auto,
-            elevation: Elevation::Linear,
-            spread: 0.0,
-            sliding: 0,
-            slice_index: SliceIndex::Auto,
-            entries: 1025,
-            rays: 1,
-            adaptive: false,
-            tolerance: 0.0,
-            brick: None,
-            subsampling: 1,
-        }
-    }
 }
 
 /// How a sample is interpolated between texels.
@@ -161,15 +139,17 @@ pub enum Elevation {
 }
 
 /// Volume rendering.
-#[derive(Clone, Debug, PartialEq, FromNode, ToNode)]
+#[derive(Clone, Debug, PartialEq, Defaults, FromNode, ToNode)]
 #[tree(deny_unknown_fields, default)]
 pub struct Volume {
     /// Grey window: samples in this interval are stretched to 0..1 before the transfer function is applied.
+    #[value([0.0, 1.0])]
     pub window: [f64; 2],
     /// Start depth, mm below the probe's face (Cartesian: along the depth axis): rays ignore everything nearer to the probe. Absent: the region's
     /// near face.
     pub start_depth: Option<f64>,
     /// Transfer function.
+    #[value(Transfer::Named(TransferName::Grey))]
     pub transfer: Transfer,
     /// Colours of this function in place of those of `transfer` (thesis Figs. 34 and 35: curves of colour and opacity are chosen apart).
     pub colour: Option<TransferName>,
@@ -188,34 +168,17 @@ pub struct Volume {
     /// Shading.
     pub shading: Shading,
     /// Depth-coded shading: factor of the colours at the nearest point of the box, 0..=10.
+    #[value([1.05, 1.0, 0.9])]
     pub near_tint: [f64; 3],
     /// Depth-coded shading: factor of the colours at the farthest point of the box, 0..=10.
+    #[value([0.3, 0.42, 0.75])]
     pub far_tint: [f64; 3],
     /// First-hit shading: the accumulated opacity that counts as the hit, 0.001..=1.
+    #[value(0.3)]
     pub hit: f64,
     /// Mode mixed: opacity factor of the volume layer over the surface.
+    #[value(1.0)]
     pub veil: f64,
-}
-
-impl Default for Volume {
-    fn default() -> Self {
-        Volume {
-            window: [0.0, 1.0],
-            start_depth: None,
-            transfer: Transfer::Named(TransferName::Grey),
-            colour: None,
-            opacity: None,
-            extinction: None,
-            entries: None,
-            threshold: 0.0,
-            compositing: Compositing::Corrected,
-            shading: Shading::None,
-            near_tint: [1.05, 1.0, 0.9],
-            far_tint: [0.3, 0.42, 0.75],
-            hit: 0.3,
-            veil: 1.0,
-        }
-    }
 }
 
 /// Compositing rule: the opacity a of a step of length h, with y = kappa h and kappa the absorption of the transfer function.
@@ -290,10 +253,11 @@ pub struct TransferPoint {
 }
 
 /// Surface rendering: the surface detector (thesis, equation 4-3).
-#[derive(Clone, Debug, PartialEq, FromNode, ToNode)]
+#[derive(Clone, Debug, PartialEq, Defaults, FromNode, ToNode)]
 #[tree(deny_unknown_fields, default)]
 pub struct Surface {
     /// Grey window: samples in this interval are stretched to 0..1 before the surface is detected.
+    #[value([0.0, 1.0])]
     pub window: [f64; 2],
     /// Start depth, mm below the probe's face: rays ignore everything nearer to the probe. Absent: the region's near face.
     pub start_depth: Option<f64>,
@@ -301,49 +265,34 @@ pub struct Surface {
     pub detector: Detector,
     /// Detectors `adaptive` and `lasting`: the difference at an edge must exceed this many standard deviations of the noise in front of the edge. A
     /// weaker edge counts only if the ray has no other.
+    #[value(2.5)]
     pub noise: f64,
     /// Length of an edge, mm. The detector's difference at a place is the mean echo over this length behind the place minus the mean echo over this
     /// length in front of it, at any step of the rays. The detector takes at least 4 and at most 256 samples of this length. `samples`: 4 steps of
     /// the rays, as in the thesis, so that the step decides which edges are found. Absent: 4 slice pixels.
     pub edge: Option<Edge>,
     /// Detection threshold: an edge is where the detector's difference (see `edge`), after the window, exceeds it.
+    #[value(0.1)]
     pub threshold: f64,
     /// Threshold of the rough detector (`rough`). Absent: `threshold`.
     pub rough_threshold: Option<f64>,
     /// Step of the rough detector in steps of the fine one; 1 disables it. The rough detector searches first. Where it fires, the ray steps back and
     /// the fine detector finds the place. The rough one passes over specks and some noise, and misses walls that are weak or thinner than its ring of
     /// samples. The thesis has one of 2.
+    #[value(1)]
     pub rough: u32,
     /// Sign of the edge.
     pub sign: Sign,
     /// Location of the surface within the edge.
     pub place: Place,
     /// Which surface along the ray; 1 is the outermost.
+    #[value(1)]
     pub number: u32,
     /// The colour of the lit surface: a constant one, or that of the volume through the transfer function.
     pub colour: SurfaceColour,
     /// Depth, mm, of the volume behind the surface that gives the surface its colour with `colour = "behind"`.
+    #[value(3.0)]
     pub colour_depth: f64,
-}
-
-impl Default for Surface {
-    fn default() -> Self {
-        Surface {
-            window: [0.0, 1.0],
-            start_depth: None,
-            detector: Detector::Threshold,
-            noise: 2.5,
-            edge: None,
-            threshold: 0.1,
-            rough_threshold: None,
-            rough: 1,
-            sign: Sign::Bright,
-            place: Place::Peak,
-            number: 1,
-            colour: SurfaceColour::Constant,
-            colour_depth: 3.0,
-        }
-    }
 }
 
 /// The colour of a surface that is lit.
@@ -423,19 +372,14 @@ pub enum Place {
 }
 
 /// Projections: modes mip, minip and mean.
-#[derive(Clone, Debug, PartialEq, FromNode, ToNode)]
+#[derive(Clone, Debug, PartialEq, Defaults, FromNode, ToNode)]
 #[tree(deny_unknown_fields, default)]
 pub struct Projection {
     /// Grey window: samples in this interval are stretched to 0..1 before the projection.
+    #[value([0.0, 1.0])]
     pub window: [f64; 2],
     /// Start depth, mm below the probe's face: rays ignore everything nearer to the probe. Absent: the region's near face.
     pub start_depth: Option<f64>,
-}
-
-impl Default for Projection {
-    fn default() -> Self {
-        Projection { window: [0.0, 1.0], start_depth: None }
-    }
 }
 
 pub(super) const NUMBERS: &[Number] = &[

@@ -5,7 +5,7 @@ use crate::scene::number::Allowed::{OffOr, OffOrOdd, Range};
 use crate::scene::number::Group::{Image, Light as Group, Surface};
 use crate::scene::number::{Allowed, LENGTH, LENGTH_OR_0, Number, PLACE, SHARE, number};
 use crate::scene::{MAX_WINDOW, Settings};
-use crate::tree::{FromNode, ToNode};
+use crate::tree::{Defaults, FromNode, ToNode};
 use glam::DVec3;
 
 /// Stage 3: edge-preserving filters of the distance map, which run in the order in which they are listed.
@@ -84,30 +84,38 @@ fn once() -> u32 {
 }
 
 /// Stage 3: the light. The direction uses the axes that `follows` names, the position those of the camera: right, up, towards the viewer.
-#[derive(Clone, Debug, PartialEq, FromNode, ToNode)]
+#[derive(Clone, Debug, PartialEq, Defaults, FromNode, ToNode)]
 #[tree(deny_unknown_fields, default)]
 pub struct Light {
     /// Direction from the surface to a distant light, in the axes that `follows` names. Its length does not matter, but must not be 0.
+    #[value(DVec3::new(-0.5, 0.6, 0.6))]
     pub direction: DVec3,
     /// What the direction is relative to.
     pub follows: Follows,
     /// Position of a near (point) light, mm from the camera's target along right, up and towards the viewer. Absent: the light is distant.
     pub position: Option<DVec3>,
     /// Ambient coefficient of Blinn-Phong shading; it may exceed 1.
+    #[value(0.18)]
     pub ambient: f64,
     /// Diffuse coefficient of Blinn-Phong shading; it may exceed 1.
+    #[value(0.75)]
     pub diffuse: f64,
     /// Specular coefficient of Blinn-Phong shading; it may exceed 1.
+    #[value(0.18)]
     pub specular: f64,
     /// Specular exponent, 0..=1e6.
+    #[value(24.0)]
     pub shininess: f64,
     /// Colour of the light, 0..=10.
+    #[value([1.0, 1.0, 1.0])]
     pub colour: [f64; 3],
     /// Colour of the surface, 0..=10.
+    #[value([0.93, 0.72, 0.56])]
     pub surface_colour: [f64; 3],
     /// How much a weak echo at the surface darkens its colour: 0 not at all, 1 in proportion to the echo.
     pub texture: f64,
     /// Neighbours whose distances differ by more than this belong to two surfaces, mm. Normals do not cross the gap.
+    #[value(2.0)]
     pub cliff: f64,
     /// Shadow.
     pub shadow: Option<Shadow>,
@@ -132,33 +140,11 @@ pub enum Follows {
     Region,
 }
 
-impl Default for Light {
-    fn default() -> Self {
-        Light {
-            direction: DVec3::new(-0.5, 0.6, 0.6),
-            follows: Follows::Camera,
-            position: None,
-            ambient: 0.18,
-            diffuse: 0.75,
-            specular: 0.18,
-            shininess: 24.0,
-            colour: [1.0, 1.0, 1.0],
-            surface_colour: [0.93, 0.72, 0.56],
-            texture: 0.0,
-            cliff: 2.0,
-            shadow: None,
-            occlusion: None,
-            skin: None,
-            volume: None,
-        }
-    }
-}
-
 /// Light volume: light is propagated through a lattice of cells over the region, absorbed by what the transfer function makes opaque, red least,
 /// spread as it goes, and scattered on in tissue. The coefficients of the light are those of `light`. Surfaces have no film curve: for them ambient
 /// and diffuse are divided by their sum where that exceeds 1. Colours are linear light: Narkowicz's fit (2015) of the ACES film curve compresses
 /// them, so that no highlight is cut off, and a gamma of 2.2 encodes them for a screen.
-#[derive(Clone, Copy, Debug, PartialEq, FromNode, ToNode)]
+#[derive(Clone, Copy, Debug, PartialEq, Defaults, FromNode, ToNode)]
 #[tree(deny_unknown_fields, default)]
 pub struct LightVolume {
     /// Edge of a cell, mm. Absent: half the standard deviation of the Gaussian that the volume is smoothed with (`slices.smooth`), and a slice pixel
@@ -166,34 +152,48 @@ pub struct LightVolume {
     pub cell: Option<f64>,
     /// Most cells, but for rounding up to an even number along each edge; also at most 1024 along an edge. A cell takes about 45 bytes of the
     /// device's memory.
+    #[value(4_000_000)]
     pub cells: u32,
     /// Samples along each edge of a cell.
+    #[value(1)]
     pub taps: u32,
     /// Depth of light: the path through the most opaque tissue, mm, after which 1/e of green light is left.
+    #[value(1.4)]
     pub depth: f64,
     /// Warmth, 0..=2: how much deeper red light goes than green, and green than blue; 0 is grey.
+    #[value(1.0)]
     pub warmth: f64,
     /// Standard deviation over which light has spread after 1 mm, mm; it grows with the square root of the path. The lattice spreads light
     /// over at least half a cell a layer.
+    #[value(0.35)]
     pub widening: f64,
     /// Standard deviation over which tissue scatters green light, mm; red further, blue less.
+    #[value(0.9)]
     pub scatter: f64,
     /// Reach of ambient light, mm: matter farther away than this does not occlude it.
+    #[value(20.0)]
     pub reach: f64,
     /// Slope of the echo (0..1) per mm from which on the orientation of a surface is certain. The default is half the slope of skin in fluid after a
     /// Gaussian of 1.5 mm. Where the echo is flatter, light depends less on the orientation.
+    #[value(0.04)]
     pub slope: f64,
     /// How much light depends on the orientation of the tissue's surface: 0 not at all, 1 fully.
+    #[value(0.85)]
     pub relief: f64,
     /// How far the light wraps around to the side that faces away from it: 0 not at all, 1 fully.
+    #[value(0.35)]
     pub wrap: f64,
     /// Coefficient of the back light, 0..=10.
+    #[value(0.12)]
     pub back: f64,
     /// Direction from the tissue to the back light, in the same axes as `light.direction`.
+    #[value(DVec3::new(0.7, 0.6, -0.45))]
     pub back_direction: DVec3,
     /// Colour of the back light, 0..=10.
+    #[value([0.9, 0.4, 0.22])]
     pub back_colour: [f64; 3],
     /// Exposure: factor of the light before the film curve, 0..=100.
+    #[value(1.0)]
     pub exposure: f64,
     /// The backdrop that fills the picture behind the volume, in mode volume without first-hit shading. Absent: black.
     pub ground: Option<Ground>,
@@ -201,57 +201,35 @@ pub struct LightVolume {
 
 /// A backdrop that is brightest a little above the middle of the picture and falls off to its edges. Colours are linear light, like those of the
 /// transfer function, and may exceed 1.
-#[derive(Clone, Copy, Debug, PartialEq, FromNode, ToNode)]
+#[derive(Clone, Copy, Debug, PartialEq, Defaults, FromNode, ToNode)]
 #[tree(deny_unknown_fields, default)]
 pub struct Ground {
     /// Colour where it is brightest.
+    #[value([0.022, 0.013, 0.009])]
     pub middle: [f64; 3],
     /// Colour at the edges.
+    #[value([0.004, 0.0025, 0.002])]
     pub edge: [f64; 3],
 }
 
-impl Default for Ground {
-    fn default() -> Self {
-        Ground { middle: [0.022, 0.013, 0.009], edge: [0.004, 0.0025, 0.002] }
-    }
-}
-
-impl Default for LightVolume {
-    fn default() -> Self {
-        LightVolume {
-            cell: None,
-            cells: 4_000_000,
-            taps: 1,
-            depth: 1.4,
-            warmth: 1.0,
-            widening: 0.35,
-            scatter: 0.9,
-            reach: 20.0,
-            slope: 0.04,
-            relief: 0.85,
-            wrap: 0.35,
-            back: 0.12,
-            back_direction: DVec3::new(0.7, 0.6, -0.45),
-            back_colour: [0.9, 0.4, 0.22],
-            exposure: 1.0,
-            ground: None,
-        }
-    }
-}
-
 /// Shadow by tracing the distance map towards the light (thesis Fig. 41).
-#[derive(Clone, Copy, Debug, PartialEq, FromNode, ToNode)]
+#[derive(Clone, Copy, Debug, PartialEq, Defaults, FromNode, ToNode)]
 #[tree(deny_unknown_fields, default)]
 pub struct Shadow {
     /// Share of the light named by `dims` that a full shadow removes.
+    #[value(0.6)]
     pub strength: f64,
     /// Width of the shadow's edge per mm of distance to the obstacle, 0..=10; 0 is a hard edge.
+    #[value(0.15)]
     pub softness: f64,
     /// Maximum distance of an obstacle from the place that it shades, mm.
+    #[value(40.0)]
     pub reach: f64,
     /// Assumed thickness of the visible surface, mm: light that passes farther behind it is not blocked.
+    #[value(25.0)]
     pub thickness: f64,
     /// Bias, mm: light is blocked only where it passes more than this behind the visible surface, so that noise of the distance map casts no shadow.
+    #[value(0.6)]
     pub bias: f64,
     /// What a shadow dims.
     pub dims: Dims,
@@ -268,50 +246,38 @@ pub enum Dims {
     Pixel,
 }
 
-impl Default for Shadow {
-    fn default() -> Self {
-        Shadow { strength: 0.6, softness: 0.15, reach: 40.0, thickness: 25.0, bias: 0.6, dims: Dims::Light }
-    }
-}
-
 /// Ambient occlusion from the distance map around each pixel.
-#[derive(Clone, Copy, Debug, PartialEq, FromNode, ToNode)]
+#[derive(Clone, Copy, Debug, PartialEq, Defaults, FromNode, ToNode)]
 #[tree(deny_unknown_fields, default)]
 pub struct Occlusion {
     /// Radius around a place on the surface within which the surface occludes it, mm.
+    #[value(6.0)]
     pub radius: f64,
     /// Strength, 0..=4: factor of the share of the hemisphere that is hidden. Ambient light loses the product.
+    #[value(1.0)]
     pub strength: f64,
 }
 
-impl Default for Occlusion {
-    fn default() -> Self {
-        Occlusion { radius: 6.0, strength: 1.0 }
-    }
-}
-
 /// Skin shading: light wraps around the terminator, red further than blue, and shines through thin tissue.
-#[derive(Clone, Copy, Debug, PartialEq, FromNode, ToNode)]
+#[derive(Clone, Copy, Debug, PartialEq, Defaults, FromNode, ToNode)]
 #[tree(deny_unknown_fields, default)]
 pub struct Skin {
     /// How far the light wraps around the terminator: 0 not at all, 1 fully.
+    #[value(0.35)]
     pub wrap: f64,
     /// Translucency: factor, 0..1, of the light that passes through thin tissue.
+    #[value(0.3)]
     pub translucency: f64,
     /// Depth behind the surface over which echoes are averaged to tell thin tissue, mm.
+    #[value(5.0)]
     pub depth: f64,
     /// Colour of the light that passes through tissue, 0..=10.
+    #[value([0.9, 0.25, 0.12])]
     pub colour: [f64; 3],
 }
 
-impl Default for Skin {
-    fn default() -> Self {
-        Skin { wrap: 0.35, translucency: 0.3, depth: 5.0, colour: [0.9, 0.25, 0.12] }
-    }
-}
-
 /// Stage 4, postprocessing. The filters run in the order in which they are listed, then contrast, brightness, gamma and the colour map.
-#[derive(Clone, Debug, PartialEq, FromNode, ToNode)]
+#[derive(Clone, Debug, PartialEq, Defaults, FromNode, ToNode)]
 #[tree(deny_unknown_fields, default)]
 pub struct Post {
     /// Sigma filter.
@@ -323,33 +289,20 @@ pub struct Post {
     /// Antialiasing of surfaces, and of cut faces, that have one ray a pixel. A pixel at an outline, or at a fold where distances differ by
     /// `light.cliff`, mixes what is near and what is far by the share of its area that each covers. At folds this begins at half of `light.cliff`.
     /// The edge between them follows from the distances of the pixels around it.
+    #[value(true)]
     pub antialias: bool,
     /// Added to the brightness, whose range is 0..1, after the contrast: -1..=1.
     pub brightness: f64,
     /// Contrast factor about middle grey, 0..=10.
+    #[value(1.0)]
     pub contrast: f64,
     /// Gamma: the exponent is 1 / gamma, so that values above 1 brighten dark parts.
+    #[value(1.0)]
     pub gamma: f64,
     /// Colour map.
     pub colour_map: ColourMap,
     /// Keeps a float picture in addition to the 8-bit one even if no pass needs it. Planes are then cut and tone-mapped by two passes instead of one.
     pub floats: bool,
-}
-
-impl Default for Post {
-    fn default() -> Self {
-        Post {
-            sigma: None,
-            enhanced_sigma: None,
-            perona_malik: None,
-            antialias: true,
-            brightness: 0.0,
-            contrast: 1.0,
-            gamma: 1.0,
-            colour_map: ColourMap::None,
-            floats: false,
-        }
-    }
 }
 
 /// Colour map of the picture's brightness.

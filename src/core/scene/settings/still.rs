@@ -2,35 +2,34 @@
 
 use crate::scene::number::Allowed::Range;
 use crate::scene::number::{Number, SHARE, number};
-use crate::tree::{FromNode, ToNode};
+use crate::tree::{Defaults, FromNode, ToNode};
 
 /// A still: mode volume by paths of light that collide many times, without a denoiser. The transfer function describes the medium: its opacities give the
 /// extinction, and its colours are those that a half-space of the medium has under even light. The key light is `light.diffuse` in `light.direction`, and
 /// light comes from all around with the radiance `light.ambient`. Back light, exposure and ground are those of `light.volume`; without it there is no back
 /// light and no ground, and the exposure is 1. Specular light, cut faces of clip planes and early ray termination do not apply.
-#[derive(Clone, Copy, Debug, PartialEq, FromNode, ToNode)]
+#[derive(Clone, Copy, Debug, PartialEq, Defaults, FromNode, ToNode)]
 #[tree(deny_unknown_fields, default)]
 pub struct Still {
     /// Paths of a pixel. The standard error of the picture falls with the square root of their number.
+    #[value(64)]
     pub samples: u32,
     /// Seed of the random numbers. The same seed and number of samples give the same picture.
     pub seed: u32,
     /// Factor of the extinction, 0..=100.
+    #[value(1.0)]
     pub extinction: f64,
     /// Factor of the albedo.
+    #[value(1.0)]
     pub albedo: f64,
     /// Anisotropy, -0.95..=0.95: the mean cosine of Henyey and Greenstein's phase function; 0 scatters evenly.
     pub anisotropy: f64,
     /// Most collisions of a path; what light would do after them is missing.
+    #[value(128)]
     pub events: u32,
     /// Paths of a pixel in each dispatch; more where all of them would take over 64 dispatches. The value changes no bit of the picture.
+    #[value(4)]
     pub batch: u32,
-}
-
-impl Default for Still {
-    fn default() -> Still {
-        Still { samples: 64, seed: 0, extinction: 1.0, albedo: 1.0, anisotropy: 0.0, events: 128, batch: 4 }
-    }
 }
 
 impl Still {

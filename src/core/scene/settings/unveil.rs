@@ -3,27 +3,23 @@
 use crate::scene::Settings;
 use crate::scene::number::Allowed::{Any, Range};
 use crate::scene::number::{Group, Number, number};
-use crate::tree::{FromNode, ToNode};
+use crate::tree::{Defaults, FromNode, ToNode};
 
 /// Automatic render start: what lies in front of the fluid before a face, such as the uterine wall, is not rendered. In each volume the start surface
 /// is the near face of the pocket of fluid, within the region. Planes and the block of mode cube show everything; planes beside a rendering have the
 /// surface as a green line. Where no pocket can be told from the tissue around it, nothing is removed and one line says so: rendering starts at the
 /// region's or the mode's start depth. Takes a second volume, the whole sector in stage 1, and time of the CPU for each volume.
-#[derive(Clone, Copy, Debug, PartialEq, FromNode, ToNode)]
+#[derive(Clone, Copy, Debug, PartialEq, Defaults, FromNode, ToNode)]
 #[tree(deny_unknown_fields, default)]
 pub struct Unveil {
     /// Find the fluid and start there.
     pub enabled: bool,
     /// How far behind the near face of the fluid rendering starts, mm: more removes more.
+    #[value(1.0)]
     pub offset: f64,
     /// Standard deviation of the Gaussian that smooths the start surface, mm.
+    #[value(2.0)]
     pub smoothing: f64,
-}
-
-impl Default for Unveil {
-    fn default() -> Unveil {
-        Unveil { enabled: false, offset: 1.0, smoothing: 2.0 }
-    }
 }
 
 fn unveils(s: &Settings) -> bool {

@@ -6,10 +6,11 @@
 
 use super::chord::Chord;
 use crate::live::Update;
+use crate::scene::PresentMode;
 use crate::scene::load::{self, Layers, LoadError, line_of, transfer_file};
 use crate::scene::{FileVersion, Settings};
 use crate::text::printable;
-use crate::tree::{self, FromNode, Node, NodeError, ToNode};
+use crate::tree::{self, Defaults, FromNode, Node, NodeError, ToNode};
 use std::fmt;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -27,12 +28,14 @@ pub const PHANTOM: &str = "phantom";
 ///
 /// The keys at the top select the source. They are the flags of `echolume stream` with `_` for `-`, and are checked as those. Everything else is
 /// in tables.
-#[derive(Clone, Debug, PartialEq, FromNode, ToNode)]
+#[derive(Clone, Debug, PartialEq, Defaults, FromNode, ToNode)]
 #[tree(deny_unknown_fields, default)]
 pub struct Config {
     /// The version of this file's keys. Default: 1, the only one.
+    #[value(FileVersion)]
     version: FileVersion,
     /// The source of frames: `phantom` (the default), a recording, or `igtl://HOST[:PORT]`.
+    #[value(PHANTOM.into())]
     pub source: String,
     /// Path of the probe file (TOML) with the geometry, if the source does not state it. Default: none.
     pub probe: Option<PathBuf>,
@@ -104,69 +107,67 @@ pub struct Motor {
 }
 
 /// Table `display`: the screen and the window.
-#[derive(Clone, Debug, PartialEq, FromNode, ToNode)]
+#[derive(Clone, Debug, PartialEq, Defaults, FromNode, ToNode)]
 #[tree(deny_unknown_fields, default)]
 pub struct Display {
     /// Show the window in full screen. Default: true.
+    #[value(true)]
     pub full_screen: bool,
     /// Draw directly on the monitor (VK_KHR_display), without a window system. Default: false.
     pub direct: bool,
     /// A part of the name of the monitor to use. Default: the monitor of the window; if `direct` is true, the first monitor.
     pub monitor: Option<String>,
     /// Width and height of a window that is not full-screen, pixels, 64 to 16384 each. Default: 1280 x 800.
+    #[value([1280, 800])]
     pub size: [u32; 2],
     /// How pictures reach the screen. Default: fifo.
-    pub present: Present,
+    pub present: PresentMode,
     /// Show sliders and buttons at the start. Default: true.
+    #[value(true)]
     pub panels: bool,
     /// Scale of text and buttons, 0.5 to 4. Default: 1.
+    #[value(1.0)]
     pub scale: f64,
     /// Frame budget: longest time of a picture while the view moves, 1 ms to 10 s; `none` (None): no limit. Default: 33 ms.
     #[tree(with = "optional_duration")]
+    #[value(Some(Duration::from_millis(33)))]
     pub budget: Option<Duration>,
     /// Path of the error.json of `echolume report error` from which the quality ladder for the budget is made. Default: the built-in ladder.
     pub report: Option<PathBuf>,
 }
 
-/// How pictures reach the screen: the present mode of the swapchain.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode, ToNode)]
-#[tree(rename_all = "lowercase")]
-pub enum Present {
-    /// Every picture, in order.
-    #[default]
-    Fifo,
-    /// Only the latest picture, if the device supports it.
-    Mailbox,
-}
-
 /// Table `keys`: key combinations of the kiosk.
-#[derive(Clone, Debug, PartialEq, FromNode, ToNode)]
+#[derive(Clone, Debug, PartialEq, Defaults, FromNode, ToNode)]
 #[tree(deny_unknown_fields, default)]
 pub struct Keys {
     /// The key combination that ends the program; `none` (the value None): no combination does. Default: ctrl+alt+q.
     #[tree(with = "optional_chord")]
+    #[value(Chord::parse("ctrl+alt+q").ok())]
     pub exit: Option<Chord>,
 }
 
 /// Table `live`: how live volumes are shown and kept.
-#[derive(Clone, Debug, PartialEq, FromNode, ToNode)]
+#[derive(Clone, Debug, PartialEq, Defaults, FromNode, ToNode)]
 #[tree(deny_unknown_fields, default)]
 pub struct Live {
     /// How arriving frames become visible. Default: whole.
     pub update: Update,
     /// Largest number of volumes in the cine loop, 1 to 1000. Default: 20.
+    #[value(20)]
     pub cine_volumes: u32,
     /// Largest memory of the cine loop, 16 to 65536 MiB, which also limits the number of its volumes. Default: 512.
+    #[value(512)]
     pub cine_memory_mb: u32,
     /// Time between attempts to open the source, 100 ms to 10 min. Default: 2 s.
     #[tree(with = "duration")]
+    #[value(Duration::from_secs(2))]
     pub retry: Duration,
     /// Folder in which all frames that arrive are recorded. Default: none, no recording.
     pub record: Option<PathBuf>,
 }
 
 /// Table `files`: files that the program writes.
-#[derive(Clone, Debug, PartialEq, FromNode, ToNode)]
+#[derive(Clone, Debug, PartialEq, Defaults, FromNode, ToNode)]
 #[tree(deny_unknown_fields, default)]
 pub struct Files {
     /// Folder for saved pictures and cine loops. Default: the current folder.
@@ -174,79 +175,17 @@ pub struct Files {
     /// Path of the log file. Default: none; the log goes to standard error, which is the journal of a service.
     pub log: Option<PathBuf>,
     /// Largest size of one log file, 1 to 1024 MiB. Default: 10.
+    #[value(10)]
     pub log_size_mb: u32,
     /// Number of log files, including the current one, 1 to 100. Default: 5.
+    #[value(5)]
     pub log_files: u32,
     /// Path of a file with metrics for Prometheus, rewritten every 15 s. Default: none.
     pub prometheus: Option<PathBuf>,
     /// True: recordings, pictures, workspaces and logs can be read by the program's user alone, whatever the umask. False: the umask decides.
     /// Default: true.
+    #[value(true)]
     pub private: bool,
-}
-
-impl Default for Config {
-    fn default() -> Config {
-        Config {
-            version: FileVersion,
-            source: PHANTOM.into(),
-            probe: None,
-            rate: None,
-            real_time: false,
-            rounds: None,
-            forever: false,
-            tool: None,
-            device_name: None,
-            no_checksum: false,
-            clip: None,
-            spacing: None,
-            hole: None,
-            extent: None,
-            preset: Vec::new(),
-            device: None,
-            motor: None,
-            scene: toml::Table::new(),
-            display: Display::default(),
-            keys: Keys::default(),
-            live: Live::default(),
-            files: Files::default(),
-            locations: KeyLocations::default(),
-        }
-    }
-}
-
-impl Default for Display {
-    fn default() -> Display {
-        Display {
-            full_screen: true,
-            direct: false,
-            monitor: None,
-            size: [1280, 800],
-            present: Present::Fifo,
-            panels: true,
-            scale: 1.0,
-            budget: Some(Duration::from_millis(33)),
-            report: None,
-        }
-    }
-}
-
-impl Default for Keys {
-    fn default() -> Keys {
-        Keys { exit: Chord::parse("ctrl+alt+q").ok() }
-    }
-}
-
-impl Default for Live {
-    fn default() -> Live {
-        let retry = Duration::from_secs(2);
-        Live { update: Update::Whole, cine_volumes: 20, cine_memory_mb: 512, retry, record: None }
-    }
-}
-
-impl Default for Files {
-    fn default() -> Files {
-        Files { pictures: None, log: None, log_size_mb: 10, log_files: 5, prometheus: None, private: true }
-    }
 }
 
 impl Config {
@@ -428,31 +367,8 @@ mod optional_chord {
     }
 }
 
-/// All keys that correspond to flags.
-const SOURCE_KEYS: &[&str] = &[
-    "source",
-    "probe",
-    "rate",
-    "real_time",
-    "rounds",
-    "tool",
-    "device_name",
-    "no_checksum",
-    "clip",
-    "spacing",
-    "hole",
-    "extent",
-    "motor.port",
-    "motor.angle",
-    "motor.sweeps",
-    "motor.homed",
-    "motor.delay",
-    "motor.stamps",
-    "motor.baud",
-    "motor.parity",
-    "motor.stop_bits",
-    "motor.timeout",
-];
+/// A key with its value.
+type Key<T> = (&'static str, T);
 
 /// The flag of a key.
 fn flag(key: &str) -> String {
@@ -463,8 +379,8 @@ fn flag(key: &str) -> String {
 }
 
 impl Config {
-    /// The arguments of `echolume stream` that select the source of this configuration, each as one word: `--flag=value`, or `--flag` for a switch.
-    pub fn source_arguments(&self) -> Vec<String> {
+    /// The keys that correspond to flags, with their values: those of flags with a value, and switches.
+    fn source_keys(&self) -> ([Key<Option<String>>; 18], [Key<bool>; 4]) {
         let path = |path: &Path| path.to_string_lossy().into_owned();
         let clip = self.clip.map(|clip| clip.map(|n| n.to_string()).join(","));
         let rounds = if self.forever { Some(u32::MAX) } else { self.rounds };
@@ -499,6 +415,12 @@ impl Config {
             ("motor.homed", homed),
             ("motor.stamps", stamps),
         ];
+        (values, switches)
+    }
+
+    /// The arguments of `echolume stream` that select the source of this configuration, each as one word: `--flag=value`, or `--flag` for a switch.
+    pub fn source_arguments(&self) -> Vec<String> {
+        let (values, switches) = self.source_keys();
         let values = values.into_iter().filter_map(|(key, value)| Some(format!("{}={}", flag(key), value?)));
         values.chain(switches.into_iter().filter(|(_, on)| *on).map(|(key, _)| flag(key))).collect()
     }
@@ -508,7 +430,8 @@ impl Config {
     pub fn flag_error(&self, message: &str) -> ConfigError {
         let mut text_with_keys = message.to_string();
         let mut first: Option<(usize, &str)> = None;
-        for key in SOURCE_KEYS {
+        let (values, switches) = self.source_keys();
+        for key in values.map(|(key, _)| key).into_iter().chain(switches.map(|(key, _)| key)) {
             let flag = flag(key);
             let mut from = 0;
             while let Some(at) = text_with_keys[from..].find(&flag).map(|at| from + at) {

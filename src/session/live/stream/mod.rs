@@ -8,8 +8,8 @@ use super::feed::{Arrived, Feed, FeedCounts};
 use super::first_pipelines::FirstPipelines;
 use super::first_volume::FirstVolume;
 use super::options::StreamOptions;
-use super::phase::{Pending, Phase};
-use super::session::{Begun, FinishedPicture, Session, Views};
+use super::phase::Phase;
+use super::session::{Begun, FinishedPicture, Pending, Session, Views};
 use super::statistics::Statistics;
 use super::volume_pool::VolumePool;
 use crate::gpu::{self, Bands, Context, GpuError, Preparation, Renderer, SceneMaker};
@@ -152,7 +152,7 @@ impl Stream {
         if let Some(session) = &mut self.session {
             let mut replays = true;
             match session.phase {
-                Phase::Drawing { .. } => {
+                Phase::Drawing(_) => {
                     // With zero patience the call does not block.
                     if !session.renderer.is_drawing()? || (is_ending && !patience.is_zero()) {
                         return self.finish_picture(is_ending);
@@ -168,14 +168,14 @@ impl Stream {
                         return Ok(Step::Progress);
                     }
                 }
-                Phase::Draining { .. } if !is_ending => (patience, replays) = (Duration::ZERO, false),
-                Phase::Idle | Phase::Replaying(_) | Phase::Draining { .. } => {
+                Phase::Draining(_) if !is_ending => (patience, replays) = (Duration::ZERO, false),
+                Phase::Idle | Phase::Draining(_) => {
                     if let Some(step) = self.begin_picture()? {
                         return Ok(step);
                     }
                 }
             }
-            if let Some(session) = self.session.as_mut().filter(|session| replays && session.phase.replay().is_some()) {
+            if let Some(session) = self.session.as_mut().filter(|session| replays && session.replay.is_some()) {
                 session.continue_replay()?;
                 return Ok(Step::Progress);
             }
@@ -224,7 +224,7 @@ impl Stream {
         self.asked.is_coarse = false;
         let was_coarse = coarse != self.asked.drawn();
         if let (true, Some(session), Some(header)) = (was_coarse, &mut self.session, &self.header) {
-            session.pending = Pending::Ready(views(header, &self.asked, &self.options)?);
+            session.pending = Pending::ready(views(header, &self.asked, &self.options)?);
         }
         Ok(was_coarse)
     }
@@ -515,7 +515,7 @@ impl Stream {
 
     fn change_to(&mut self, asked: Asked) -> Result<(), StreamError> {
         if let (Some(session), Some(header)) = (&mut self.session, &self.header) {
-            session.pending = Pending::Ready(views(header, &asked, &self.options)?);
+            session.pending = Pending::ready(views(header, &asked, &self.options)?);
         }
         self.asked = asked;
         Ok(())
@@ -591,7 +591,7 @@ impl Stream {
         let (Some(session), Some(header)) = (&mut self.session, &self.header) else { return };
         let (header, options) = (Arc::new(header.clone()), self.options.clone());
         let scenes = next.into_iter().map(|(settings, full)| {
-            let (header, options, backward) = (header.clone(), options.clone(), session.swept_backward().to_vec());
+            let (header, options, backward) = (header.clone(), options.clone(), session.backward.clone());
             let make = move || {
                 let asked = match full {
                     Some(full) => Asked { full, lowered: Some(settings), is_coarse: false },

@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 impl Stream {
     /// True while a volume of the cine loop is being sent to the device.
     pub fn is_replaying(&self) -> bool {
-        self.session.as_ref().is_some_and(|session| session.phase.replay().is_some())
+        self.session.as_ref().is_some_and(|session| session.replay.is_some())
     }
 
     /// True while a picture is being drawn.
@@ -151,7 +151,7 @@ impl Stream {
 
     /// Number of the volume that the last picture shows, even if the picture is still being drawn. None without a picture.
     pub fn drawn_volume(&self) -> Option<u32> {
-        self.session.as_ref().and_then(Session::drawn_volume)
+        self.session.as_ref().and_then(|session| session.drawn)
     }
 
     /// The renderer, for reading pictures and volumes back; None before the first geometry has begun.

@@ -282,7 +282,7 @@ fn opened(validation: bool) -> Device {
     Device::opened(ContextOptions {
         validation,
         specialize: validation.then_some(true),
-        max_unused_pipelines: 8,
+        max_unused_pipelines: Some(8),
         ..ContextOptions::default()
     })
 }

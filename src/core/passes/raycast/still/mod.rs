@@ -14,7 +14,7 @@ use crate::passes::light_volume;
 use crate::passes::lookup_tables::{brick_reaches, still_medium};
 use crate::passes::pass::*;
 use crate::passes::preprocess::packed_sampling;
-use crate::scene::{Scene, Side, Still};
+use crate::scene::{Scene, Side, Still, windowed};
 
 fn need(scene: &Scene) -> Need {
     match scene.still() {
@@ -66,9 +66,9 @@ pub(crate) const MAJORANTS: Pass = Pass {
     reference: |scene, _, reads, writes| {
         let (ranges, medium) = (reads.get("brick_ranges"), reads.get("medium"));
         let target = writes.get_mut("majorants");
-        let [low, high] = scene.volume_view().window;
+        let window = scene.volume_view().window;
         let last = scene.transfer_entries() - 1;
-        let entry = |value: f64| ((value - low) / (high - low)).clamp(0.0, 1.0) * last as f64;
+        let entry = |value: f64| windowed(window, value) * last as f64;
         let beyond = empty_space::beyond(scene);
         for (n, reach) in brick_reaches(scene, &scene.bricks()).into_iter().enumerate() {
             let slack = 1e-6 * last as f64;

@@ -2,8 +2,8 @@
 
 use super::Stream;
 use crate::passes::pass::*;
-use crate::passes::raycast::ray;
-use crate::scene::{Scene, StillLights};
+use crate::passes::raycast::{ray, volume};
+use crate::scene::{Scene, StillLights, windowed};
 use glam::DVec3;
 use std::f64::consts::PI;
 
@@ -42,17 +42,10 @@ impl<'a> Medium<'a> {
     /// Albedo of red, green and blue, and extinction (1/mm), at a place in space, mm. All are 0 outside the insonified region.
     pub fn at(&self, place: DVec3) -> Matter {
         let Some(texel) = ray::texel(self.scene, place) else { return ([0.0; 3], 0.0) };
-        let [low, high] = self.scene.volume_view().window;
-        let value = ((ray::interpolated(self.scene, self.volume, texel) - low) / (high - low)).clamp(0.0, 1.0);
-        let entries = self.table.values.len() / 4;
-        let entry = value * (entries - 1) as f64;
-        let n = (entry as usize).min(entries - 2);
-        let share = entry - n as f64;
-        let channel = |c: usize| {
-            let (here, next) = (self.table.values[4 * n + c], self.table.values[4 * n + 4 + c]);
-            here + (next - here) * share
-        };
-        ([channel(0), channel(1), channel(2)], channel(3) * self.scene.faded(place))
+        let sample = ray::interpolated(self.scene, self.volume, texel);
+        let value = windowed(self.scene.volume_view().window, sample);
+        let [r, g, b, extinction] = volume::looked_up(self.table, self.table.values.len() / 4, value);
+        ([r, g, b], extinction * self.scene.faded(place))
     }
 
     /// The stretches of a line from a place, with their ends, mm, and majorants. The last one ends where the line leaves the region.
