@@ -11,7 +11,7 @@ use crate::gpu::{Candidate, Context, ContextOptions, Deadline, DeviceChoice, Gpu
 use crate::marked::Demo;
 use crate::scene::default_look::Recorded;
 use crate::scene::load::{Layers, LoadError, PRESETS};
-use crate::scene::{Input, Scene};
+use crate::scene::{DeviceFacts, Input, Scene};
 use crate::source::phantom::{self, Phantom, PhantomSource};
 use crate::source::{Frame, Source, VolumeFrames};
 use crate::terminal::{Failure, failed, input, progress_bar, say};
@@ -613,7 +613,7 @@ pub fn open_device_for_statistics(choice: Option<DeviceChoice>) -> Result<Arc<Co
 
 /// The scene with the format that a device stores its volume best in.
 fn stored_on(device: &Candidate, scene: Scene) -> Scene {
-    Scene { truncates_halves: device.truncates_halves(), ..scene }
+    Scene { device: DeviceFacts { truncates_halves: device.truncates_halves(), ..scene.device }, ..scene }
 }
 
 fn open(options: &ContextOptions) -> Result<Arc<Context>, Failure> {

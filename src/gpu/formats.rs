@@ -100,14 +100,14 @@ const FRAMES_IN_CACHE: u32 = 4;
 /// of the window, and passes use shared memory on a GPU. On a CPU few frames go through stage 1 at once, so that the slots of stage 1 stay in the
 /// caches.
 pub fn adapt_scene(context: &Context, texel_access: TexelAccess, mut scene: Scene) -> Scene {
-    scene.truncates_halves = context.candidate.truncates_halves();
+    scene.device.truncates_halves = context.candidate.truncates_halves();
     let filters = filters(context, Slot::Volume.format(&scene));
     let mut scene = scene.sampled(if filters { texel_access.sampling() } else { Sampling::Exact });
     match context.candidate.is_software() {
-        true => scene.frames_at_once = FRAMES_IN_CACHE,
-        false => scene.shared_memory = context.candidate.limits.max_compute_shared_memory_size,
+        true => scene.device.frames_at_once = FRAMES_IN_CACHE,
+        false => scene.device.shared_memory = context.candidate.limits.max_compute_shared_memory_size,
     }
-    scene.window_texels = window_texels(context);
+    scene.device.window_texels = window_texels(context);
     let format = vulkan(Slot::PackedNeighbours.format(&scene));
     let fits = context.image_limits(format, vk::ImageType::TYPE_3D, usage(context, Slot::PackedNeighbours));
     let fits = fits.is_ok_and(|l| {

@@ -13,7 +13,7 @@ use super::timing::TimeStamps;
 use crate::passes::slots::{Initializer, encoded};
 use crate::passes::{Arrays, Bind, DispatchArgs, Frequency, Part, Pass, Slot, Texels};
 use crate::plan::Plan;
-use crate::scene::Scene;
+use crate::scene::{DeviceFacts, Scene};
 use std::sync::Arc;
 
 /// Runs single passes on inputs that the caller gives, for tests and verification.
@@ -52,7 +52,8 @@ impl PassRunner {
     /// The scene as [`PassRunner::run`] runs it: fields that depend on the device are set, except those that decide the number of dispatches.
     pub fn adapted(&self, scene: &Scene) -> Scene {
         let adapted = formats::adapt_scene(&self.context, self.texel_access, scene.clone());
-        Scene { shared_memory: scene.shared_memory, frames_at_once: scene.frames_at_once, ..adapted }
+        let DeviceFacts { shared_memory, frames_at_once, .. } = scene.device;
+        Scene { device: DeviceFacts { shared_memory, frames_at_once, ..adapted.device }, ..adapted }
     }
 
     /// The SPIR-V and the reflected declarations of a pass in an adapted scene, as the driver gets them.

@@ -6,7 +6,7 @@ use super::formats::{self, TexelAccess};
 use super::pipeline_compiler::{AsyncPipelineCompiler, SceneMaker, Wake};
 use super::pipelines::{Pipeline, Pipelines, Shaders};
 use crate::plan::Plan;
-use crate::scene::Scene;
+use crate::scene::{DeviceFacts, Scene};
 use std::collections::HashSet;
 use std::sync::Arc;
 
@@ -39,7 +39,8 @@ impl SceneCompiler {
     /// The scene with the fields that depend on the device set, and its plan.
     pub fn plan(&self, scene: Scene) -> (Scene, Plan) {
         let adapted = formats::adapt_scene(&self.pipelines.context, self.texel_access, scene);
-        let scene = Scene { frames_at_once: self.frames_at_once.unwrap_or(adapted.frames_at_once), ..adapted };
+        let frames_at_once = self.frames_at_once.unwrap_or(adapted.device.frames_at_once);
+        let scene = Scene { device: DeviceFacts { frames_at_once, ..adapted.device }, ..adapted };
         let plan = Plan::new(&scene);
         (scene, plan)
     }

@@ -78,7 +78,7 @@ fn texels_of_shared_memory_are_those_that_single_invocations_read() {
         for region in ["", "[region]\nlateral = [-3, 4]\ndepth = [20, 31]"] {
             let single = swept(&format!("slices = {{ pixels = {pixels}, {filters} }}\n{region}"));
             let mut shared = single.clone();
-            shared.shared_memory = 16 << 10;
+            shared.device.shared_memory = 16 << 10;
             let volume = |scene: &Scene| {
                 let mut renderer = Renderer::new(&device, scene.clone(), &together()).expect("renderer");
                 let order: Vec<usize> = (0..SLICES).collect();

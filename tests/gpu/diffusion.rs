@@ -4,7 +4,7 @@ use crate::common::gpu::*;
 use crate::filters::{by_reference, largest_difference, noise, on_device, plane, texels};
 use echolume::low_level::gpu::pass_runner::PassRunner;
 use echolume::low_level::passes::{Slot, Texels, by_name};
-use echolume::low_level::scene::Scene;
+use echolume::low_level::scene::{DeviceFacts, Scene};
 
 fn csv(name: &str) -> Texels {
     let text = std::fs::read_to_string(data(&format!("perona-malik/{name}.csv"))).expect("numbers");
@@ -84,7 +84,7 @@ fn aos_step(u: &Texels, tau: f64, conductance: impl Fn(f64) -> f64) -> Texels {
 
 /// The scene with each of the solvers of AOS: an invocation a row, and a workgroup a row in the memory that every device has.
 fn solvers(scene: &Scene) -> [Scene; 2] {
-    [0, 16 << 10].map(|shared_memory| Scene { shared_memory, ..scene.clone() })
+    [0, 16 << 10].map(|shared_memory| Scene { device: DeviceFacts { shared_memory, ..scene.device }, ..scene.clone() })
 }
 
 #[test]
@@ -103,7 +103,7 @@ fn aos_equals_dense_solves() {
             for scene in solvers(&scene) {
                 let f64s = largest_difference(&by_reference(&scene, "aos_slice", &source), &expected);
                 let f32s = largest_difference(&on_device(&mut single, &scene, "aos_slice", &source), &expected);
-                let memory = scene.shared_memory;
+                let memory = scene.device.shared_memory;
                 println!("{size:?}, tau {tau}, {memory} B: reference {f64s:.1e}, device {f32s:.1e} from dense solves");
                 // At 1e6 the solves themselves keep 9 digits of 16. On the device every term is positive: an ulp a pixel.
                 let ulps = 2e-6f64.max(6e-8 * size[0].max(size[1]) as f64);

@@ -6,7 +6,7 @@ use crate::common::scenes::{BYTES, scene};
 use echolume::low_level::gpu::Renderer;
 use echolume::low_level::passes::{Slot, Texels};
 use echolume::low_level::plan::Plan;
-use echolume::low_level::scene::Scene;
+use echolume::low_level::scene::{DeviceFacts, Scene};
 use glam::DVec3;
 
 /// Voxels of 1 mm whose centres count from 0.
@@ -140,7 +140,7 @@ fn light_through_several_layers_at_once_is_that_of_layer_by_layer() {
         let light = format!("follows = 'region', direction = {direction}");
         let each = look(&light, &GREY.replace("back = 0", "back = 0.5"));
         let mut several = each.clone();
-        several.shared_memory = 32 << 10;
+        several.device.shared_memory = 32 << 10;
         let dispatches = |scene| Plan::new(scene).steps.len();
         assert!(3 * dispatches(&several) < dispatches(&each), "several layers a dispatch");
         for slot in [Slot::LightArriving, Slot::BackLight] {
@@ -250,7 +250,7 @@ fn two_steps_that_share_their_light_have_that_of_their_middle() {
     assert!(single > 0.0 && single.max(shared) < 1e-3, "shared {shared}, single {single}");
     // A GPU takes one step after the other; too little shared memory for anything else to differ.
     let together = of(0.5, 1.0);
-    let one_by_one = Scene { shared_memory: 1, ..together.clone() };
+    let one_by_one = Scene { device: DeviceFacts { shared_memory: 1, ..together.device }, ..together.clone() };
     assert!(picture(&together) == picture(&one_by_one));
 }
 

@@ -7,7 +7,7 @@ use crate::common::scenes::{BYTES, FLOATS, scene};
 use echolume::low_level::gpu::WRITERS_OF_RUNS;
 use echolume::low_level::passes::{DispatchArgs, Frequency, PASSES, Part, Pass, device_limits, interface_check};
 use echolume::low_level::probe::{Advance, Axis, Geometry, Motion, Probe};
-use echolume::low_level::scene::Scene;
+use echolume::low_level::scene::{DeviceFacts, Scene};
 use echolume::low_level::shader_source;
 use echolume::low_level::spirv;
 use echolume::low_level::verify::built_in::labelled;
@@ -402,7 +402,8 @@ fn scenes() -> Vec<Scene> {
     scenes.push(scene(voxels([8, 8, 8]), FLOATS, "slices = { median = true }"));
     // With the shared memory of a GPU.
     let use_it = scenes.iter().filter(|s| s.settings.slices.perona_malik.is_some() || s.lit_by_volume().is_some());
-    let in_workgroups: Vec<_> = use_it.map(|s| Scene { shared_memory: 32 << 10, ..s.clone() }).collect();
+    let device = DeviceFacts { shared_memory: 32 << 10, ..DeviceFacts::default() };
+    let in_workgroups: Vec<_> = use_it.map(|s| Scene { device, ..s.clone() }).collect();
     scenes.extend(in_workgroups);
     scenes
 }

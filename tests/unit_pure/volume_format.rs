@@ -5,10 +5,11 @@ use crate::common::scenes::{BYTES, scene};
 use echolume::low_level::passes::Slot;
 use echolume::low_level::passes::slots::Format;
 use echolume::low_level::plan::Plan;
-use echolume::low_level::scene::Scene;
+use echolume::low_level::scene::{DeviceFacts, Scene};
 
 fn stored(toml: &str, truncates_halves: bool) -> Scene {
-    Scene { truncates_halves, ..scene(voxels([12, 10, 8]), BYTES, toml) }
+    let scene = scene(voxels([12, 10, 8]), BYTES, toml);
+    Scene { device: DeviceFacts { truncates_halves, ..scene.device }, ..scene }
 }
 
 /// A device that rounds keeps half floats, and so its pictures; one that truncates gets what is more accurate, where all values fit into it.

@@ -418,7 +418,7 @@ const LARGEST_TILE: u32 = 8 << 10;
 /// True if the invocations of a workgroup read their texels once into shared memory (glsl/include/workgroup_tile.glsl), which must hold `words` words
 /// of 4 bytes. On a CPU it is false: it has no shared memory, and reads texels again as fast.
 pub(super) fn reads_tile(scene: &Scene, words: u32) -> bool {
-    4 * words <= LARGEST_TILE.min(scene.shared_memory)
+    4 * words <= LARGEST_TILE.min(scene.device.shared_memory)
 }
 
 #[derive(Clone, Debug, PartialEq)]

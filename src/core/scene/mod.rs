@@ -59,7 +59,7 @@ pub use visible_bounds::{Rectangle, Shared, VisibleBounds};
 
 use crate::probe::StoredType;
 use crate::probe::{Geometry, Probe};
-use crate::tree::{FromNode, ToNode};
+use crate::tree::{Defaults, FromNode, ToNode};
 use glam::DVec3;
 use region::{framed_low, is_still, slice_grid, visible_box};
 use sizes::{Pitches, ResolvedSize, Resolver};
@@ -184,6 +184,20 @@ impl std::str::FromStr for PresentMode {
     }
 }
 
+/// What a scene takes from the device that draws it. The default is that of no device: a CPU without limits.
+#[derive(Clone, Copy, Debug, PartialEq, Defaults)]
+pub struct DeviceFacts {
+    /// Pixel format of the picture: that of the window, so that no conversion is needed.
+    pub window_texels: WindowTexels,
+    /// Bytes of shared memory of a workgroup on a GPU, which AOS, the light volume and filters use. 0 on a CPU, where single invocations are faster.
+    pub shared_memory: u32,
+    /// True if the device truncates half-precision floats when it stores them, instead of rounding.
+    pub truncates_halves: bool,
+    /// Maximum number of frames that go through stage 1 at once, at least 1.
+    #[value(u32::MAX)]
+    pub frames_at_once: u32,
+}
+
 #[derive(Clone, Debug)]
 pub struct Scene {
     pub geometry: Geometry,
@@ -200,15 +214,8 @@ pub struct Scene {
     pub ring: Ring,
     /// True if skipping bricks saves time on the device, which decides where `ray.brick` is not set. True until [`Scene::sampled`] sets it.
     pub bricks_pay: bool,
-    /// Pixel format of the picture: that of the window, so that no conversion is needed. Set by the renderer for its device.
-    pub window_texels: WindowTexels,
-    /// Bytes of shared memory of a workgroup on a GPU, which AOS, the light volume and filters use. 0 on a CPU, where single invocations are faster.
-    /// Set by the renderer for its device.
-    pub shared_memory: u32,
-    /// True if the device truncates half-precision floats when it stores them, instead of rounding. Set by the renderer for its device.
-    pub truncates_halves: bool,
-    /// Maximum number of frames that go through stage 1 at once, at least 1. Set by the renderer for its device.
-    pub frames_at_once: u32,
+    /// What the renderer says of its device.
+    pub device: DeviceFacts,
     /// How the volume is sampled: the setting `ray.sampling`, or for `Auto` what [`Scene::sampled`] chose.
     pub sampling: Sampling,
     /// Margin around the sector, pixels of a slice, in which pixels take the nearest sample of the sector: as wide as the filters reach. 0 is the
@@ -345,10 +352,7 @@ impl Scene {
             step,
             ring,
             bricks_pay: true,
-            window_texels: WindowTexels::default(),
-            shared_memory: 0,
-            truncates_halves: false,
-            frames_at_once: u32::MAX,
+            device: DeviceFacts::default(),
             sampling,
             apron: 0.0,
             conditioning,
@@ -446,7 +450,7 @@ impl Scene {
 
     /// True if the device is a CPU, or not known yet: it has no shared memory and executes both sides of every branch.
     pub(crate) fn is_for_cpu(&self) -> bool {
-        self.shared_memory == 0
+        self.device.shared_memory == 0
     }
 
     /// True if lines are conditioned before scan conversion.

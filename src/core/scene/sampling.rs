@@ -32,7 +32,7 @@ impl Scene {
     /// has 11 bits, of which truncation loses one, always downwards. R16 has 16 bits for 0..1.
     pub fn volume_format(&self) -> VolumeFormat {
         match self.settings.slices.format {
-            VolumeFormat::Auto if self.truncates_halves && !self.may_overshoot() => VolumeFormat::R16,
+            VolumeFormat::Auto if self.device.truncates_halves && !self.may_overshoot() => VolumeFormat::R16,
             VolumeFormat::Auto => VolumeFormat::R16f,
             format => format,
         }
@@ -45,7 +45,7 @@ impl Scene {
 
     /// A line on the texel format of the volume and the reason for it, for `--explain`.
     pub(crate) fn format_choice(&self) -> String {
-        let why = match (self.settings.slices.format, self.truncates_halves, self.may_overshoot()) {
+        let why = match (self.settings.slices.format, self.device.truncates_halves, self.may_overshoot()) {
             (VolumeFormat::Auto, true, true) => {
                 "the device truncates what it stores so, but scheme aos-richardson may leave values beyond 0..1"
             }

@@ -38,7 +38,7 @@ impl SceneSpec {
         let mut scene =
             scene(self.geometry.clone(), self.input, &self.toml).map_err(|e| format!("{}: {e}", self.name))?;
         scene.settings.post.floats |= self.floats;
-        scene.shared_memory = self.shared_memory;
+        scene.device.shared_memory = self.shared_memory;
         Ok(scene)
     }
 }

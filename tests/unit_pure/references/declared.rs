@@ -3,6 +3,7 @@
 
 use super::*;
 use echolume::low_level::passes::{Slot, Value};
+use echolume::low_level::scene::DeviceFacts;
 
 /// A dispatch as text: shader, slots read and written, invocations.
 fn told(scene: &Scene, name: &str, iteration: u32) -> String {
@@ -124,7 +125,7 @@ fn elimination_goes_forth_and_back_along_rows_and_then_columns() {
 fn workgroups_solve_rows_and_columns_that_their_memory_holds() {
     let of = |size, bytes| {
         let aos = slices(size, "perona_malik = { scheme = 'aos', repeat = 2 }");
-        Scene { shared_memory: bytes, ..aos }
+        Scene { device: DeviceFacts { shared_memory: bytes, ..aos.device }, ..aos }
     };
     let scene = of([21, 300], 16 << 10);
     assert_eq!((pass("aos_slice").repeat)(&scene), 4);
@@ -152,7 +153,14 @@ fn workgroups_solve_rows_and_columns_that_their_memory_holds() {
     }
     for (size, dispatches) in [([512, 9], 2), ([513, 9], 4)] {
         let aos = picture(size, "perona_malik = { scheme = 'aos', repeat = 1 }");
-        assert_eq!((pass("aos_picture").repeat)(&Scene { shared_memory: 16 << 10, ..aos }), dispatches, "{size:?}");
+        assert_eq!(
+            (pass("aos_picture").repeat)(&Scene {
+                device: DeviceFacts { shared_memory: 16 << 10, ..aos.device },
+                ..aos
+            }),
+            dispatches,
+            "{size:?}"
+        );
     }
 }
 
@@ -235,12 +243,12 @@ fn shaders_and_references_get_the_same_parameters() {
     let tie = f64::from(1e-6f32);
     assert_eq!(numbers(&scene, "sigma_slice"), [("range", 0.25), ("tie", tie), ("few", 4.0), ("slice", 1.0)]);
     for (shared_memory, tiled) in [(0, 0), (4 << 10, 1)] {
-        let scene = Scene { shared_memory, ..scene.clone() };
+        let scene = Scene { device: DeviceFacts { shared_memory, ..scene.device }, ..scene.clone() };
         assert_eq!(constants(&scene, "sigma_slice", 0), [("RADIUS", 4), ("MULTIPLICATIVE", 1), ("TILED", tiled)]);
     }
     // 16 KB of shared memory hold the tile of any window, but leave a GPU too few workgroups.
     let wide = slices([8, 8], "sigma = { window = 41, sigma = 0.125 }");
-    let wide = Scene { shared_memory: 16 << 10, ..wide };
+    let wide = Scene { device: DeviceFacts { shared_memory: 16 << 10, ..wide.device }, ..wide };
     assert_eq!(constants(&wide, "sigma_slice", 0)[2], ("TILED", 0));
     let least = f64::from((1.0 / 510.0) as f32);
     let expected = [("range", 0.5), ("tie", tie), ("few", 3.0), ("edge", 0.5), ("least", least), ("slice", 1.0)];
@@ -253,7 +261,9 @@ fn shaders_and_references_get_the_same_parameters() {
     for (axis, name, radius, deviation) in
         [(0, "gaussian_lateral", 6, 2.0), (1, "gaussian_depth", 3, 1.0), (2, "gaussian_elevation", 2, 0.5)]
     {
-        let on_device = |shared_memory: u32| constants(&Scene { shared_memory, ..scene.clone() }, name, 0);
+        let on_device = |shared_memory: u32| {
+            constants(&Scene { device: DeviceFacts { shared_memory, ..scene.device }, ..scene.clone() }, name, 0)
+        };
         let expected = |tiled| [("RADIUS", radius), ("AXIS", axis), ("SHARPENS", 0), ("TILED", tiled)];
         assert_eq!(on_device(0), expected(0));
         assert_eq!(on_device(16 << 10), expected(i32::from(axis == 0)));

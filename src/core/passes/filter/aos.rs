@@ -113,7 +113,7 @@ impl Images {
         let chunk = (0..2).map(|axis| self.chunk(scene, axis)).max().unwrap_or(0);
         // An equation has three coefficients and a right side.
         let bytes = 4 * (3 + self.channels) * THREADS * chunk;
-        if chunk <= MAX_CHUNK && bytes <= scene.shared_memory { Solver::Hybrid } else { Solver::Thomas }
+        if chunk <= MAX_CHUNK && bytes <= scene.device.shared_memory { Solver::Hybrid } else { Solver::Thomas }
     }
 
     /// Unknowns of each invocation of the hybrid solver.

@@ -69,7 +69,7 @@ impl Beam {
 
     /// Several layers a dispatch where workgroups have memory of their own: on a GPU. A stride would need a wider border of each.
     fn layers_at_once(&self, scene: &Scene) -> u32 {
-        if LAYERS_MEMORY <= scene.shared_memory && self.stride(scene) == 1 { LAYERS } else { 1 }
+        if LAYERS_MEMORY <= scene.device.shared_memory && self.stride(scene) == 1 { LAYERS } else { 1 }
     }
 
     fn shader(&self, scene: &Scene) -> &'static str {

@@ -435,12 +435,12 @@ slots! {
     LabelColours = D::table("label_colours", |_| Shape::Buffer(16 * 256), lookup_tables::label_colours, By(lookup_tables::labels_differ))
         .of(COLOUR, "share, 0..1");
     /// The result before labels are laid over it.
-    Unlabelled = D::image("unlabelled", per_pixel, |s| match s.window_texels {
+    Unlabelled = D::image("unlabelled", per_pixel, |s| match s.device.window_texels {
         WindowTexels::Deep => Format::Rgba16f,
         _ => Format::Rgba8,
     }).of(COLOUR, "share, 0..1");
     /// The result: 8 bits a channel, or the format of the window.
-    Screen = D::image("screen", per_pixel, |s| match s.window_texels {
+    Screen = D::image("screen", per_pixel, |s| match s.device.window_texels {
         WindowTexels::Rgba8 => Format::Rgba8,
         WindowTexels::Bgra8 => Format::Bgra8,
         WindowTexels::Deep => Format::Rgba16f,

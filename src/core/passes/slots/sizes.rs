@@ -24,7 +24,7 @@ pub fn frames_per_batch(scene: &Scene) -> u32 {
         |[width, height]: [u32; 2], format: Format| u64::from(width) * u64::from(height) * format.texel_bytes() as u64;
     let largest = bytes(scene.frame_size(), frame_format(scene)).max(bytes(scene.grid.size, Format::R32f));
     let largest = if scene.conditions() { largest.max(bytes(scene.line_lattice(), Format::R32f)) } else { largest };
-    let most = MAX_FRAMES.min(scene.slices().into()).min(scene.frames_at_once.max(1).into());
+    let most = MAX_FRAMES.min(scene.slices().into()).min(scene.device.frames_at_once.max(1).into());
     (batch_bytes(scene) / largest).clamp(1, most) as u32
 }
 
