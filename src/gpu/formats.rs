@@ -108,6 +108,7 @@ pub fn adapt_scene(context: &Context, texel_access: TexelAccess, mut scene: Scen
         false => scene.device.shared_memory = context.candidate.limits.max_compute_shared_memory_size,
     }
     scene.device.window_texels = window_texels(context);
+    scene.device.invocations = context.candidate.limits.max_compute_work_group_invocations;
     let format = vulkan(Slot::PackedNeighbours.format(&scene));
     let fits = context.image_limits(format, vk::ImageType::TYPE_3D, usage(context, Slot::PackedNeighbours));
     let fits = fits.is_ok_and(|l| {

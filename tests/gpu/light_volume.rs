@@ -143,6 +143,9 @@ fn light_through_several_layers_at_once_is_that_of_layer_by_layer() {
         several.device.shared_memory = 32 << 10;
         let dispatches = |scene| Plan::new(scene).steps.len();
         assert!(3 * dispatches(&several) < dispatches(&each), "several layers a dispatch");
+        let device_of_few = DeviceFacts { invocations: 512, ..several.device };
+        let few = Scene { device: device_of_few, ..several.clone() };
+        assert_eq!(dispatches(&few), dispatches(&each), "a workgroup needs 1024 invocations");
         for slot in [Slot::LightArriving, Slot::BackLight] {
             let [a, b] = [&each, &several].map(|scene| lit(&device, scene, body, slot));
             assert_eq!(a.size, b.size);

@@ -191,6 +191,9 @@ pub struct DeviceFacts {
     pub window_texels: WindowTexels,
     /// Bytes of shared memory of a workgroup on a GPU, which AOS, the light volume and filters use. 0 on a CPU, where single invocations are faster.
     pub shared_memory: u32,
+    /// Largest number of invocations of a workgroup.
+    #[value(u32::MAX)]
+    pub invocations: u32,
     /// True if the device truncates half-precision floats when it stores them, instead of rounding.
     pub truncates_halves: bool,
     /// Maximum number of frames that go through stage 1 at once, at least 1.

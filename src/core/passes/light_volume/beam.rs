@@ -9,10 +9,12 @@ use crate::scene::{Propagation, Scene};
 const MAX_STRIDE: u32 = 16;
 /// Smallest and largest variance of the kernel of propagate.comp, cells^2, for which no weight is negative; the largest by the square of its stride.
 const VARIANCES: [f64; 2] = [0.25, 0.75];
-/// Layers of a dispatch of propagate_layers.comp, and the shared memory that it takes, bytes: a float for each of three colours, in
-/// 32 x 32 cells of two layers.
+/// Layers of a dispatch of propagate_layers.comp, and cells of a workgroup, each with an invocation. A workgroup lights a quarter of them; the others
+/// lie around those.
 const LAYERS: u32 = 8;
-const LAYERS_MEMORY: u32 = 2 * 3 * 4 * 32 * 32;
+const REGION: u32 = 32 * 32;
+/// Shared memory of a workgroup, bytes: a float for each of three colours, in two layers.
+const LAYERS_MEMORY: u32 = 2 * 3 * 4 * REGION;
 
 pub(super) fn need_back(scene: &Scene) -> Need {
     match scene.lit_by_volume() {
@@ -69,7 +71,8 @@ impl Beam {
 
     /// Several layers a dispatch where workgroups have memory of their own: on a GPU. A stride would need a wider border of each.
     fn layers_at_once(&self, scene: &Scene) -> u32 {
-        if LAYERS_MEMORY <= scene.device.shared_memory && self.stride(scene) == 1 { LAYERS } else { 1 }
+        let fits = LAYERS_MEMORY <= scene.device.shared_memory && REGION <= scene.device.invocations;
+        if fits && self.stride(scene) == 1 { LAYERS } else { 1 }
     }
 
     fn shader(&self, scene: &Scene) -> &'static str {
@@ -98,9 +101,19 @@ impl Beam {
         vec![whole("next_front", self.fronts[args.iteration as usize % 2]), whole("arriving", self.arriving)]
     }
 
+    /// Cells of a layer along both of its axes.
+    fn front_size(&self, scene: &Scene) -> [u32; 2] {
+        match self.fronts[0].shape(scene) {
+            Shape::Two(size) => size,
+            _ => [1; 2],
+        }
+    }
+
     fn extent(&self, scene: &Scene) -> [u32; 3] {
-        let Shape::Two([width, height]) = self.fronts[0].shape(scene) else { return [1; 3] };
-        [width, height, 1]
+        let [width, height] = self.front_size(scene);
+        // Invocations of workgroups that light several layers are cells of overlapping regions.
+        let along = if self.layers_at_once(scene) > 1 { 2 } else { 1 };
+        [along * width, along * height, 1]
     }
 
     /// Of the kernel, cells^2.
@@ -170,7 +183,7 @@ impl Beam {
 
     fn reference(&self, scene: &Scene, args: &DispatchArgs, reads: &Arrays, writes: &mut Arrays) {
         let found = self.propagation(scene);
-        let [width, height, _] = self.extent(scene).map(|n| n as usize);
+        let [width, height] = self.front_size(scene).map(|n| n as usize);
         let (absorption, variance, stride) = (self.absorption(scene), self.variance(scene), self.stride(scene));
         // The share of each of three cells, with the mean and the variance asked for.
         let shares = |shift: f64| {
