@@ -133,6 +133,8 @@ fn a_profile_is_consistent_and_round_trips() {
     let [width, height, _] = sigma.invocations(&scene(SETTINGS), &DispatchArgs::default()).map(u64::from);
     assert_eq!(of("sigma_slice").invocations, Some(15 * width.next_multiple_of(8) * height.next_multiple_of(8)));
     assert_eq!(of("sigma_slice").fetches, Some(15 * width * height * 3 * 6));
+    // A tile is 4 x 4 texels.
+    assert_eq!(of("tile_ranges").fetches, of("tile_ranges").dispatched.map(|tiles| 16 * tiles));
     // On a CPU each pass has its part of the CPU time of a repeat.
     if context.candidate.is_software() && cfg!(target_os = "linux") {
         for (n, all) in profile.cpu_ns.iter().enumerate() {

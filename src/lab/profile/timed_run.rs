@@ -307,19 +307,29 @@ fn dispatched(step: &Step, scene: &Scene) -> u64 {
     step.pass.invocations(scene, &args).iter().map(|n| u64::from(*n)).product()
 }
 
-/// Texels that one step fetches; None unless it is a filter whose window does not depend on the data.
+/// Texels that one step fetches if each pixel has a surface; None unless the pass has a window. Of a window that depends on the data, its least size.
 fn fetches(pass: &Pass, scene: &Scene, step: &Step) -> Option<u64> {
     let args = DispatchArgs { slices: pass.slices(scene), ..step.args() };
     let constants = pass.constants(scene, &args);
-    let constant = |asked: &str| constants.iter().find(|(name, _)| *name == asked).map(|(_, value)| *value);
-    let radius = constant("RADIUS")? as u64;
+    let constant = |asked: &str| constants.iter().find(|(name, _)| *name == asked).map(|(_, value)| *value as u64);
     // An invocation filters a run of neighbours and shares their window, a workgroup that of all its invocations where it has shared memory.
     let sharing = if constant("TILED") == Some(1) { u64::from(GROUP) } else { 1 };
-    let seen = |made: u64| made + 2 * radius;
-    let window = match pass.name.split('_').next()? {
-        "gaussian" => sharing * seen(sharing * u64::from(filter::gaussian::RUN)),
-        "sigma" => seen(sharing) * seen(sharing * u64::from(RUN)),
-        _ => return None,
+    let run = u64::from(RUN);
+    let seen = |made: u64| Some(made + 2 * constant("RADIUS")?);
+    let window = match pass.name {
+        "tile_ranges" => constant("TILE")?.pow(2),
+        "light_reduce" => 4_u64.pow(3),
+        "median_slice" => (constant("COLUMNS")? + 2) * (run + 2),
+        // Eight first thresholds; then the window is read to count values, and again to find the median.
+        "median_distance" => 8 + 2 * seen(1)? * seen(run)?,
+        "bilateral_distance" => run + seen(1)? * seen(run)?,
+        name => match name.split('_').next()? {
+            "gaussian" => sharing * seen(sharing * u64::from(filter::gaussian::RUN))?,
+            "sigma" => seen(sharing)? * seen(sharing * run)?,
+            // The texel itself and its starting window, without the estimate of its centre and what the window grows by.
+            "enhanced" => 1 + seen(1)?.pow(2),
+            _ => return None,
+        },
     };
     Some(dispatched(step, scene) * window / (sharing * sharing))
 }
