@@ -2,6 +2,7 @@
 
 use crate::source::formats::described;
 use crate::source::{self, Calibration, DepthAxis, OpenOptions, Source};
+use crate::sync::locked;
 use crate::terminal::{Failure, input, say};
 use crate::workspace::Origin;
 use std::path::{Path, PathBuf};
@@ -106,7 +107,7 @@ pub fn open_recording(path: &Path, options: OpenOptions) -> Result<Box<dyn Sourc
 
 /// Prints on one line which probe file is used. Prints nothing for None, or if the last call that printed named the same file.
 pub fn say_probe_file(file: Option<&Path>) {
-    let mut said = SAID.lock().unwrap_or_else(|e| e.into_inner());
+    let mut said = locked(&SAID);
     if let Some(file) = file.filter(|file| said.as_deref() != Some(*file)) {
         say!("probe: {}", file.display());
         *said = Some(file.into());

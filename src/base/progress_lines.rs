@@ -1,9 +1,10 @@
 //! Progress as lines of text for the program that started this one. The viewer shows the progress of an export by them.
 
+use crate::sync::locked;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle, TermLike};
 use std::fmt::{self, Debug, Formatter};
 use std::io::{self, Write};
-use std::sync::{Mutex, PoisonError};
+use std::sync::Mutex;
 
 /// The environment variable that requests progress lines, and the value that it must have.
 pub const ASKED_BY: (&str, &str) = ("ECHOLUME_PROGRESS", "lines");
@@ -58,7 +59,7 @@ impl Lines {
         if text.is_empty() {
             return Ok(());
         }
-        writeln!(self.0.lock().unwrap_or_else(PoisonError::into_inner), "{PREFIX}{text}")
+        writeln!(locked(&self.0), "{PREFIX}{text}")
     }
 }
 
@@ -96,7 +97,7 @@ impl TermLike for Lines {
     }
 
     fn flush(&self) -> io::Result<()> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).flush()
+        locked(&self.0).flush()
     }
 }
 
@@ -110,7 +111,7 @@ mod tests {
 
     impl Write for Shared {
         fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-            self.0.lock().unwrap_or_else(PoisonError::into_inner).extend(bytes);
+            locked(&self.0).extend(bytes);
             Ok(bytes.len())
         }
 

@@ -1,6 +1,7 @@
 //! Output of a command: lines on standard output, and the line on standard error that ends a failed command.
 
 use crate::progress_lines;
+use crate::sync::locked;
 use crate::text::without_control_characters;
 use indicatif::ProgressBar;
 use std::io::{ErrorKind, IsTerminal, Write};
@@ -111,7 +112,7 @@ pub fn write(bytes: &[u8]) {
     match std::io::stdout().write_all(bytes).and_then(|()| std::io::stdout().flush()) {
         Ok(()) => {}
         Err(error) if error.kind() == ErrorKind::BrokenPipe => IS_CLOSED.store(true, Ordering::Relaxed),
-        Err(error) => drop(WRITE_ERROR.lock().unwrap_or_else(|e| e.into_inner()).get_or_insert(error)),
+        Err(error) => drop(locked(&WRITE_ERROR).get_or_insert(error)),
     }
 }
 
@@ -146,7 +147,7 @@ pub fn is_closed() -> bool {
 /// Takes the first error of writing to standard output since the last call; None if there was none. That the reader closed the pipe is no
 /// such error ([`is_closed`]).
 pub fn take_write_error() -> Option<std::io::Error> {
-    WRITE_ERROR.lock().unwrap_or_else(|e| e.into_inner()).take()
+    locked(&WRITE_ERROR).take()
 }
 
 /// `message` as one line of at most [`MAX_MESSAGE`] characters.

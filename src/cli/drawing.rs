@@ -7,7 +7,7 @@ use crate::terminal::{Failure, failed};
 use std::path::Path;
 use std::sync::Arc;
 
-/// The arguments of `render` for several pictures: how they are drawn, and where they are written.
+/// The arguments of `render` that say how pictures are drawn and where they are written.
 pub struct Job<'a> {
     pub input: &'a InputArgs,
     pub output: &'a Path,

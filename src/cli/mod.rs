@@ -283,8 +283,8 @@ fn parsed() -> Result<Arguments, clap::Error> {
 }
 
 impl Command {
-    /// What the configuration of the viewer asks for: its log; false if it lets the umask say who may read files; and true if the command runs until
-    /// it is stopped.
+    /// What the viewer asks for, in this order: its log; whether only the user may read the files it writes (otherwise the umask decides); and whether it
+    /// runs until it is stopped, so that SIGHUP opens the log again instead of ending it.
     fn of_view(&self) -> (Option<LogPlace>, bool, bool) {
         match self {
             #[cfg(feature = "view")]

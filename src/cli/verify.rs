@@ -128,7 +128,7 @@ impl Verify {
             return Ok(());
         }
         if self.coverage {
-            let scenes = verify::built_in::scenes(verify::built_in::SHARED_MEMORY).map_err(failed)?;
+            let scenes = verify::built_in::scenes(verify::built_in::gpu()).map_err(failed)?;
             say!("{}", verify::coverage::text(&scenes).trim_end());
             return Ok(());
         }

@@ -10,6 +10,7 @@ use crate::live::StreamOptions;
 use crate::live::cine::CineLimits;
 use crate::source::live::Live;
 use crate::source::live::SourceKind;
+use crate::sync::locked;
 use crate::terminal::{Failure, failed, input};
 use crate::ui::console::{Console, ConsoleOptions, StartupFault};
 use crate::ui::frame_budget::{Rung, built_in_ladder, measured_ladder};
@@ -169,7 +170,7 @@ impl ConsoleConfig {
         let kind = self.source.as_ref().map_or(SourceKind::default(), SourceArgs::kind);
         let (source, first, progress) = (self.source, Mutex::new(self.first), self.options.opening.progress.clone());
         let open: OpenSource = Arc::new(move || {
-            let first = first.lock().unwrap_or_else(|e| e.into_inner()).take();
+            let first = locked(&first).take();
             let opened = match (first, &source) {
                 (Some(First::Open(source)), _) => Ok(source),
                 (Some(First::BeingOpened(opened)), _) => opened.recv().unwrap_or_else(|_| Err(failed(PANICKED))),

@@ -534,10 +534,8 @@ impl Context {
             Ok(()) => self.wait_fence(fence, begun, "wait for an idle queue"),
             failed => failed.context(operation),
         };
-        if !self.is_given_up() {
-            // SAFETY: it was not submitted, or the device is done with it or lost.
-            unsafe { self.device.destroy_fence(fence, None) };
-        }
+        // SAFETY: it was not submitted, or the device is done with it or lost.
+        self.destroy(|device| unsafe { device.destroy_fence(fence, None) });
         done
     }
 

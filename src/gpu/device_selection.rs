@@ -36,7 +36,7 @@ const KINDS: [(vk::PhysicalDeviceType, &str); 5] = [
     (vk::PhysicalDeviceType::OTHER, "other"),
     (vk::PhysicalDeviceType::CPU, "software"),
 ];
-/// The index in [`KINDS`] of a kind that it does not have.
+/// Index in [`KINDS`] of the entry for kinds that are not listed.
 const OTHER: usize = 3;
 
 /// A physical device, with what it lacks and supports.

@@ -23,7 +23,7 @@ pub enum InjectionPoint {
     Acquire,
 }
 
-/// The result of a call that is made to fail, for modules that do not use types of Vulkan.
+/// The result of a call that is made to fail: an error of Vulkan, for crates that do not use `ash`.
 pub use ash::vk::Result as InjectedFailure;
 
 /// Content for newly allocated memory, to find uses of uninitialized memory.

@@ -14,7 +14,7 @@ const MAX_REPORTED: usize = 4;
 #[derive(Clone, Debug, Default)]
 pub struct LossReport {
     pub description: String,
-    /// Of failed memory accesses and of instructions.
+    /// Addresses of failed memory accesses and of instructions.
     pub addresses: Vec<vk::DeviceFaultAddressInfoEXT>,
     /// Codes that only the vendor can interpret.
     pub codes: Vec<vk::DeviceFaultVendorInfoEXT>,

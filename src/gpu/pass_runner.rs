@@ -49,7 +49,8 @@ impl PassRunner {
         self.context.candidate.limits.sub_texel_precision_bits
     }
 
-    /// The scene as [`PassRunner::run`] runs it: fields that depend on the device are set, except those that decide the number of dispatches.
+    /// The scene as [`PassRunner::run`] runs it: fields that depend on the device are set, except shared memory and frames at once, which decide the
+    /// number of dispatches and which callers choose.
     pub fn adapted(&self, scene: &Scene) -> Scene {
         let adapted = formats::adapt_scene(&self.context, self.texel_access, scene.clone());
         let DeviceFacts { shared_memory, frames_at_once, .. } = scene.device;

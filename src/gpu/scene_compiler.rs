@@ -22,6 +22,8 @@ pub(super) struct SceneCompiler {
 }
 
 impl SceneCompiler {
+    /// The arguments have the meaning of the fields of the same names of the renderer's options.
+    ///
     /// # Errors
     /// The device fails.
     pub fn new(

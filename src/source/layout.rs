@@ -75,7 +75,7 @@ pub(super) struct Cartesian {
 }
 
 impl Layout {
-    /// The layout of one volume, or of several that `geometry` has, whose file states its geometry and nothing else.
+    /// The layout of one volume, or of several that `geometry` has, whose file states its geometry: without times, poses and remarks.
     pub fn new(
         format: &'static str,
         pixel: PixelFormat,

@@ -4,11 +4,12 @@ use super::formats;
 use super::frame::{Frame, Header, Source};
 use crate::files::{InputError, Spool};
 use crate::probe::{Geometry, World};
+use crate::sync::locked;
 use crate::{SampleType, StoredType};
 use glam::DAffine3;
 use std::io::{IsTerminal, Read};
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard};
 
 /// Its name for users.
 const NAME: &str = "standard input";
@@ -19,7 +20,7 @@ const MAX_BYTES: u64 = 64 << 30;
 static KEPT: Mutex<Option<Spool>> = Mutex::new(None);
 
 fn kept() -> MutexGuard<'static, Option<Spool>> {
-    KEPT.lock().unwrap_or_else(PoisonError::into_inner)
+    locked(&KEPT)
 }
 
 /// True if a path stands for standard input: `-`.

@@ -254,6 +254,7 @@ impl Job {
                 let rate = self.rate.clamp(FILM_RATES[0], FILM_RATES[1]).to_string();
                 of_workspace("render", &["--volumes", "loop", "--rate", &rate])?;
             }
+            // Pictures have no rate.
             Work::Loop => of_workspace("render", &["--volumes", "loop"])?,
             Work::Convert => _ = command.arg("convert").args([recording, made]),
             Work::Mesh => _ = command.arg("mesh").args([recording, made]),
@@ -264,7 +265,7 @@ impl Job {
         Ok(command)
     }
 
-    /// A folder of pictures has to end like one.
+    /// The path that the command writes. That of a folder of pictures, which turntables and loops make, ends with a slash.
     fn output(&self, made: &Path) -> PathBuf {
         if matches!(self.format.ending, "turntable" | "loop") { made.join("") } else { made.to_path_buf() }
     }

@@ -135,7 +135,7 @@ mod tests {
     /// A fault of a command or an instruction that nothing here runs is never found.
     #[test]
     fn every_shader_is_run_and_every_dispatch_goes_beyond_eight_workgroups() {
-        let scenes = built_in::scenes(built_in::SHARED_MEMORY).unwrap();
+        let scenes = built_in::scenes(built_in::gpu()).unwrap();
         assert_eq!(unused_shaders(&scenes), Vec::<&str>::new());
         // A workgroup that lists all pixels, and the coarse cells of light from behind.
         let exceptions = ["tolerance_list", "light_propagate_back"];

@@ -33,7 +33,7 @@ pub mod time_stamps;
 
 pub use compare::{Comparison, ExtraTolerance, compare_outputs, compare_picture, expect_same_picture};
 
-use echolume_base::{baselines, files, html_page, metrics, picture, statistics, terminal, text, tree};
+use echolume_base::{baselines, files, html_page, metrics, picture, statistics, sync, terminal, text, tree};
 use echolume_core::{passes, plan, queues, reference, scene, spirv};
 use echolume_gpu::{self as gpu, machine};
 use echolume_lab::profile;
@@ -42,7 +42,7 @@ use {echolume_probe as probe, echolume_source as source};
 use crate::gpu::pass_runner::PassRunner;
 use crate::gpu::{Context, ContextOptions, GpuError};
 use crate::passes::fault_injection::Change;
-use crate::scene::Scene;
+use crate::scene::{DeviceFacts, Scene};
 use baselines::Stored;
 use render::Drawn;
 use report::{CheckName, Fault, Figure, Level, Outcome, PictureComparison, Run, Verdict};
@@ -282,9 +282,13 @@ impl DeviceUnderTest {
         let context = Context::new(options)?;
         prepare.iter().for_each(|prepare| prepare(&context));
         let pass_runner = PassRunner::new(&context)?;
-        let scenes =
-            built_in::scenes(context.candidate.limits.max_compute_shared_memory_size).map_err(GpuError::Broken)?;
-        let scenes = Rc::new(scenes);
+        let limits = &context.candidate.limits;
+        let facts = DeviceFacts {
+            shared_memory: limits.max_compute_shared_memory_size,
+            invocations: limits.max_compute_work_group_invocations,
+            ..DeviceFacts::default()
+        };
+        let scenes = Rc::new(built_in::scenes(facts).map_err(GpuError::Broken)?);
         Ok(DeviceUnderTest {
             context,
             level,

@@ -143,10 +143,13 @@ fn the_phantom_streams_until_it_is_stopped() {
     let said = done(&[&["stream", "--null", "--rate", "4", "--volumes", "3", "--validate"], &SMALL[..]].concat());
     let last = said.lines().last().expect("a line");
     assert!(last.contains(" 3 volumes shown") || last.contains(" 4 volumes shown"), "{said}");
-    let said =
-        done(&[&["stream", "--null", "--rate", "4", "--for", "2500ms", "--update", "rolling"], &SMALL[..]].concat());
+    // A busy machine draws no picture in so short a time.
+    let for_a_while =
+        |time| done(&[&["stream", "--null", "--rate", "4", "--for", time, "--update", "rolling"], &SMALL[..]].concat());
+    let mut tries = ["2500ms", "10s", "60s"].into_iter().map(for_a_while);
+    let said = tries.find(|said| said.contains("latency ms p50")).expect("a picture in a minute");
     assert!(said.lines().filter(|l| l.contains(" s  frames ")).count() >= 1, "{said}");
-    assert!(said.contains("what sound allows") && said.contains("latency ms p50"), "{said}");
+    assert!(said.contains("what sound allows"), "{said}");
 }
 
 /// As in two terminals: a simulated motor in one, a stream swept by it in the other, until SIGINT.

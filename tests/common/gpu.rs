@@ -155,7 +155,7 @@ pub fn same_slot(device: &Device, a: &Option<Texels>, b: &Option<Texels>, tolera
 
 /// Scenes by name that together need every pass.
 pub fn scenes() -> Vec<(String, Scene)> {
-    built_in::scenes(built_in::SHARED_MEMORY).expect("scenes")
+    built_in::scenes(built_in::gpu()).expect("scenes")
 }
 
 pub fn frame_format(scene: &Scene) -> Format {

@@ -90,7 +90,7 @@ pub(super) fn corners(planes: &[HalfSpace], least: f64, slack: f64) -> Vec<DVec3
                     continue;
                 }
                 let corner = across.inverse() * DVec3::new(a.limit, b.limit, c.limit);
-                if planes.iter().all(|plane| plane.normal.dot(corner) <= plane.limit + slack) {
+                if planes.iter().all(|plane| plane.room(corner) >= -slack) {
                     corners.push(corner);
                 }
             }

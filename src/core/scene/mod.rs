@@ -59,7 +59,7 @@ pub use visible_bounds::{Rectangle, Shared, VisibleBounds};
 
 use crate::probe::StoredType;
 use crate::probe::{Geometry, Probe};
-use crate::tree::{Defaults, FromNode, ToNode};
+use crate::tree::{All, Defaults, FromNode, Name, ToNode};
 use glam::DVec3;
 use region::{framed_low, is_still, slice_grid, visible_box};
 use sizes::{Pitches, ResolvedSize, Resolver};
@@ -162,7 +162,7 @@ pub enum WindowTexels {
 }
 
 /// How pictures reach the screen: the present mode of the swapchain.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode, ToNode)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, All, FromNode, Name, ToNode)]
 #[tree(rename_all = "lowercase")]
 pub enum PresentMode {
     /// Each picture waits for a refresh of the monitor, without tearing.
@@ -176,11 +176,8 @@ impl std::str::FromStr for PresentMode {
     type Err = String;
 
     fn from_str(text: &str) -> Result<PresentMode, String> {
-        match text {
-            "fifo" => Ok(PresentMode::Fifo),
-            "mailbox" => Ok(PresentMode::Mailbox),
-            _ => Err("must be fifo or mailbox".into()),
-        }
+        let named = PresentMode::ALL.into_iter().find(|mode| mode.name() == text);
+        named.ok_or_else(|| format!("must be {}", PresentMode::ALL.map(PresentMode::name).join(" or ")))
     }
 }
 

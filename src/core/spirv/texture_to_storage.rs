@@ -10,7 +10,7 @@ use super::module::{
 pub use ::spirv::ImageFormat;
 use std::collections::HashMap;
 
-/// True if a format needs the capability StorageImageExtendedFormats.
+/// True if a format needs the capability StorageImageExtendedFormats. Of integers slots have unsigned ones of one or two channels only.
 fn is_extended(format: ImageFormat) -> bool {
     format > ImageFormat::Rgba8Snorm && format != ImageFormat::R32ui
 }

@@ -11,8 +11,9 @@ use std::sync::Arc;
 /// The image in which picture and panels are composed for a window, and what was drawn into it last.
 pub(super) struct Composition {
     pub image: RawImage,
-    /// Those of the window; the size in pixels.
+    /// That of the window.
     pub format: vk::Format,
+    /// That of the window, pixels.
     pub size: [u32; 2],
     /// True if the image was drawn into, so that its layout is no longer UNDEFINED.
     pub is_laid_out: bool,

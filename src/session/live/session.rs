@@ -332,7 +332,7 @@ impl Session {
     pub fn finish(&mut self, queued: usize, statistics: &mut Statistics) -> Result<FinishedPicture, GpuError> {
         let picture = self.renderer.end_drawing()?;
         let InFlight { volume, arrived } = self.phase.finish(queued);
-        // Their pipelines may have been compiled meanwhile, and nothing would ask again.
+        // Pipelines of pending settings may have been compiled meanwhile: the next step looks again.
         self.pending.iter_mut().for_each(|pending| pending.is_compiling = false);
         let now = Instant::now();
         arrived.iter().for_each(|at| statistics.record_latency(now.saturating_duration_since(*at)));

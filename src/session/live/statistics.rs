@@ -73,13 +73,24 @@ impl Statistics {
         self.latency.value_at_quantile(share) as f64 / 1e3
     }
 
-    /// Everything that is counted but the number of passes that could not be timed.
+    /// Everything that is counted, without latencies and what is measured of passes.
     fn counts(&mut self) -> [&mut u64; 13] {
         let Statistics { frames, lost, refused, frozen, unrecorded, pictures, faults, volumes, .. } = self;
-        let SourceFaults { reported, ended, disconnected: gone } = faults;
+        let SourceFaults { reported, ended, disconnected } = faults;
         let VolumeCounts { shown, dropped, incomplete, left_out } = volumes;
         [
-            frames, lost, refused, frozen, unrecorded, pictures, reported, ended, gone, shown, dropped, incomplete,
+            frames,
+            lost,
+            refused,
+            frozen,
+            unrecorded,
+            pictures,
+            reported,
+            ended,
+            disconnected,
+            shown,
+            dropped,
+            incomplete,
             left_out,
         ]
     }

@@ -48,15 +48,16 @@ pub(super) struct Place {
     pub odd: bool,
 }
 
-/// The pixels of one DICOM file: their size, coding and location.
+/// The pixels of one or more DICOM files: their size, coding and location.
 pub(super) struct Image {
     /// Columns and rows of a picture.
     pub size: [usize; 2],
     pub pixel: PixelFormat,
     pub coding: Coding,
     pub arrangement: Arrangement,
-    /// Where the bytes of each frame are, in the order of the file.
+    /// Where the bytes of each frame are, in the order of the file, or in that of reading once the frames are sorted.
     pub places: Vec<Place>,
+    /// Offset and length, bytes, of each fragment, or of each uncompressed frame.
     pub parts: Vec<(u64, u64)>,
     /// True if uncompressed bytes are in big-endian words of 16 bits, so that the second byte of a word is the first pixel.
     pub swapped: bool,

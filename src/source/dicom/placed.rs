@@ -38,6 +38,7 @@ pub(super) fn layout(
 ) -> Result<Layout, InputError> {
     let Placed { format, geometry, order, part, has_spacing, times, mut remarks, warnings } = placed;
     warn(&path, &image.warnings | &warnings, &mut remarks);
+    // A decoder that turns colours into luminance leaves one channel, of which the remark on channels does not say that the file has colours.
     if !matches!(image.arrangement, Arrangement::Plain | Arrangement::Planes) {
         remarks.push(("colours".into(), "read as their luminance".into()));
     }

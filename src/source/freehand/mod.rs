@@ -2,7 +2,7 @@
 //!
 //! Two steps, as in the pixel-based methods of Rohling, Gee and Berman, *A comparison of freehand three-dimensional ultrasound
 //! reconstruction techniques*, Med. Image Anal. 3 (1999), and Solberg et al., *Freehand 3D ultrasound reconstruction algorithms: a
-//! review*, Ultrasound Med. Biol. 33 (2007): every pixel is added to the voxels around its position as it arrives, and
+//! review*, Ultrasound Med. Biol. 33 (2007): every pixel is added to the voxels around its position as it arrives, so that a voxel is the weighted mean of its pixels, and
 //! voxels without a pixel are filled from those around them. The second step bridges gaps along straight lines that end in
 //! reached voxels on both sides (Vaughan et al., *Hole filling with oriented sticks in ultrasound volume reconstruction*, J. Med. Imaging
 //! 2 (2015)): holes up to a width are closed, wider ones stay 0, and nothing is added beyond the border of the swept region.
@@ -32,12 +32,13 @@ const DEFAULT_MAX_VOXELS: usize = 1 << 25;
 /// Largest possible limit.
 const MAX_VOXELS: usize = 1 << 31;
 /// Largest weight of a voxel, in pixels at its centre. Above it, sum and weight are halved: with larger sums, rounding in f32 would
-/// affect the mean, and after 2^24 further pixels would have no effect.
+/// affect the mean, and after 2^24 further pixels would have no effect. Earlier pixels then count less.
 const MAX_WEIGHT: f32 = 4096.0;
 /// Larger samples are left out: they cannot be added up in f32, and are no echoes.
 const MAX_SAMPLE: f32 = 1e30;
 /// Smaller weights are rounding errors: a pixel at the centre of a voxel is not added to its neighbours.
 const MIN_WEIGHT: f64 = 1e-6;
+
 /// Options of a [`Compounder`].
 #[derive(Clone, Debug, PartialEq, Defaults)]
 pub struct CompoundingOptions {

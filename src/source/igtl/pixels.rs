@@ -23,7 +23,7 @@ pub(super) fn samples(image: Image) -> Result<(Vec<u8>, u64), String> {
     let channels = usize::from(components);
     let number = match (scalar, components) {
         (_, 0 | 2 | 5..) => return Err(format!("pixels have {components} components, must have 1, 3 or 4")),
-        // Other than those of files, these stay 8 bits. Adding 128 to an i8 flips its top bit.
+        // Unlike those of files, these stay 8 bits. Adding 128 to an i8 flips its top bit.
         (Scalar::I8, 1) => {
             bytes.iter_mut().for_each(|byte| *byte ^= 0x80);
             Scalar::U8

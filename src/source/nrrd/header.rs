@@ -38,7 +38,7 @@ pub(in super::super) static KEYS: Keys = Keys::new(|| {
         ("old min|old max", Aspect::Value, Use::Warned(&[])),
         ("block size", Aspect::Storage, Use::Listed),
         ("content|number|min|max|sample units|thicknesses", Aspect::About, Use::Listed),
-        // Of vectors and tensors.
+        // Of vectors and tensors, and of the segments of a segmentation.
         ("measurement frame|SegmentN_*|Segmentation_*", Aspect::About, Use::Listed),
     ])
 });

@@ -66,6 +66,7 @@ use crate::gpu::{Context, GpuError, Wake};
 use crate::kiosk::chord::Chord;
 use crate::live::metrics::LiveMetrics;
 use crate::live::{Feed, Stream, StreamError, StreamOptions};
+use crate::sync::locked;
 use crate::texts;
 use crate::workspace::Origin;
 use std::sync::Arc;
@@ -153,7 +154,7 @@ impl Console {
     /// A console that opens its source by `open`. `size`: that of the window, pixels.
     pub fn new(context: &Arc<Context>, open: OpenSource, options: ConsoleOptions, size: [u32; 2]) -> Console {
         let now = Instant::now();
-        let (kept, display) = options.opening.recordings.lock().unwrap_or_else(|e| e.into_inner()).take_kept();
+        let (kept, display) = locked(&options.opening.recordings).take_kept();
         let (kept, frozen) = kept.map_or((None, None), |kept| (Some(kept.controls), kept.frozen));
         // Settings that were kept are complete.
         let is_kept = kept.is_some();

@@ -9,6 +9,7 @@ use crate::input::Key;
 use crate::open_list::{self, Kind};
 use crate::panels::{FilesShown, Reading};
 use crate::recordings::{Display, Kept, MAX_OPEN, Named, OpenRecordings, Recordings};
+use crate::sync::locked;
 use crate::texts;
 use std::path::{Path, PathBuf};
 use std::sync::MutexGuard;
@@ -179,7 +180,7 @@ impl Opening {
     }
 
     fn recordings(&self) -> MutexGuard<'_, Recordings> {
-        self.recordings.lock().unwrap_or_else(|e| e.into_inner())
+        locked(&self.recordings)
     }
 
     /// Puts a file at the top of the list of recent files, if that is stored.

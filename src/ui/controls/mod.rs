@@ -37,7 +37,7 @@ pub(super) enum Change {
     /// Only the selected tool changed.
     Tool,
     Settings,
-    /// Measurements, annotations or body marks changed, but not the rendered picture.
+    /// What is drawn over the picture changed, or how the loop is played, but not the rendered picture.
     Marks,
     /// The command was refused for the given reason.
     Refused(&'static str),
@@ -336,7 +336,7 @@ impl Controls {
         }
     }
 
-    /// Has these settings from now on, as a step that can be undone.
+    /// Replaces the settings by ones that can be drawn, as a step that can be undone, and remembers their mode if it renders.
     fn put(&mut self, settings: Settings, command: &Command) -> Change {
         if !settings.mode.is_flat() {
             self.rendered = settings.mode;

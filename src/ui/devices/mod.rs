@@ -16,6 +16,7 @@ pub(super) use reader::DeviceMessage;
 
 use super::input::Input;
 use crate::gpu::Wake;
+use crate::sync::locked;
 use crate::texts;
 use reader::OpenDevices;
 use rustix::event::{EventfdFlags, PollFd, PollFlags, Timespec, eventfd, poll};
@@ -24,7 +25,7 @@ use std::os::fd::OwnedFd;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -102,7 +103,7 @@ impl Devices {
 
     /// Sets the size of the screen, pixels.
     pub fn resize(&self, size: [u32; 2]) {
-        *self.shared.size.lock().unwrap_or_else(PoisonError::into_inner) = size;
+        *locked(&self.shared.size) = size;
         self.shared.notify();
     }
 }
@@ -154,7 +155,7 @@ fn read_devices(
     grab: bool,
     send: &dyn Fn(DeviceMessage) -> Result<(), Stopped>,
 ) -> io::Result<Stopped> {
-    let size = || *shared.size.lock().unwrap_or_else(PoisonError::into_inner);
+    let size = || *locked(&shared.size);
     let (mut opened, mut current_size) = (OpenDevices::new(size(), grab), size());
     let (mut next_scan, mut out) = (Instant::now(), Vec::new());
     while !shared.ends.load(Ordering::Acquire) {

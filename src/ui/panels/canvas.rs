@@ -3,7 +3,7 @@
 use super::{PanelState, ShownPicture, picture_rect, shown};
 use egui::{LayerId, Painter, Pos2, Rect, Ui, vec2};
 
-/// What is drawn over the shown picture.
+/// Draws over the shown picture: a painter, and where the picture's pixels are.
 pub(super) struct Canvas {
     /// Draws where the picture is in sight.
     pub(super) painter: Painter,

@@ -1,4 +1,4 @@
-//! Every text of the window, in English: a translation is another copy of this folder. Names of modes are in [`Mode`](crate::scene::Mode), names and
+//! Every text of the window, in English; `keys` also has the commands of keys, each beside its text. Names of modes are in [`Mode`](crate::scene::Mode), names and
 //! hints of sliders are at their settings; faults that the panels show are worded by the modules that find them.
 
 /// A text with values in it: `text!(name(value) = "text with {value}");`

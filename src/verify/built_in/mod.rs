@@ -5,7 +5,7 @@ mod rays;
 
 use crate::passes::Texels;
 use crate::probe::{Advance, Array, Axis, Geometry, Grid, Indices, Motion, Probe};
-use crate::scene::{Input, LabelVolume, Scene, Settings, VolumeFormat};
+use crate::scene::{DeviceFacts, Input, LabelVolume, Scene, Settings, VolumeFormat};
 use crate::source::StoredType;
 use crate::statistics::mix;
 use glam::{DAffine3, DQuat, DVec3, EulerRot};
@@ -20,14 +20,14 @@ pub struct SceneSpec {
     toml: String,
     /// Uses pictures of floats, whatever the settings are.
     floats: bool,
-    /// Shared memory, bytes, with which passes solve rows and columns under AOS, propagate light and filter slices in workgroups, as on a
-    /// GPU.
-    shared_memory: u32,
+    /// With shared memory passes solve rows and columns under AOS, propagate light and filter slices in workgroups, as on a GPU.
+    device: DeviceFacts,
 }
 
 impl SceneSpec {
     fn new(name: &str, geometry: &Geometry, input: Input, toml: String) -> SceneSpec {
-        SceneSpec { name: name.into(), geometry: geometry.clone(), input, toml, floats: false, shared_memory: 0 }
+        let device = DeviceFacts::default();
+        SceneSpec { name: name.into(), geometry: geometry.clone(), input, toml, floats: false, device }
     }
 
     /// Builds the scene.
@@ -38,21 +38,21 @@ impl SceneSpec {
         let mut scene =
             scene(self.geometry.clone(), self.input, &self.toml).map_err(|e| format!("{}: {e}", self.name))?;
         scene.settings.post.floats |= self.floats;
-        scene.device.shared_memory = self.shared_memory;
+        scene.device = self.device;
         Ok(scene)
     }
 }
 
-/// Scenes by name that together need every pass, in every variant of the geometry. `shared_memory`: shared memory of a workgroup on the device,
-/// bytes.
+/// Scenes by name that together need every pass, in every variant of the geometry. `device`: of the scenes whose passes share
+/// memory in workgroups.
 ///
 /// # Errors
 /// One line: a scene is invalid.
-pub fn scenes(shared_memory: u32) -> Result<Vec<(String, Scene)>, String> {
-    specs(shared_memory).into_iter().map(|spec| Ok((spec.name.clone(), spec.build()?))).collect()
+pub fn scenes(device: DeviceFacts) -> Result<Vec<(String, Scene)>, String> {
+    specs(device).into_iter().map(|spec| Ok((spec.name.clone(), spec.build()?))).collect()
 }
 
-fn specs(shared_memory: u32) -> Vec<SceneSpec> {
+fn specs(device: DeviceFacts) -> Vec<SceneSpec> {
     let planes = planes::plane_scenes();
     // Planes that are rendered directly to 8 bits are also rendered via floats.
     let straight = planes.iter().filter(|spec| spec.build().is_ok_and(|scene| scene.tones_planes()));
@@ -63,11 +63,8 @@ fn specs(shared_memory: u32) -> Vec<SceneSpec> {
     // Rows and columns under AOS are solved, light is propagated and slices are filtered in both ways on every device.
     let keys = ["'aos", "volume = { cell", "sigma = { window = 5, sigma = 0.08 }, smooth"];
     let in_both_ways = rays.iter().filter(|spec| keys.iter().any(|key| spec.toml.contains(key)));
-    let in_workgroups = in_both_ways.map(|spec| SceneSpec {
-        name: format!("{}, in workgroups", spec.name),
-        shared_memory,
-        ..spec.clone()
-    });
+    let in_workgroups =
+        in_both_ways.map(|spec| SceneSpec { name: format!("{}, in workgroups", spec.name), device, ..spec.clone() });
     let in_workgroups: Vec<SceneSpec> = in_workgroups.collect();
     rays.into_iter().chain(in_workgroups).chain(planes).chain(in_floats).chain(wide_scenes()).collect()
 }
@@ -178,8 +175,10 @@ fn wide_scenes() -> Vec<SceneSpec> {
     scenes
 }
 
-/// Shared memory of a workgroup, bytes, as a GPU has it: with so much every pass uses the same shader as on a GPU.
-pub const SHARED_MEMORY: u32 = 32 << 10;
+/// What a GPU has: every pass then uses the same shader as on a GPU.
+pub fn gpu() -> DeviceFacts {
+    DeviceFacts { shared_memory: 32 << 10, ..DeviceFacts::default() }
+}
 
 /// Edge of a brick where a scene states none, texels.
 const BRICK: u32 = 8;

@@ -11,7 +11,10 @@ const PAIR: &str = "'sr'\nlayout = 'pair'";
 /// Names of scenes with their settings as TOML, in the order of their file.
 fn named_settings() -> impl Iterator<Item = (&'static str, &'static str)> {
     let scenes = include_str!("rays.txt").split("\n[").skip(1);
-    scenes.filter_map(|scene| scene.split_once("]\n")).map(|(name, toml)| (name, toml.trim_end()))
+    // What has no name in brackets is no TOML either, so that building the scenes fails.
+    scenes
+        .map(|scene| scene.split_once("]\n").unwrap_or(("unnamed", scene)))
+        .map(|(name, toml)| (name, toml.trim_end()))
 }
 
 /// Scenes that cast rays: every such mode in every geometry, and every filter, light and setting of rays in one geometry.

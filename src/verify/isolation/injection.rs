@@ -3,22 +3,36 @@
 
 use crate::files::signals;
 use crate::report::Fault;
+use crate::tree::{All, Name};
 use crate::{Check, Findings};
 use std::str::FromStr;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// How a check crashes: an access to memory that is not there, a failed assertion of the driver, a wait that never ends, the driver ends the process,
-/// it fails once and passes from then on, it fails unless the host waits for each submission.
-const KINDS: [&str; 6] = ["segv", "abort", "hang", "exit", "flake", "unsynchronized"];
+/// How a check crashes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, All, Name)]
+#[tree(rename_all = "lowercase")]
+enum Kind {
+    /// An access to memory that is not there.
+    Segv,
+    /// A failed assertion of the driver.
+    Abort,
+    /// A wait that never ends.
+    Hang,
+    /// The driver ends the process.
+    Exit,
+    /// It fails once, and passes from then on.
+    Flake,
+    /// It fails unless the host waits for each submission.
+    Unsynchronized,
+}
 
 /// A crash to inject into a worker process, as text: `segv:GROUP / NAME` for the check that crashes, or instead of `segv` `abort`, `hang`, `exit`
 /// (the process ends), `flake` (the check fails once) or `unsynchronized` (it fails unless the host waits for each submission). With `start` instead
 /// of a check the process crashes before it opens the device.
 #[derive(Clone, Debug)]
 pub struct InjectedCrash {
-    /// One of [`KINDS`].
-    kind: &'static str,
+    kind: Kind,
     /// Group and name.
     check: String,
     text: String,
@@ -29,8 +43,8 @@ impl FromStr for InjectedCrash {
 
     fn from_str(text: &str) -> Result<InjectedCrash, String> {
         let (kind, check) = text.split_once(':').ok_or("must be KIND:GROUP / NAME")?;
-        let known = KINDS.into_iter().find(|known| *known == kind);
-        let kind = known.ok_or_else(|| format!("'{kind}' is not one of {}", KINDS.join(", ")))?;
+        let known = Kind::ALL.into_iter().find(|known| known.name() == kind);
+        let kind = known.ok_or_else(|| format!("'{kind}' is not one of {}", Kind::ALL.map(Kind::name).join(", ")))?;
         Ok(InjectedCrash { kind, check: check.trim().into(), text: text.into() })
     }
 }
@@ -60,9 +74,9 @@ impl InjectedCrash {
         *check = Check::new(check.group, check.name.clone(), move |dut| {
             crash(kind);
             let fails = match kind {
-                "flake" => !has_failed.swap(true, Ordering::Relaxed),
-                "unsynchronized" => !dut.waits,
-                _ => false,
+                Kind::Flake => !has_failed.swap(true, Ordering::Relaxed),
+                Kind::Unsynchronized => !dut.waits,
+                Kind::Segv | Kind::Abort | Kind::Hang | Kind::Exit => false,
             };
             let faults = if fails { vec![Fault::new("injected".to_string())] } else { Vec::new() };
             Ok(Findings { faults, ..Findings::default() })
@@ -75,14 +89,14 @@ impl InjectedCrash {
 const START: &str = "start";
 
 /// Returns for kinds that do not end the process.
-fn crash(kind: &str) {
+fn crash(kind: Kind) {
     match kind {
-        "segv" => signals::raise_segmentation_fault(),
-        "abort" => std::process::abort(),
-        "exit" => std::process::exit(7),
-        "hang" => loop {
+        Kind::Segv => signals::raise_segmentation_fault(),
+        Kind::Abort => std::process::abort(),
+        Kind::Exit => std::process::exit(7),
+        Kind::Hang => loop {
             std::thread::sleep(Duration::from_secs(1));
         },
-        _ => {}
+        Kind::Flake | Kind::Unsynchronized => {}
     }
 }

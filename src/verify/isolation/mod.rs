@@ -9,6 +9,7 @@ pub use worker::{Ready, refuse, serve, tell_calls};
 
 use crate::files::signals;
 use crate::report::{CheckName, Outcome, Verdict};
+use crate::sync::locked;
 use crate::terminal::Failure;
 use crate::text::single_line;
 use std::cell::RefCell;
@@ -137,7 +138,9 @@ impl<'a> Workers<'a> {
         let outcome = match reply {
             Ok(Message::Done(done)) => {
                 self.current = Some(worker);
-                let (outcome, pictures) = *done;
+                let (outcome, mut pictures) = *done;
+                pictures
+                    .retain(|shown| [&shown.actual, &shown.expected, &shown.difference].iter().all(|p| p.width > 0));
                 return (Outcome { pictures, ..outcome }, false);
             }
             Ok(_) => failed("the process that ran it answered something else".into()),
@@ -205,7 +208,7 @@ impl Worker {
             let (said, echo) = (said.clone(), echo.clone());
             move |line: &str| {
                 echo(line);
-                let mut said = said.lock().unwrap_or_else(|e| e.into_inner());
+                let mut said = locked(&said);
                 said.push_back(single_line(line));
                 if said.len() > LINES {
                     said.pop_front();
@@ -278,7 +281,7 @@ impl Worker {
         while begun.elapsed() < LAST_WORDS && !self.readers.iter().all(JoinHandle::is_finished) {
             std::thread::sleep(Duration::from_millis(5));
         }
-        let said = self.said.lock().unwrap_or_else(|e| e.into_inner()).iter().cloned().collect();
+        let said = locked(&self.said).iter().cloned().collect();
         let (how, by) = status.map_or(("ended".into(), None), in_words);
         Ended::Itself { how, by, said }
     }

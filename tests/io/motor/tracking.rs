@@ -159,6 +159,10 @@ fn volumes_are_complete_with_the_slices_and_directions_of_the_array() {
         assert!((way.to_degrees() - 0.13).abs() < 0.02 && way == &-way_back, "{way}");
         let (frames, end) = frames(&mut swept, 3);
         let counts = swept.counts();
+        // Where the host of the simulation is too busy, its motor stands still.
+        if end.as_ref().is_some_and(|why| why.as_ref().is_some_and(|why| why.contains("has stalled"))) {
+            return false;
+        }
         assert_eq!(end, None, "{counts}");
         assert!(counts.early > 0 && counts.whole >= 3, "{counts}");
         hold_against_the_truth(&frames, counts.filled);
@@ -167,11 +171,12 @@ fn volumes_are_complete_with_the_slices_and_directions_of_the_array() {
         drop(swept);
         assert!(stopped_at_last(&simulator.received()));
         assert!(eventually(|| !simulator.is_moving()));
+        true
     };
     std::thread::scope(|scope| {
-        scope.spawn(|| one(false, ARRIVAL));
-        scope.spawn(|| one(true, ARRIVAL));
-        scope.spawn(|| one(false, Clock::Stamp));
+        for (pieces, clock) in [(false, ARRIVAL), (true, ARRIVAL), (false, Clock::Stamp)] {
+            scope.spawn(move || assert!((0..5).any(|_| one(pieces, clock)), "stalled five times"));
+        }
     });
 }
 

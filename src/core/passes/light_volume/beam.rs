@@ -9,12 +9,12 @@ use crate::scene::{Propagation, Scene};
 const MAX_STRIDE: u32 = 16;
 /// Smallest and largest variance of the kernel of propagate.comp, cells^2, for which no weight is negative; the largest by the square of its stride.
 const VARIANCES: [f64; 2] = [0.25, 0.75];
-/// Layers of a dispatch of propagate_layers.comp, and cells of a workgroup, each with an invocation. A workgroup lights a quarter of them; the others
-/// lie around those.
+/// Layers of a dispatch of propagate_layers.comp, and cells of a workgroup's region, each with an invocation. A workgroup lights a tile of a quarter
+/// of them; the others lie around it.
 const LAYERS: u32 = 8;
-const REGION: u32 = 32 * 32;
+const REGION_CELLS: u32 = 32 * 32;
 /// Shared memory of a workgroup, bytes: a float for each of three colours, in two layers.
-const LAYERS_MEMORY: u32 = 2 * 3 * 4 * REGION;
+const LAYERS_MEMORY: u32 = 2 * 3 * 4 * REGION_CELLS;
 
 pub(super) fn need_back(scene: &Scene) -> Need {
     match scene.lit_by_volume() {
@@ -71,7 +71,7 @@ impl Beam {
 
     /// Several layers a dispatch where workgroups have memory of their own: on a GPU. A stride would need a wider border of each.
     fn layers_at_once(&self, scene: &Scene) -> u32 {
-        let fits = LAYERS_MEMORY <= scene.device.shared_memory && REGION <= scene.device.invocations;
+        let fits = LAYERS_MEMORY <= scene.device.shared_memory && REGION_CELLS <= scene.device.invocations;
         if fits && self.stride(scene) == 1 { LAYERS } else { 1 }
     }
 
@@ -111,7 +111,7 @@ impl Beam {
 
     fn extent(&self, scene: &Scene) -> [u32; 3] {
         let [width, height] = self.front_size(scene);
-        // Invocations of workgroups that light several layers are cells of overlapping regions.
+        // Regions of several layers overlap: an edge is twice that of the tile within it.
         let along = if self.layers_at_once(scene) > 1 { 2 } else { 1 };
         [along * width, along * height, 1]
     }

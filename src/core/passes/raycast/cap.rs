@@ -94,7 +94,7 @@ fn reference_pixel(scene: &Scene, volume: &Texels, x: usize, y: usize) -> Option
     let solid: Vec<HalfSpace> = ray::solid(scene, view).collect();
     let (enter, _, face) = ray::entry(solid.iter().copied(), origin, direction)?;
     // A clip plane, and no side of the box.
-    let face = face.filter(|face| *face >= 6)?;
+    let face = face.filter(|face| *face >= ray::SIDES)?;
     let place = origin + direction * enter;
     let is_on_face = |place: &DVec3| solid.iter().enumerate().all(|(i, half)| i == face || half.room(*place) >= 0.0);
     let echo = |place: DVec3| ray::texel(scene, place).map(|at| ray::interpolated(scene, volume, at));

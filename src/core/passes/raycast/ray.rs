@@ -232,7 +232,7 @@ pub(super) struct Ray<'a> {
     /// Across the ray, unit length.
     across: [DVec3; 2],
     /// Distances along the ray, mm, between which it is in the box and on the kept side of all clip planes: it enters at `enter` and leaves at
-    /// `leave`. `enter` is at least 0. The ray misses if leave < enter.
+    /// `leave`. `enter` is at least 0. A ray that misses, or only touches, has (0, -1).
     pub enter: f64,
     pub leave: f64,
     /// Ratio of the step at the entry to the scene's step, and the increase of this ratio per mm.
@@ -392,6 +392,9 @@ pub(super) fn entry(
     }
     (leave > enter).then_some((enter, leave, face))
 }
+
+/// Sides of a box, the first half-spaces of [`solid`].
+pub(super) const SIDES: usize = 6;
 
 /// The half-spaces whose intersection a view shows: the six sides of its box, then the clip planes.
 pub(super) fn solid(scene: &Scene, view: View) -> impl Iterator<Item = HalfSpace> {
