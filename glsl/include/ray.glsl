@@ -3,8 +3,8 @@
 
 layout(constant_id = 0) const int SWEEP = 1;    // 0 Cartesian, 1 fan, 2 translated, 3 still
 layout(constant_id = 1) const int ARRAY = 1;    // 0 linear, 1 curved, 2 curved with lines 90 degrees or more off the axis
-layout(constant_id = 2) const int SAMPLING = 0; // 0 the device's filter, 1 eight fetches; two loads of four packed
-                                                // neighbours: 2 of bytes, 3 of 16 bits of 0..1, 4 of half floats
+layout(constant_id = 2) const int SAMPLING = 0; // 0 the device's filter, 1 eight fetches; packed neighbours: 2 one load of eight
+                                                // bytes, two loads of four values: 3 of 16 bits of 0..1, 4 of half floats
 layout(constant_id = 19) const int ELEVATION = 0; // between slices: 0 linear, 1 the uniform cubic B-spline
 layout(constant_id = 20) const int CLIPS = 0;   // clip planes
 layout(constant_id = 21) const int SPREAD = 0;  // 1: steps grow with the range, as the sample spacing of a convex sweep does
@@ -292,19 +292,26 @@ float share_inside(vec4 inner, vec4 outer) {
 // At coordinates in the stored part.
 float fetch(ivec3 at) { return texelFetch(volume, at, 0).x; }
 
-// A texel, the next column's, the next row's, and the diagonal neighbour's, in units of NEIGHBOUR_UNIT.
+// A texel of a slice, the next column's, the next row's, and the diagonal neighbour's, in units of NEIGHBOUR_UNIT; coordinates in the stored
+// part.
 const float NEIGHBOUR_UNIT = SAMPLING == 2 ? 1.0 / 255.0 : SAMPLING == 3 ? 1.0 / 65535.0 : 1.0;
-vec4 neighbours_at(ivec3 at) {
-    uvec2 bits = texelFetch(packed_neighbours, at, 0).xy;
-    if (SAMPLING == 2) return vec4(ivec4(bits.xxxx >> uvec4(0, 8, 16, 24)) & 255);
+vec4 plane_at(ivec2 low, ivec2 high, int slice) {
+    if (SAMPLING == 1)
+        return vec4(fetch(ivec3(low, slice)), fetch(ivec3(high.x, low.y, slice)), fetch(ivec3(low.x, high.y, slice)), fetch(ivec3(high, slice)));
+    uvec2 bits = texelFetch(packed_neighbours, ivec3(low, slice), 0).xy;
     if (SAMPLING == 3) return vec4(ivec4(bits.xxyy >> uvec4(0, 16, 0, 16)) & 65535);
     return vec4(unpackHalf2x16(bits.x), unpackHalf2x16(bits.y));
 }
 
-// Texels of a slice in the order of `neighbours_at`, in the same units; coordinates in the stored part.
-vec4 plane_at(ivec2 low, ivec2 high, int slice) {
-    if (SAMPLING > 1) return neighbours_at(ivec3(low, slice));
-    return vec4(fetch(ivec3(low, slice)), fetch(ivec3(high.x, low.y, slice)), fetch(ivec3(low.x, high.y, slice)), fetch(ivec3(high, slice)));
+vec4 bytes_of(uint bits) { return vec4(ivec4(bits.xxxx >> uvec4(0, 8, 16, 24)) & 255); }
+
+// The same in two slices that are the same or follow each other.
+vec4[2] planes_at(ivec2 low, ivec2 high, ivec2 slices) {
+    if (SAMPLING != 2) return vec4[](plane_at(low, high, slices.x), plane_at(low, high, slices.y));
+    // A texel has the neighbours in its own slice and in the next one.
+    uvec2 bits = texelFetch(packed_neighbours, ivec3(low, slices.x), 0).xy;
+    // Only the B-spline asks for the same slice twice, where more than a border repeats.
+    return vec4[](bytes_of(bits.x), bytes_of(ELEVATION == 1 && slices.y == slices.x ? bits.x : bits.y));
 }
 
 float filtered_by_device(vec3 texel) {
@@ -328,8 +335,8 @@ float bspline_volume(vec3 texel) {
     vec2 share = at - vec2(low);
     low -= first_stored.xy;
     ivec4 slices = clamp(int(k) + ivec4(-1, 0, 1, 2), first_stored.z, last_stored.z) - first_stored.z;
-    vec4 plane = w.x * plane_at(low, high, slices.x) + w.y * plane_at(low, high, slices.y)
-               + w.z * plane_at(low, high, slices.z) + w.w * plane_at(low, high, slices.w);
+    vec4 first[2] = planes_at(low, high, slices.xy), second[2] = planes_at(low, high, slices.zw);
+    vec4 plane = w.x * first[0] + w.y * first[1] + w.z * second[0] + w.w * second[1];
     vec2 row = mix(plane.xz, plane.yw, share.x);
     return mix(row.x, row.y, share.y) * NEIGHBOUR_UNIT;
 }
@@ -344,7 +351,8 @@ float raw_volume(vec3 texel) {
     ivec3 low = ivec3(at), high = min(low + 1, last_stored) - first_stored;
     vec3 w = at - vec3(low);
     low -= first_stored;
-    vec4 plane = mix(plane_at(low.xy, high.xy, low.z), plane_at(low.xy, high.xy, high.z), w.z);
+    vec4 planes[2] = planes_at(low.xy, high.xy, ivec2(low.z, high.z));
+    vec4 plane = mix(planes[0], planes[1], w.z);
     vec2 row = mix(plane.xz, plane.yw, w.x);
     return mix(row.x, row.y, w.y) * NEIGHBOUR_UNIT;
 }

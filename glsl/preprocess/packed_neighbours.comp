@@ -1,5 +1,5 @@
-// Each texel of a slice with its neighbours one column and one row on, as they are stored. An interpolated sample then takes one
-// load per slice. Both images hold the stored part of the volume.
+// Each texel of a slice with its neighbours one column and one row on, as they are stored, and of bytes those of the next slice as well.
+// An interpolated sample then takes two loads, of bytes one. Both images hold the stored part of the volume.
 #version 460
 #include "common.glsl"
 layout(constant_id = 0) const int RUN = 4;    // texels per invocation
@@ -16,12 +16,14 @@ uint bits_of(float value) {
     return uint(int(value * (STORED == 0 ? 255.0 : 65535.0) + 0.5));
 }
 
-// A texel and the one below it; beyond the last stored row it repeats.
-uvec2 pair_at(ivec3 at, ivec2 last) {
-    ivec2 near = min(at.xy, last);
-    float value = texelFetch(volume, ivec3(near, at.z), 0).x;
-    float below = texelFetch(volume, ivec3(near.x, min(near.y + 1, last.y), at.z), 0).x;
-    return uvec2(bits_of(value), bits_of(below));
+uint bits_at(ivec3 at) { return bits_of(texelFetch(volume, at, 0).x); }
+
+// A texel and the one below it, of bytes in two slices; beyond the last stored row or slice it repeats.
+uvec2 pair_at(ivec3 at, ivec3 last) {
+    ivec3 near = min(at, last), next = min(near + 1, last);
+    uvec2 pair = uvec2(bits_at(near), bits_at(ivec3(near.x, next.y, near.z)));
+    if (STORED == 0) pair |= uvec2(bits_at(ivec3(near.xy, next.z)), bits_at(ivec3(near.x, next.yz))) << 16;
+    return pair;
 }
 
 void main() {
@@ -29,12 +31,15 @@ void main() {
     ivec3 size = imageSize(packed_neighbours);
     if (any(greaterThanEqual(to, size))) return;
     ivec3 at = to;
-    ivec2 last = textureSize(volume, 0).xy - 1;
+    ivec3 last = textureSize(volume, 0) - 1;
     uvec2 here = pair_at(at, last);
     for (int n = 0; n < RUN; ++n) {
         uvec2 next = pair_at(at + ivec3(1, 0, 0), last);
-        uvec2 bits = STORED == 0 ? uvec2(here.x | next.x << 8 | here.y << 16 | next.y << 24, 0)
-                                 : uvec2(here.x | next.x << 16, here.y | next.y << 16);
+        uvec2 bits = here | next << 16;
+        if (STORED == 0) {
+            uvec2 columns = here | next << 8; // of either row in both slices
+            bits = uvec2((columns.x & 0xffff) | columns.y << 16, columns.x >> 16 | (columns.y & 0xffff0000u));
+        }
         if (to.x < size.x) imageStore(packed_neighbours, to, uvec4(bits, 0, 0));
         here = next;
         ++at.x;

@@ -20,17 +20,35 @@ layout(scalar) uniform Params {
 #include "distance_map.glsl"
 uniform writeonly image2D shadow;
 
-// The pixel coordinates of a point in space, and its distance along that pixel's ray.
-vec3 projected(vec3 place) {
+// A way through space as it runs in the picture, with all that is the same for each of its places.
+struct Way {
+    vec2 at;     // where it begins, pixels
+    vec2 drift;  // pixels per mm; in perspective times depth
+    float depth; // of its beginning, and per mm of the way, mm along `forward`
+    float towards;
+    float along; // of the vector from the eye to its beginning: mm along the way, and the square of its length
+    float square;
+};
+
+vec2 in_pixels(vec3 v) {
+    vec3 dx = PERSPECTIVE == 1 ? direction_dx : origin_dx, dy = PERSPECTIVE == 1 ? direction_dy : origin_dy;
+    return vec2(dot(v, dx) / dot(dx, dx), dot(v, dy) / dot(dy, dy));
+}
+
+Way way_from(vec2 at, vec3 place, vec3 along) {
     vec3 offset = place - origin;
-    if (PERSPECTIVE == 1) {
-        float depth = dot(offset, forward);
-        vec3 across = offset / max(depth, 1e-30) - direction;
-        vec2 at = vec2(dot(across, direction_dx) / dot(direction_dx, direction_dx), dot(across, direction_dy) / dot(direction_dy, direction_dy));
-        return vec3(at, depth > 0.0 ? length(offset) : -1.0);
-    }
-    vec2 at = vec2(dot(offset, origin_dx) / dot(origin_dx, origin_dx), dot(offset, origin_dy) / dot(origin_dy, origin_dy));
-    return vec3(at, dot(offset, forward));
+    Way way = Way(at, in_pixels(along), dot(offset, forward), dot(along, forward), dot(offset, along), dot(offset, offset));
+    // What an approach to the eye does to the pixel where the way begins.
+    if (PERSPECTIVE == 1) way.drift -= way.towards * (at + in_pixels(direction));
+    return way;
+}
+
+// The pixel coordinates of the place so many mm on, and its distance along that pixel's ray.
+vec3 place_on(Way way, float gone) {
+    float depth = way.depth + way.towards * gone;
+    if (PERSPECTIVE == 0) return vec3(way.at + way.drift * gone, depth);
+    float far = sqrt(max(way.square + gone * (2.0 * way.along + gone), 0.0));
+    return vec3(way.at + way.drift * (gone / max(depth, 1e-30)), depth > 0.0 ? far : -1.0);
 }
 
 // The distance map between pixel centres. Only pixels of the same surface are interpolated.
@@ -67,11 +85,12 @@ void main() {
         float pixel_size = pitch.x + pitch.y * distance;
         float stride = max(min(pixel_size / max(across, 1e-6), 0.5 * thickness / max(sqrt(max(1.0 - across * across, 0.0)), 1e-6)), 0.25 * pixel_size);
         vec2 size = vec2(textureSize(distance_map, 0));
+        Way way = way_from(at, place, to_light);
         float travelled = 0.0;
         for (int i = 0; i < MOST_STEPS; ++i) {
             travelled += SOFT == 1 ? max(stride, growth * travelled) : stride;
             if (travelled > length_to_light) break;
-            vec3 pixel_place = projected(place + to_light * travelled);
+            vec3 pixel_place = place_on(way, travelled);
             if (any(lessThan(pixel_place.xy, vec2(0.0))) || any(greaterThanEqual(pixel_place.xy, size)) || pixel_place.z < 0.0) break;
             float nearest = map_at(pixel_place.xy);
             // Depth of the sample behind the surface. A miss blocks nothing.

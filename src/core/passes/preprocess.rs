@@ -213,7 +213,8 @@ fn load_params(scene: &Scene, args: &DispatchArgs) -> Params {
 }
 
 /// Stores every texel of a slice together with its neighbours one column and one row on, so that an interpolated sample takes two loads, one a slice.
-/// This needs four times the volume's memory in addition, and one more pass over every new slice.
+/// Of bytes it has the neighbours in the next slice as well, so that one load is enough. This needs 8 bytes a texel in addition, and one more pass over
+/// every new slice.
 pub const PACKED_NEIGHBOURS: Pass = Pass {
     name: "packed_neighbours",
     shader: |_, _| "preprocess/packed_neighbours",
@@ -221,8 +222,11 @@ pub const PACKED_NEIGHBOURS: Pass = Pass {
         true => Ok("rays load the four neighbours of a slice at once"),
         false => Err("no ray is cast, or samples are taken in another way"),
     },
-    // A slice changes with the frames that are smoothed into it.
-    reads: |s, _| vec![Bind { part: Part::Around(s.reach_to_frames()), ..whole("volume", Slot::of_rays(s)) }],
+    // A slice changes with the frames that are smoothed into it, and of bytes with the next slice.
+    reads: |s, _| {
+        let reach = s.reach_to_frames() + u32::from(packs_two_slices(s));
+        vec![Bind { part: Part::Around(reach), ..whole("volume", Slot::of_rays(s)) }]
+    },
     writes: |_, _| vec![Bind { part: Part::Around(0), ..whole("packed_neighbours", Slot::PackedNeighbours) }],
     extent: |s, t| in_runs([s.grid.size[0], s.grid.size[1], t.slices], 0),
     params: |_, t| Params::default().i32("slice", t.slice),
@@ -240,8 +244,11 @@ pub const PACKED_NEIGHBOURS: Pass = Pass {
             for to in (0..height).flat_map(|y| (0..width).map(move |x| [x, y])) {
                 let (x, y) = (to[0] + first[0], to[1] + first[1]);
                 let (right, below) = ((x + 1).min(first[0] + width - 1), (y + 1).min(first[1] + height - 1));
-                let of = [(x, y), (right, y), (x, below), (right, below)].map(|(x, y)| volume.one(x, y, z));
-                let packed = Texels { size: [4, 1, 1], channels: 1, values: of.to_vec() };
+                let slices = [z, (z + 1).min(first[2] + depth - 1)];
+                let slices = &slices[..1 + usize::from(packs_two_slices(scene))];
+                let place = [(x, y), (right, y), (x, below), (right, below)];
+                let of = slices.iter().flat_map(|z| place.map(|(x, y)| volume.one(x, y, *z)));
+                let packed = Texels { size: [4 * slices.len(), 1, 1], channels: 1, values: of.collect() };
                 let bytes = packed.encode(Slot::Volume.format(scene));
                 let words = bytes.chunks_exact(4).map(|b| f64::from(u32::from_le_bytes([b[0], b[1], b[2], b[3]])));
                 target.set([to[0], to[1], z - first[2]], &words.collect::<Vec<_>>());
@@ -250,6 +257,11 @@ pub const PACKED_NEIGHBOURS: Pass = Pass {
     },
     ..Pass::AFTER_SLICES
 };
+
+/// True if packed neighbours are those of two slices.
+fn packs_two_slices(scene: &Scene) -> bool {
+    packed_format(scene) == 0
+}
 
 /// STORED of packed_neighbours.comp.
 fn packed_format(scene: &Scene) -> i32 {

@@ -4,7 +4,7 @@ use super::Scene;
 use super::camera;
 use super::settings::{Mode, Sampling, Scheme, VolumeFormat};
 
-/// Maximum number of texels for which packed neighbours are chosen automatically: four times as many values.
+/// Maximum number of texels for which packed neighbours are chosen automatically: 1 GiB.
 const MAX_PACKED_TEXELS: u64 = 1 << 27;
 /// Samples per texel of one picture above which packed neighbours pay off.
 const SAMPLES_PER_PACKED_TEXEL: f64 = 6.0;
@@ -137,7 +137,7 @@ impl Scene {
         matches!(self.sampling, Sampling::Auto | Sampling::Hardware)
     }
 
-    /// True if rays sample packed neighbours, texels that hold four neighbours of a slice. Never for volumes of 32-bit floats, whose packed texels
+    /// True if rays sample packed neighbours, texels that hold four neighbours of one or two slices. Never for volumes of 32-bit floats, whose packed texels
     /// would take 16 bytes.
     pub fn packs(&self) -> bool {
         let stored = self.volume_format() != VolumeFormat::R32f;

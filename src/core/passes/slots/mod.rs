@@ -246,7 +246,7 @@ slots! {
     SectionVolume = D::image("section_volume", volume, volume_format).multibuffered().clear().across_queues()
         .of(GREY, SHARE_OF_RANGE);
     /// The bits of each texel of the volume together with those of its neighbours one column and one row on.
-    PackedNeighbours = D::image("packed_neighbours", volume, four_texels).multibuffered()
+    PackedNeighbours = D::image("packed_neighbours", volume, |_| Format::Rg32u).multibuffered()
         .of(&["bits", "more_bits"], "bits of a texel and of its neighbours one column on, one row on, and both");
     /// Smallest and largest value of every tile of every slice.
     TileRanges = D::image("tile_ranges", |s| Shape::Three(s.tile_counts()), |_| Format::Rg16).multibuffered().clear()

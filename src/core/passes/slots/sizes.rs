@@ -76,11 +76,6 @@ pub(super) fn volume_format(scene: &Scene) -> Format {
     }
 }
 
-/// The bits of four texels of the volume.
-pub(super) fn four_texels(scene: &Scene) -> Format {
-    if scene.volume_format() == VolumeFormat::R8 { Format::R32u } else { Format::Rg32u }
-}
-
 pub(super) fn per_brick(scene: &Scene) -> Shape {
     Shape::Three(scene.bricks().count)
 }

@@ -93,8 +93,8 @@ pub enum Sampling {
     Hardware,
     /// Eight texels, interpolated in f32 by the shader.
     Exact,
-    /// Like `exact`, from two texels that hold four packed neighbours each. For volumes of 8 or 16 bits. Needs four times the volume's
-    /// memory in addition, and one more pass over every new slice.
+    /// Like `exact`, from packed neighbours: of 8-bit samples one texel with four in each of two slices, of 16-bit samples two texels with four each.
+    /// Needs 8 bytes for each texel of the volume in addition, and one more pass over every new slice.
     #[tree(rename = "quads")]
     PackedNeighbours,
 }
@@ -106,7 +106,7 @@ impl Sampling {
             Sampling::Auto => "the fastest for the device",
             Sampling::Hardware => "by the device's trilinear filter",
             Sampling::Exact => "eight texels each, interpolated in f32",
-            Sampling::PackedNeighbours => "two texels of four neighbours each, interpolated in f32",
+            Sampling::PackedNeighbours => "packed neighbours, interpolated in f32",
         }
     }
 }
