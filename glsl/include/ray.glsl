@@ -169,7 +169,7 @@ float quarter_tangent(float x, float y, float range) {
     return x < 0.0 ? -t : t;
 }
 
-// Parameter of the line through an in-plane point of a curved array, see `line_parameter` of lookup_tables.rs.
+// Parameter of the line through an in-plane point of a curved array, see `line_parts` of lookup_tables.rs.
 float line_at(float x, float y, float range) {
     return ARRAY == 2 ? quarter_tangent(x, y, range) : x / max(range + y, 1e-20);
 }

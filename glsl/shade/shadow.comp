@@ -51,15 +51,18 @@ vec3 place_on(Way way, float gone) {
     return vec3(way.at + way.drift * (gone / max(depth, 1e-30)), depth > 0.0 ? far : -1.0);
 }
 
-// The distance map between pixel centres. Only pixels of the same surface are interpolated.
+float fetched(int x, int y) { return texelFetch(distance_map, ivec2(x, y), 0).x; }
+
+// The distance map between pixel centres, at a place within the picture. Only pixels of the same surface are interpolated.
 float map_at(vec2 at) {
     vec2 place = at - 0.5;
-    ivec2 base = ivec2(floor(place));
+    ivec2 base = ivec2(floor(place)), next = base + 1;
     vec2 w = place - vec2(base);
-    float a = distance_at(base), b = distance_at(base + ivec2(1, 0));
-    float c = distance_at(base + ivec2(0, 1)), d = distance_at(base + ivec2(1, 1));
+    // All four are loaded, without a branch for each: at the border there are no four.
+    ivec2 from = max(base, ivec2(0)), to = min(next, textureSize(distance_map, 0) - 1);
+    float a = fetched(from.x, from.y), b = fetched(to.x, from.y), c = fetched(from.x, to.y), d = fetched(to.x, to.y);
     float low = min(min(a, b), min(c, d)), high = max(max(a, b), max(c, d));
-    if (high - low > cliff) return distance_at(ivec2(floor(at)));
+    if (from != base || to != next || high - low > cliff) return fetched(int(at.x), int(at.y));
     // Differences from the smallest keep f32's digits.
     return low + mix(mix(a - low, b - low, w.x), mix(c - low, d - low, w.x), w.y);
 }

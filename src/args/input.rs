@@ -2,7 +2,7 @@
 
 use super::labels::show_labels;
 use super::picture_file::STANDARD;
-use super::recording::{GeometryArgs, open_recording, recording_help};
+use super::recording::{GeometryArgs, open_phantom, open_recording, recording_help};
 use super::user_files::{pipeline_folder, presets_file};
 use crate::files::check_target;
 use crate::files::signals;
@@ -12,9 +12,8 @@ use crate::marked::Demo;
 use crate::scene::default_look::Recorded;
 use crate::scene::load::{Layers, LoadError, PRESETS};
 use crate::scene::{DeviceFacts, Input, Scene};
-use crate::source::phantom::{self, Phantom, PhantomSource};
 use crate::source::{Frame, Source, VolumeFrames};
-use crate::terminal::{Failure, failed, input, progress_bar, say};
+use crate::terminal::{Failure, failed, input, say, with_progress};
 use crate::user_presets;
 use crate::workspace::{self, Origin, Workspace};
 use std::collections::HashSet;
@@ -106,13 +105,7 @@ impl InputArgs {
         recorded.is_completed = self.workspace()?.is_none();
         if recorded.needs_levels(&layers) {
             let mut histogram = recorded.histogram(&layers).map_err(input)?;
-            let bar = progress_bar(source.frames_per_volume() as u64).with_message("frames");
-            frames_of(&mut *source, volume, |frame| {
-                histogram.take(&frame.bytes);
-                bar.inc(1);
-                Ok(())
-            })?;
-            bar.finish_and_clear();
+            shown_frames_of(&mut *source, volume, |frame| histogram.take(&frame.bytes))?;
             recorded.levels = histogram.levels();
         }
         let scene = recorded.scene(&layers).map_err(input)?;
@@ -255,14 +248,8 @@ impl InputArgs {
     /// Every frame of the volume [`InputArgs::volume`], in the order of the recording; shows a progress bar.
     #[cfg(feature = "lab")]
     pub fn frames(&self, source: &mut dyn Source) -> Result<Vec<Frame>, Failure> {
-        let bar = progress_bar(source.frames_per_volume() as u64).with_message("frames");
         let mut frames = Vec::new();
-        frames_of(source, self.volume()?, |frame| {
-            frames.push(frame);
-            bar.inc(1);
-            Ok(())
-        })?;
-        bar.finish_and_clear();
+        shown_frames_of(source, self.volume()?, |frame| frames.push(frame))?;
         Ok(frames)
     }
 
@@ -299,16 +286,13 @@ impl InputArgs {
     }
 
     fn source(&self) -> Result<Box<dyn Source>, Failure> {
-        let phantom = || -> Result<Box<dyn Source>, Failure> {
-            Ok(Box::new(PhantomSource::new(Phantom::new(phantom::PhantomOptions::default()).map_err(input)?)))
-        };
         match (self.workspace()?, &self.input) {
             (Some((file, workspace)), _) => match workspace.recording(file).map_err(input)? {
-                recording if recording.as_os_str() == workspace::PHANTOM => phantom(),
+                recording if recording.as_os_str() == workspace::PHANTOM => open_phantom(),
                 recording => open_recording(recording, self.geometry.or(&workspace.origin)?.options()),
             },
             (None, Some(file)) => open_recording(file, self.geometry.options()),
-            (None, None) => phantom(),
+            (None, None) => open_phantom(),
         }
     }
 
@@ -484,18 +468,23 @@ impl SceneArgs {
     }
 }
 
-/// Calls `each` with every frame of the volume with this index, from 0, in the order of the recording. Ends with the first error of the recording or
-/// of `each`.
-pub fn frames_of(
-    source: &mut dyn Source,
-    volume: usize,
-    mut each: impl FnMut(Frame) -> Result<(), Failure>,
-) -> Result<(), Failure> {
+/// Calls `each` with every frame of the volume with this index, from 0, in the order of the recording. Ends with the first error of the recording.
+pub fn frames_of(source: &mut dyn Source, volume: usize, mut each: impl FnMut(Frame)) -> Result<(), Failure> {
     let mut frames = VolumeFrames::of(source, volume).map_err(input)?;
     while let Some(frame) = frames.read().map_err(input)? {
-        each(frame)?;
+        each(frame);
     }
     frames.count().map(drop).map_err(input)
+}
+
+/// The same as [`frames_of`], with a progress bar.
+fn shown_frames_of(source: &mut dyn Source, volume: usize, mut each: impl FnMut(Frame)) -> Result<(), Failure> {
+    with_progress(source.frames_per_volume() as u64, "frames", |step| {
+        frames_of(source, volume, |frame| {
+            each(frame);
+            step();
+        })
+    })
 }
 
 /// Makes a folder, and those above it, unless they exist.
@@ -663,6 +652,12 @@ pub fn write_report(file: &Path, text: &str) -> Result<(), Failure> {
     crate::files::replace_shared(file, text.as_bytes()).map_err(failed)?;
     say!("written: {}", file.display());
     Ok(())
+}
+
+/// Writes a report as [`write_report`] does, if its file was asked for.
+#[cfg(feature = "lab")]
+pub fn write_if_asked(file: Option<&Path>, text: impl FnOnce() -> Result<String, String>) -> Result<(), Failure> {
+    file.map_or(Ok(()), |file| write_report(file, &text().map_err(failed)?))
 }
 
 /// Checks that none of `files`, which `flag` names, would replace an input (`read`).

@@ -19,7 +19,7 @@ pub use input::{
     InputArgs, Output, SceneArgs, check_messages, check_outputs, check_volume, device_failure, frames_of, make_folder,
 };
 #[cfg(feature = "lab")]
-pub use input::{Opened, open_device, open_device_for_statistics, write_report};
+pub use input::{Opened, open_device, open_device_for_statistics, write_if_asked, write_report};
 pub use motor::{SerialArgs, motor_failure, motor_table};
 pub use number::check_number;
 pub use picture_file::PictureFile;

@@ -138,11 +138,8 @@ impl<'a> PictureSeries<'a> {
 
     /// Ends the series; a film is completed and gets its final name.
     pub fn finish(self) -> Result<(), Failure> {
-        if let Some(film) = self.film {
-            let unwritable = |e: String| failed(format!("{}: cannot be written: {e}", self.target.file(0).display()));
-            return film.finish().map_err(unwritable);
-        }
-        Ok(())
+        let unwritable = |e: String| failed(format!("{}: cannot be written: {e}", self.target.file(0).display()));
+        self.film.map_or(Ok(()), FilmWriter::finish).map_err(unwritable)
     }
 }
 

@@ -1,6 +1,7 @@
 //! Opens the recordings of commands, and prints on one line which probe file was used.
 
 use crate::source::formats::described;
+use crate::source::phantom::{Phantom, PhantomOptions, PhantomSource};
 use crate::source::{self, Calibration, DepthAxis, OpenOptions, Source};
 use crate::sync::locked;
 use crate::terminal::{Failure, input, say};
@@ -103,6 +104,14 @@ pub fn open_recording(path: &Path, options: OpenOptions) -> Result<Box<dyn Sourc
     let source = source::open_with(path, options).map_err(input)?;
     say_probe_file(source.probe_file());
     Ok(source)
+}
+
+/// The phantom as a recording.
+///
+/// # Errors
+/// None: its options are the default ones.
+pub fn open_phantom() -> Result<Box<dyn Source>, Failure> {
+    Ok(Box::new(PhantomSource::new(Phantom::new(PhantomOptions::default()).map_err(input)?)))
 }
 
 /// Prints on one line which probe file is used. Prints nothing for None, or if the last call that printed named the same file.

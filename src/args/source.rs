@@ -4,6 +4,8 @@
 use super::labels::show_labels;
 use super::motor::{MotorArgs, PlannedSweep};
 use super::number::check_number;
+#[cfg(feature = "view")]
+use super::recording::open_phantom;
 use super::recording::{GeometryArgs, open_recording, say_probe_file};
 use crate::gpu::TimeStamps;
 use crate::kiosk::config::Config;
@@ -164,10 +166,8 @@ impl SourceArgs {
     /// input or a network.
     #[cfg(feature = "view")]
     pub fn show_labels(&self, layers: &mut Layers, file: &Path) -> Result<(), Failure> {
-        let source: Box<dyn Source> = match self.kind() {
-            SourceKind::Demo => {
-                Box::new(PhantomSource::new(Phantom::new(phantom::PhantomOptions::default()).map_err(input)?))
-            }
+        let source = match self.kind() {
+            SourceKind::Demo => open_phantom()?,
             SourceKind::Recording => open_recording(self.path(), self.geometry.options())?,
             SourceKind::Pipe | SourceKind::Probe => {
                 return Err(input("--labels: are of a recording; the volumes of this source are live"));
@@ -332,11 +332,9 @@ impl SourceArgs {
 
     fn clip(&self) -> Result<Option<[usize; 4]>, Failure> {
         let Some(text) = &self.clip else { return Ok(None) };
+        let fault = || input(format!("--clip {text}: must read X,Y,W,H in pixels, as 100,40,520,440"));
         let numbers: Option<Vec<usize>> = text.split(',').map(|n| n.parse().ok()).collect();
-        match numbers.and_then(|n| <[usize; 4]>::try_from(n).ok()) {
-            Some(clip) => Ok(Some(clip)),
-            None => Err(input(format!("--clip {text}: must read X,Y,W,H in pixels, as 100,40,520,440"))),
-        }
+        numbers.and_then(|n| n.try_into().ok()).map(Some).ok_or_else(fault)
     }
 }
 

@@ -125,12 +125,8 @@ impl<'a, B: DrawingBackend> Canvas<'a, B> {
     pub fn cut(&self, text: &str, size: u32, max_width: f64) -> Result<String, String> {
         let mut cut = text.to_string();
         while self.measure(&cut, size)?[0] > max_width && cut.chars().count() > 1 {
-            cut = cut
-                .trim_end_matches('…')
-                .chars()
-                .collect::<Vec<_>>()
-                .split_last()
-                .map_or(String::new(), |(_, kept)| kept.iter().collect::<String>() + "…");
+            let mut kept = cut.trim_end_matches('…').to_string();
+            cut = kept.pop().map_or(String::new(), |_| kept + "…");
         }
         Ok(cut)
     }

@@ -1,6 +1,7 @@
 //! SHA-256 digests of bytes, files and recordings.
 
 use sha2::{Digest, Sha256};
+use std::collections::HashSet;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
@@ -40,13 +41,9 @@ pub fn sha256_of_file(path: &Path) -> io::Result<(String, u64)> {
 /// # Errors
 /// One line that names the file.
 pub fn digest_of(files: &[PathBuf]) -> Result<(String, u64), String> {
-    let mut seen: Vec<&PathBuf> = Vec::new();
+    let mut seen = HashSet::new();
     let (mut digests, mut bytes) = (Vec::new(), 0);
-    for file in files {
-        if seen.contains(&file) {
-            continue;
-        }
-        seen.push(file);
+    for file in files.iter().filter(|file| seen.insert(*file)) {
         let (digest, length) = sha256_of_file(file).map_err(|e| format!("{}: cannot be read: {e}", file.display()))?;
         digests.push(digest);
         bytes += length;

@@ -139,6 +139,15 @@ pub fn progress_bar(count: u64) -> ProgressBar {
     if is_dumb() { ProgressBar::hidden() } else { ProgressBar::new(count) }
 }
 
+/// Does work of `count` steps while a [`progress_bar`] shows how many of them are done. `what`: the steps, such as `slices`. `work` gets a function,
+/// which it calls after each step. The bar is cleared at the end, also after an error.
+pub fn with_progress<T>(count: u64, what: &'static str, work: impl FnOnce(&dyn Fn()) -> T) -> T {
+    let bar = progress_bar(count).with_message(what);
+    let done = work(&|| bar.inc(1));
+    bar.finish_and_clear();
+    done
+}
+
 /// True if the process that reads standard output has closed the pipe.
 pub fn is_closed() -> bool {
     IS_CLOSED.load(Ordering::Relaxed)

@@ -36,12 +36,17 @@ pub fn escaped(text: &str) -> String {
             line.push_str(" ...");
             break;
         }
-        match c {
-            '\'' | '"' | '\\' => line.push(c),
-            _ => line.extend(c.escape_debug()),
-        }
+        push_visible(&mut line, c);
     }
     line
+}
+
+/// Appends a character; a control character or another invisible one is escaped.
+pub(crate) fn push_visible(line: &mut String, c: char) {
+    match c {
+        '\'' | '"' | '\\' => line.push(c),
+        _ => line.extend(c.escape_debug()),
+    }
 }
 
 /// The text as a CSV field in quotes.

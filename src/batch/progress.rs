@@ -43,11 +43,7 @@ impl Progress {
     pub fn found(&mut self, cost: f64) {
         self.found += 1;
         self.saved += cost;
-        self.ends(cost);
-    }
-
-    pub fn done(&mut self, cost: f64) {
-        self.ends(cost);
+        self.done(cost);
     }
 
     /// Counts a unit of this expected cost that failed, and prints `line`.
@@ -57,10 +53,11 @@ impl Progress {
             Some(bar) => bar.suspend(|| remark(line)),
             None => remark(line),
         }
-        self.ends(cost);
+        self.done(cost);
     }
 
-    fn ends(&mut self, cost: f64) {
+    /// Counts a unit of this expected cost that ended.
+    pub fn done(&mut self, cost: f64) {
         self.ended += 1;
         self.spent += cost;
         let line = self.line();

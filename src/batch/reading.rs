@@ -63,14 +63,16 @@ pub enum Contents {
 pub(super) fn read(task: Task, folder: &Path, verified: Option<&Verified>, again: impl Fn(&Key) -> bool) -> Read {
     let begun = Instant::now();
     let (mut key, mut earlier) = (None, None);
+    // The record of a unit that need not be done again. The record of a unit that must be stays in `earlier`.
+    let mut finished = |named: &Key| {
+        earlier = read_record(folder, named, verified).map(Box::new);
+        earlier.take_if(|_| !again(named))
+    };
     // A digest that the manifest gives names the outputs before anything is read.
-    if let Some(digest) = &task.numbered.unit.digest {
-        let named = task.work.key(digest);
-        match read_record(folder, &named, verified) {
-            Some(record) if !again(&named) => return Read::Finished(task, Box::new(record)),
-            there => earlier = there.map(Box::new),
-        }
-        key = Some(named);
+    if let Some(digest) = &task.numbered.unit.digest
+        && let Some(record) = finished(key.insert(task.work.key(digest)))
+    {
+        return Read::Finished(task, record);
     }
     let read = open(&task).and_then(|mut source| {
         let (digest, bytes) = digest_of(&source.files()).map_err(input)?;
@@ -83,23 +85,17 @@ pub(super) fn read(task: Task, folder: &Path, verified: Option<&Verified>, again
             );
             return Err(input(fault));
         }
-        if key.is_none() {
-            let named = task.work.key(&digest);
-            match read_record(folder, &named, verified) {
-                Some(record) if !again(&named) => {
-                    key = Some(named);
-                    return Ok(Err(record));
-                }
-                there => earlier = there.map(Box::new),
-            }
-            key = Some(named);
+        if key.is_none()
+            && let Some(record) = finished(key.insert(task.work.key(&digest)))
+        {
+            return Ok(Err(record));
         }
         contents(&task, &mut *source).map(Ok)
     });
     let seconds = begun.elapsed().as_secs_f64();
     match (read, key) {
         (Ok(Ok(contents)), Some(key)) => Read::Ready { task, key, contents, seconds, earlier },
-        (Ok(Err(record)), _) => Read::Finished(task, Box::new(record)),
+        (Ok(Err(record)), _) => Read::Finished(task, record),
         (Err(failure), key) => Read::Failed { task, key, failure, seconds },
         (Ok(Ok(_)), None) => Read::Failed { task, key: None, failure: input("the recording has no digest"), seconds },
     }
@@ -131,10 +127,7 @@ fn contents(task: &Task, source: &mut dyn Source) -> Result<Contents, Failure> {
 /// The frames of the chosen volume, in the order of the recording.
 fn frames(work: &Work, source: &mut dyn Source) -> Result<Vec<Frame>, Failure> {
     let mut frames = Vec::new();
-    frames_of(source, work.volume, |frame| {
-        frames.push(frame);
-        Ok(())
-    })?;
+    frames_of(source, work.volume, |frame| frames.push(frame))?;
     Ok(frames)
 }
 

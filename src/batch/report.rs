@@ -91,8 +91,8 @@ pub fn html(records: &[Record], torn: usize, folder: &Path) -> String {
         main {
             @if failures > 0 { (failed(&merged)) }
             @if !pairs.is_empty() { (agreements(&pairs)) }
-            (devices(&merged))
-            (works(&merged))
+            (times_table(&merged, ["Devices", "devices", "Device and driver"], |record| drawer(record.drawer.as_ref())))
+            (times_table(&merged, ["Work", "work", "Work and host"], work_and_host))
             (contact_sheet(&merged, folder))
         }
         footer { p { "Written by " (escaped(&crate::machine::program())) "." } }
@@ -177,7 +177,7 @@ fn drawer(drawer: Option<&Drawer>) -> String {
 /// Seconds by stage of a set of units.
 #[derive(Default)]
 struct Times {
-    units: usize,
+    /// Of each unit; the others are sums.
     work: Vec<f64>,
     read: f64,
     wait: f64,
@@ -186,7 +186,6 @@ struct Times {
 
 impl Times {
     fn add(&mut self, record: &Record) {
-        self.units += 1;
         self.work.push(record.seconds.work);
         self.read += record.seconds.read;
         self.wait += record.seconds.wait;
@@ -199,11 +198,14 @@ impl Times {
     }
 
     fn mean(&self, total: f64) -> f64 {
-        total / self.units.max(1) as f64
+        total / self.work.len().max(1) as f64
     }
 }
 
-fn times_table(title: &str, id: &str, first: &str, times: &BTreeMap<String, Times>) -> Markup {
+/// The times of the units that are done, in groups of the same name. `first`: heading of the names.
+fn times_table(merged: &Merged, [title, id, first]: [&str; 3], name: impl Fn(&Record) -> String) -> Markup {
+    let mut times: BTreeMap<String, Times> = BTreeMap::new();
+    merged.done().for_each(|record| times.entry(name(record)).or_default().add(record));
     html! {
         section id=(id) {
             h2 { (title) }
@@ -211,10 +213,10 @@ fn times_table(title: &str, id: &str, first: &str, times: &BTreeMap<String, Time
             table {
                 thead { tr { th { (first) } th { "Units" } th { "Work, median" } th { "Work, mean" } th { "Read" } th { "Wait" } th { "Write" } } }
                 tbody {
-                    @for (name, times) in times {
+                    @for (name, times) in &times {
                         tr {
                             td class="name" { (name) }
-                            td class="value" { (times.units) }
+                            td class="value" { (times.work.len()) }
                             @for seconds in [times.median(), times.mean(times.work.iter().sum()), times.mean(times.read), times.mean(times.wait), times.mean(times.write)] {
                                 td class="value" { (format!("{seconds:.4}")) }
                             }
@@ -226,21 +228,9 @@ fn times_table(title: &str, id: &str, first: &str, times: &BTreeMap<String, Time
     }
 }
 
-fn devices(merged: &Merged) -> Markup {
-    let mut times: BTreeMap<String, Times> = BTreeMap::new();
-    for record in merged.done() {
-        times.entry(drawer(record.drawer.as_ref())).or_default().add(record);
-    }
-    times_table("Devices", "devices", "Device and driver", &times)
-}
-
-fn works(merged: &Merged) -> Markup {
-    let mut times: BTreeMap<String, Times> = BTreeMap::new();
-    for record in merged.done() {
-        let host = if record.host.is_empty() { "unknown host" } else { &record.host };
-        times.entry(format!("{}, {}", escaped(&record.work), escaped(host))).or_default().add(record);
-    }
-    times_table("Work", "work", "Work and host", &times)
+fn work_and_host(record: &Record) -> String {
+    let host = if record.host.is_empty() { "unknown host" } else { &record.host };
+    format!("{}, {}", escaped(&record.work), escaped(host))
 }
 
 fn contact_sheet(merged: &Merged, folder: &Path) -> Markup {

@@ -1,6 +1,6 @@
 //! Division of a manifest into shards of about equal expected cost. Every process computes the same division by itself.
 
-use std::cmp::{Ordering, Reverse};
+use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::fmt;
 use std::str::FromStr;
@@ -88,42 +88,20 @@ impl fmt::Display for Shard {
     }
 }
 
-/// The cost assigned to a shard so far, ordered by cost, then number of units, then index, the least first.
-#[derive(PartialEq)]
-struct Load {
-    cost: f64,
-    units: usize,
-    shard: u32,
-}
-
-impl Eq for Load {}
-
-impl Ord for Load {
-    fn cmp(&self, other: &Load) -> Ordering {
-        self.cost.total_cmp(&other.cost).then(self.units.cmp(&other.units)).then(self.shard.cmp(&other.shard))
-    }
-}
-
-impl PartialOrd for Load {
-    fn partial_cmp(&self, other: &Load) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
 /// The index of the shard of every unit by Graham's LPT rule: the most expensive unit first, each to the shard with the least cost so far. No
-/// shard costs more than the mean of the shards plus the cost of one unit. O(n log n), deterministic.
+/// shard costs more than the mean of the shards plus the cost of one unit. O(n log n), deterministic. `costs`: finite and at least 0, as a manifest
+/// has them.
 pub fn assign(costs: &[f64], count: u32) -> Vec<u32> {
     let mut order: Vec<usize> = (0..costs.len()).collect();
     order.sort_by(|a, b| costs[*b].total_cmp(&costs[*a]).then(a.cmp(b)));
-    let mut loads: BinaryHeap<Reverse<Load>> =
-        (0..count.max(1)).map(|shard| Reverse(Load { cost: 0.0, units: 0, shard })).collect();
+    // Cost, number of units and index, the least first. The bits of numbers that are not negative are in the order of the numbers.
+    let mut loads: BinaryHeap<_> =
+        (0..count.max(1)).map(|shard| Reverse((0.0_f64.to_bits(), 0_usize, shard))).collect();
     let mut shards = vec![0; costs.len()];
     for place in order {
-        let Some(Reverse(mut load)) = loads.pop() else { break };
-        shards[place] = load.shard;
-        load.cost += costs[place];
-        load.units += 1;
-        loads.push(Reverse(load));
+        let Some(Reverse((cost, units, shard))) = loads.pop() else { break };
+        shards[place] = shard;
+        loads.push(Reverse(((f64::from_bits(cost) + costs[place]).to_bits(), units + 1, shard)));
     }
     shards
 }

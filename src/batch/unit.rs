@@ -58,7 +58,7 @@ struct UnitLine {
 enum UnitCommand {
     Render(Box<RenderUnit>),
     Convert(ConvertUnit),
-    Measure(MeasureUnit),
+    Measure(VolumeFlags),
     Verify(Box<RenderUnit>),
 }
 
@@ -67,25 +67,22 @@ struct RenderUnit {
     #[command(flatten)]
     scene: SceneArgs,
     #[command(flatten)]
-    geometry: GeometryArgs,
-    #[arg(long, default_value_t = 0)]
-    volume: usize,
+    flags: VolumeFlags,
 }
 
 #[derive(clap::Args)]
 struct ConvertUnit {
     #[command(flatten)]
-    geometry: GeometryArgs,
-    #[arg(long, default_value_t = 0)]
-    volume: usize,
+    flags: VolumeFlags,
     #[arg(long, allow_negative_numbers = true)]
     spacing: Option<f64>,
     #[arg(long, allow_negative_numbers = true)]
     outside: Option<f64>,
 }
 
+// The flags of every unit.
 #[derive(clap::Args)]
-struct MeasureUnit {
+struct VolumeFlags {
     #[command(flatten)]
     geometry: GeometryArgs,
     #[arg(long, default_value_t = 0)]
@@ -165,31 +162,32 @@ impl Work {
             let first = said.lines().next().unwrap_or_default().trim_start_matches("error: ").to_string();
             input(format!("command: {first}; it must be render, convert, measure or verify, with their flags"))
         })?;
-        let drawn = |kind: Kind, flags: RenderUnit| {
-            if flags.scene.has_device() {
+        let drawn = |kind: Kind, unit: RenderUnit| {
+            if unit.scene.has_device() {
                 return Err(input(
                     "command: --device and --device-timeout are flags of `echolume batch`, not of a unit",
                 ));
             }
-            let layers = flags.scene.layers(false, &[])?;
-            let mut work = Work::new(kind, layers, flags.geometry, flags.volume);
+            let layers = unit.scene.layers(false, &[])?;
+            let mut work = Work::new(kind, layers, unit.flags.geometry, unit.flags.volume);
             // A transfer function is a name or a file.
-            let files = flags.scene.files().filter(|file| file.is_file());
+            let files = unit.scene.files().filter(|file| file.is_file());
             for file in files.collect::<Vec<_>>() {
-                work.digest.extend(digest_of_settings(&file)?);
+                let unreadable = |e| input(format!("{}: cannot be read: {e}", file.display()));
+                work.digest.extend(sha256_of_file(&file).map_err(unreadable)?.0.into_bytes());
             }
             Ok(work)
         };
         match line.command {
-            UnitCommand::Render(flags) => drawn(Kind::Render, *flags),
-            UnitCommand::Verify(flags) => drawn(Kind::Verify, *flags),
+            UnitCommand::Render(unit) => drawn(Kind::Render, *unit),
+            UnitCommand::Verify(unit) => drawn(Kind::Verify, *unit),
             UnitCommand::Measure(flags) => {
                 Ok(Work::new(Kind::Measure, Layers::default(), flags.geometry, flags.volume))
             }
-            UnitCommand::Convert(flags) => Ok(Work {
-                spacing: flags.spacing,
-                outside: flags.outside,
-                ..Work::new(Kind::Convert, Layers::default(), flags.geometry, flags.volume)
+            UnitCommand::Convert(unit) => Ok(Work {
+                spacing: unit.spacing,
+                outside: unit.outside,
+                ..Work::new(Kind::Convert, Layers::default(), unit.flags.geometry, unit.flags.volume)
             }),
         }
     }
@@ -237,11 +235,6 @@ impl Work {
         text.truncate(KEY_LENGTH);
         Key(text)
     }
-}
-
-fn digest_of_settings(file: &Path) -> Result<Vec<u8>, Failure> {
-    let (digest, _) = sha256_of_file(file).map_err(|e| input(format!("{}: cannot be read: {e}", file.display())))?;
-    Ok(digest.into_bytes())
 }
 
 /// The key of a unit's outputs: 32 hexadecimal digits, the beginning of their file names.

@@ -13,7 +13,6 @@ use crate::source::Frame;
 use crate::statistics::quantile_of;
 use crate::terminal::{Failure, failed, input, say};
 use serde_json::json;
-use std::fmt::{self, Display};
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -40,46 +39,26 @@ pub struct BoundsReport {
     parts: u32,
 }
 
-/// What is known of the errors of a picture: by bounds, else by the estimates of its pixels.
-struct Certificate {
-    /// Levels of 255.
-    tolerance: f64,
-    /// Shares of all pixels: within the tolerance by proof, within by estimate where nothing is proven, and beyond by proof.
-    proven: f64,
-    estimated: f64,
-    broken: f64,
-}
-
-impl Certificate {
-    /// `errors`: what each pixel states, 0..1 of the screen.
-    fn new(proofs: &[Proof], errors: &Texels, tolerance: f64) -> Certificate {
-        // As the shader compares them.
-        let allowed = f64::from((tolerance / LEVELS) as f32);
-        let share = |is_one: &dyn Fn(Proof, f64) -> bool| {
-            let pairs = proofs.iter().zip(&errors.values);
-            pairs.filter(|(proof, error)| is_one(**proof, **error)).count() as f64 / proofs.len().max(1) as f64
-        };
-        Certificate {
-            tolerance,
-            proven: share(&|proof, _| proof == Proof::Kept),
-            estimated: share(&|proof, error| proof == Proof::Open && error <= allowed),
-            broken: share(&|proof, _| proof == Proof::Broken),
-        }
-    }
-}
-
-impl Display for Certificate {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let Certificate { tolerance, proven, estimated, broken } = self;
-        let levels = if *tolerance == 1.0 { "level" } else { "levels" };
-        let open = (1.0 - proven - estimated - broken).max(0.0);
-        let [proven, estimated, broken, open] = [*proven, *estimated, *broken, open].map(|share| 100.0 * share);
-        write!(
-            f,
-            "the picture: at most {tolerance} {levels} of 255 in {proven:.1} % of the pixels by proof, in {estimated:.1} % by estimate; {open:.1} % may \
-             have more, {broken:.1} % have more by proof"
-        )
-    }
+/// What is known of the errors of a picture: by bounds, else by the estimates of its pixels. `errors`: what each pixel states, 0..1 of the screen;
+/// `tolerance`: levels of 255.
+fn certificate(proofs: &[Proof], errors: &Texels, tolerance: f64) -> String {
+    // As the shader compares them.
+    let allowed = f64::from((tolerance / LEVELS) as f32);
+    let share = |is_one: &dyn Fn(Proof, f64) -> bool| {
+        let pairs = proofs.iter().zip(&errors.values);
+        pairs.filter(|(proof, error)| is_one(**proof, **error)).count() as f64 / proofs.len().max(1) as f64
+    };
+    // Shares of all pixels. An estimate counts only where nothing is proven.
+    let proven = share(&|proof, _| proof == Proof::Kept);
+    let estimated = share(&|proof, error| proof == Proof::Open && error <= allowed);
+    let broken = share(&|proof, _| proof == Proof::Broken);
+    let open = (1.0 - proven - estimated - broken).max(0.0);
+    let [proven, estimated, broken, open] = [proven, estimated, broken, open].map(|share| 100.0 * share);
+    let levels = if tolerance == 1.0 { "level" } else { "levels" };
+    format!(
+        "the picture: at most {tolerance} {levels} of 255 in {proven:.1} % of the pixels by proof, in {estimated:.1} % by estimate; {open:.1} % may \
+         have more, {broken:.1} % have more by proof"
+    )
 }
 
 /// Median and 95th percentile of widths, and the share of them within a limit.
@@ -122,9 +101,9 @@ impl BoundsReport {
         });
         let Some(found) = found else { return Err(failed("report bounds: no ray is cast in this scene")) };
         let (bounds, proofs) = found.map_err(|why| input(format!("report bounds: {why}")))?;
-        self.write(&bounds)?;
         let hit = bounds.widths_of_hits();
         let [median, p95, within] = summary(&hit, self.width);
+        self.write(&bounds, hit.len(), [median, p95, within])?;
         say!(
             "bounds of {} rays that meet something: median width {median:.4}, 95th percentile {p95:.4}, {:.1} % of the rays within {}; \
              {} parts, {:.1} s",
@@ -135,7 +114,7 @@ impl BoundsReport {
             begun.elapsed().as_secs_f64()
         );
         if let Some((tolerance, [_, errors])) = &shown {
-            say!("{}", Certificate::new(&proofs, errors, *tolerance));
+            say!("{}", certificate(&proofs, errors, *tolerance));
         }
         say!("written: low, high and width as .png, low.npy, high.npy, bounds.json in {}", self.output.display());
         Ok(())
@@ -155,7 +134,8 @@ impl BoundsReport {
         }
     }
 
-    fn write(&self, bounds: &PictureBounds) -> Result<(), Failure> {
+    /// `hit`: number of rays that meet something, of which `figures` are the [`summary`].
+    fn write(&self, bounds: &PictureBounds, hit: usize, figures: [f64; 3]) -> Result<(), Failure> {
         let [width, height, _] = bounds.low.size;
         let widths = bounds.widths();
         let widest = widths.iter().fold(0.0, |most: f64, w| most.max(*w)).max(1e-300);
@@ -170,8 +150,7 @@ impl BoundsReport {
         for (name, map) in [("low.npy", &bounds.low), ("high.npy", &bounds.high)] {
             replace(&self.output.join(name), &npy(&[height, width, 4], &map.values, true)).map_err(failed)?;
         }
-        let hit = bounds.widths_of_hits();
-        let [median, p95, within] = summary(&hit, self.width);
+        let [median, p95, within] = figures;
         let about = json!({
             "format": "echolume bounds 1",
             "input": self.input.name(),
@@ -179,7 +158,7 @@ impl BoundsReport {
             "channels": ["red", "green", "blue", "opacity"],
             "unit": "share, 0..1, before stage 4",
             "target_width": self.width,
-            "rays_that_meet_something": hit.len(),
+            "rays_that_meet_something": hit,
             "median_width": median,
             "p95_width": p95,
             "largest_width": widest,

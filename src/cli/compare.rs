@@ -1,6 +1,6 @@
 //! `echolume render --compare`: volumes beside each other in one picture, drawn with the same settings on one device.
 
-use super::drawing::{DrawFault, Job, draw_despite_losses};
+use super::drawing::{DrawFault, Job};
 use super::recordings::read_volume;
 use crate::args::{PictureFile, check_messages, check_outputs, check_volume, recorded};
 use crate::compare::{self, Difference, MAX_TILES, tile_name};
@@ -111,7 +111,7 @@ impl CompareArgs {
         }
         let (mut source, scene) = job.input.open()?;
         job.input.check_outputs(&[("-o", output.path())], &*source)?;
-        if scene.settings.marks.bar {
+        if scene.settings.drawn.marks.bar {
             return Err(input("marks.bar: is for one volume; leave --compare out, or set marks.bar=false"));
         }
         let size = scene.picture_size();
@@ -135,19 +135,10 @@ impl CompareArgs {
             let next = self.other(job, file, letter, &drawn[0], &settings)?;
             drawn.push(next);
         }
-        let mut context = job.input.open_device(job.validate)?;
-        let mut options = job.options.clone();
-        let reopen = || job.input.open_device(job.validate);
+        let mut device = job.open_device()?;
         let (mut bare, mut pictures) = (Vec::new(), Vec::with_capacity(tiles));
         for of in &drawn {
-            let picture = draw_despite_losses(
-                &mut context,
-                &mut options,
-                job.own_shaders,
-                reopen,
-                || 0,
-                |context, options, _| draw(context, of, options),
-            )?;
+            let picture = device.draw(|| 0, |context, options, _| draw(context, of, options))?;
             // The names of tiles say it, too.
             let demo = matches!(self.compare_view, View::Wipe(_)) && of.is_synthetic;
             let demo = demo.then_some(Demo::Always);
@@ -170,7 +161,7 @@ impl CompareArgs {
         };
         let composed = composed.map_err(failed)?;
         output.write(|format| composed.encoded(format))?;
-        check_messages(&context)
+        check_messages(&device.context)
     }
 
     /// A compared recording, moved onto the first one if that was asked for.

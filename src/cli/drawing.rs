@@ -1,9 +1,9 @@
 //! Shared code of the commands that draw pictures of a recording: sending frames, and repeating after a loss of the device.
 
-use crate::args::{InputArgs, frames_of, gpu_failure};
+use crate::args::{InputArgs, gpu_failure};
 use crate::gpu::{Context, GpuError, Losses, Renderer, RendererOptions};
-use crate::source::{Frame, Source};
-use crate::terminal::{Failure, failed};
+use crate::source::{Frame, Source, VolumeFrames};
+use crate::terminal::{Failure, input};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -18,6 +18,12 @@ pub struct Job<'a> {
     pub own_shaders: bool,
 }
 
+impl<'a> Job<'a> {
+    pub fn open_device(&self) -> Result<DrawingDevice<'a>, Failure> {
+        DrawingDevice::open(self.input, self.validate, self.own_shaders, self.options.clone())
+    }
+}
+
 /// Why a picture could not be drawn.
 pub enum DrawFault {
     Gpu(GpuError),
@@ -27,6 +33,12 @@ pub enum DrawFault {
 impl From<GpuError> for DrawFault {
     fn from(error: GpuError) -> DrawFault {
         DrawFault::Gpu(error)
+    }
+}
+
+impl From<Failure> for DrawFault {
+    fn from(failure: Failure) -> DrawFault {
+        DrawFault::Source(failure)
     }
 }
 
@@ -44,35 +56,53 @@ impl DrawFault {
     }
 }
 
-/// Draws on the device of `context`. If the device is lost, `reopen` opens it again and `draw` is called again, with smaller bands in `options`,
-/// until it was lost too often in a row ([`Losses`]). A device that did not finish in time is not opened again. `progress` returns how many of
-/// several pictures are finished; a further one begins the count of losses anew. The last argument of `draw` is true if it is called again: then a
-/// part of the source may have been read. `own_shaders`: true if the shaders are the user's, so that one that does not compile is an error of the
-/// input.
-///
-/// # Errors
-/// The error of `draw` or `reopen`.
-pub fn draw_despite_losses<T>(
-    context: &mut Arc<Context>,
-    options: &mut RendererOptions,
+/// The device that pictures are drawn on, which is opened again when it is lost.
+pub struct DrawingDevice<'a> {
+    input: &'a InputArgs,
+    validate: bool,
     own_shaders: bool,
-    reopen: impl Fn() -> Result<Arc<Context>, Failure>,
-    progress: impl Fn() -> usize,
-    mut draw: impl FnMut(&Arc<Context>, &RendererOptions, bool) -> Result<T, DrawFault>,
-) -> Result<T, Failure> {
-    let (mut losses, mut reached) = (Losses::default(), 0);
-    loop {
-        let drawn = draw(context, options, losses.any());
-        // What was finished since the last loss begins another row of them.
-        if progress() > reached {
-            (losses, reached) = (Losses::default(), progress());
-        }
-        match drawn {
-            Err(DrawFault::Gpu(error)) if losses.allow_after(&error) => {
-                options.bands = losses.bands();
-                *context = reopen()?;
+    pub context: Arc<Context>,
+    /// Options of renderers. After a loss their bands are smaller.
+    pub options: RendererOptions,
+}
+
+impl<'a> DrawingDevice<'a> {
+    /// Opens the device that the arguments choose. `own_shaders`: true if the shaders of `options` are the user's, so that one that does not
+    /// compile is an error of the input.
+    pub fn open(
+        input: &'a InputArgs,
+        validate: bool,
+        own_shaders: bool,
+        options: RendererOptions,
+    ) -> Result<DrawingDevice<'a>, Failure> {
+        Ok(DrawingDevice { input, validate, own_shaders, context: input.open_device(validate)?, options })
+    }
+
+    /// Draws. If the device is lost, it is opened again and `draw` is called again, with smaller bands, until it was lost too often in a row
+    /// ([`Losses`]). A device that did not finish in time is not opened again. `progress` returns how many of several pictures are finished; a further
+    /// one begins the count of losses anew. The last argument of `draw` is true if it is called again: then a part of the source may have been read.
+    ///
+    /// # Errors
+    /// The error of `draw`, or the device cannot be opened again.
+    pub fn draw<T>(
+        &mut self,
+        progress: impl Fn() -> usize,
+        mut draw: impl FnMut(&Arc<Context>, &RendererOptions, bool) -> Result<T, DrawFault>,
+    ) -> Result<T, Failure> {
+        let (mut losses, mut reached) = (Losses::default(), 0);
+        loop {
+            let drawn = draw(&self.context, &self.options, losses.any());
+            // What was finished since the last loss begins another row of them.
+            if progress() > reached {
+                (losses, reached) = (Losses::default(), progress());
             }
-            drawn => return drawn.map_err(|fault| fault.failure(own_shaders)),
+            match drawn {
+                Err(DrawFault::Gpu(error)) if losses.allow_after(&error) => {
+                    self.options.bands = losses.bands();
+                    self.context = self.input.open_device(self.validate)?;
+                }
+                drawn => return drawn.map_err(|fault| fault.failure(self.own_shaders)),
+            }
         }
     }
 }
@@ -88,17 +118,11 @@ pub fn send_volume(
     volume: usize,
     mut each: impl FnMut(&Frame) -> Result<(), Failure>,
 ) -> Result<(), DrawFault> {
-    let mut fault = None;
-    let sent = frames_of(source, volume, |frame| {
+    let mut frames = VolumeFrames::of(source, volume).map_err(input)?;
+    while let Some(frame) = frames.read().map_err(input)? {
         each(&frame)?;
-        renderer.frame(frame.slice as u32, &frame.bytes, 0).map_err(|e| {
-            let failure = failed(&e);
-            fault = Some(e);
-            failure
-        })
-    });
-    match fault {
-        Some(fault) => Err(DrawFault::Gpu(fault)),
-        None => sent.map_err(DrawFault::Source),
+        renderer.frame(frame.slice as u32, &frame.bytes, 0)?;
     }
+    frames.count().map_err(input)?;
+    Ok(())
 }

@@ -93,9 +93,7 @@ impl ErrorReport {
         };
         let Opened { mut source, recorded, layers, scene } = self.input.open_recorded(&[], None)?;
         let scene = self.input.resolve_format(scene);
-        if let Some(folder) = &self.output {
-            make_folder(folder)?;
-        }
+        self.output.as_deref().map_or(Ok(()), make_folder)?;
         let dials = self.dials(&scene)?;
         let context = self.input.open_device(false)?;
         let frames = self.input.frames(&mut *source)?;
@@ -162,8 +160,8 @@ impl ErrorReport {
 
     /// The requested dials. For `all`, those that apply to the scene.
     fn dials(&self, scene: &Scene) -> Result<Vec<dials::Dial>, Failure> {
-        let mut dials = Vec::new();
         if self.dial.iter().any(|d| d == "all") {
+            let mut dials = Vec::new();
             for name in dials::NAMES {
                 match dials::dial(name, scene) {
                     Ok(dial) => dials.push(dial),
@@ -172,13 +170,11 @@ impl ErrorReport {
             }
             return Ok(dials);
         }
-        for name in &self.dial {
-            dials.push(dials::dial(name, scene).map_err(|why| match dials::NAMES.contains(&name.as_str()) {
-                true => input(format!("--dial {name}: this scene {why}")),
-                false => input(format!("--dial {name}: {why}")),
-            })?);
-        }
-        Ok(dials)
+        let of = |name: &String| {
+            let subject = if dials::NAMES.contains(&name.as_str()) { "this scene " } else { "" };
+            dials::dial(name, scene).map_err(|why| input(format!("--dial {name}: {subject}{why}")))
+        };
+        self.dial.iter().map(of).collect()
     }
 }
 

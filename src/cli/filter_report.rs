@@ -1,6 +1,6 @@
 //! `echolume report filters`: compares the 2D filters.
 
-use crate::args::{Output, check_outputs, make_folder, open_device, open_recording, write_report};
+use crate::args::{Output, check_outputs, make_folder, open_device, open_recording, write_if_asked, write_report};
 use crate::filter_report::candidate_runs::{MeasureError, MeasureOptions, Middle, count, phantom, recording};
 use crate::filter_report::candidates::candidates;
 use crate::filter_report::{Area, Areas, Report, contact_sheet, export};
@@ -68,20 +68,14 @@ impl FilterReport {
         }
         let names: Vec<String> =
             std::iter::once("phantom".to_string()).chain(self.recordings.iter().map(|f| stem(f))).collect();
-        let sheets: Vec<PathBuf> = match &self.pictures {
-            None => Vec::new(),
-            Some(folder) => names.iter().map(|name| folder.join(format!("{name}.png"))).collect(),
-        };
-        if let Some(folder) = &self.pictures {
-            make_folder(folder)?;
-        }
+        let sheets_in = |folder: &PathBuf| names.iter().map(|name| folder.join(format!("{name}.png"))).collect();
+        let sheets: Vec<PathBuf> = self.pictures.as_ref().map_or_else(Vec::new, sheets_in);
+        self.pictures.as_deref().map_or(Ok(()), make_folder)?;
         let mut targets: Vec<Output> = vec![("--markdown", self.markdown.as_deref()), ("--csv", self.csv.as_deref())];
         targets.extend(sheets.iter().map(|file| ("--pictures", Some(file.as_path()))));
         check_outputs(&targets, self.recordings.iter().map(PathBuf::as_path))?;
-        let mut sources = Vec::new();
-        for file in &self.recordings {
-            sources.push(open_recording(file, OpenOptions::default())?);
-        }
+        let sources = self.recordings.iter().map(|file| open_recording(file, OpenOptions::default()));
+        let mut sources = sources.collect::<Result<Vec<_>, _>>()?;
         let context = open_device(self.device.clone(), false)?;
         let options = MeasureOptions { only: &self.filter, pixels: self.pixels, repeats: self.repeat as usize };
         let bar = progress_bar((names.len() * count(&self.filter)) as u64).with_message("settings");
@@ -112,9 +106,7 @@ impl FilterReport {
             None => say!("{}", written.trim_end()),
             Some(file) => write_report(file, &written)?,
         }
-        if let Some(file) = &self.csv {
-            write_report(file, &export::csv(&report))?;
-        }
+        write_if_asked(self.csv.as_deref(), || Ok(export::csv(&report)))?;
         for (file, subject) in sheets.iter().zip(&report.subjects) {
             contact_sheet::contact_sheet(&report, subject).and_then(|sheet| sheet.save(file)).map_err(failed)?;
             say!("written: {}", file.display());

@@ -121,10 +121,11 @@ impl SupportBundle {
         if ![".tar.gz", ".tgz"].iter().any(|ending| name.ends_with(ending)) {
             return Err(input(format!("--output {shown}: must end in .tar.gz")));
         }
-        let is_there = || std::fs::symlink_metadata(&output).is_ok();
-        if is_there() {
-            return Err(input(format!("--output {shown}: exists already and is not replaced; give another name")));
-        }
+        let check_free = || match std::fs::symlink_metadata(&output) {
+            Ok(_) => Err(input(format!("--output {shown}: exists already and is not replaced; give another name"))),
+            Err(_) => Ok(()),
+        };
+        check_free()?;
         picture::check_target(&output).map_err(failed)?;
         // A missing file is an error. Faults inside the file are noted in the bundle.
         if let Some(config) = self.config.as_ref().filter(|config| !config.is_file()) {
@@ -139,9 +140,7 @@ impl SupportBundle {
         }
         bundle.add("devices.txt", "what `echolume devices --limits` says here", &devices());
         let bytes = bundle.pack().map_err(|e| failed(format!("{shown}: {e}")))?;
-        if is_there() {
-            return Err(input(format!("--output {shown}: exists already and is not replaced; give another name")));
-        }
+        check_free()?;
         picture::replace(&output, &bytes).map_err(failed)?;
         say!("{shown}: {} KiB; review it before you pass it on", bytes.len().div_ceil(1024));
         Ok(())
@@ -166,10 +165,7 @@ fn answer(mut child: Child) -> String {
     fn read(stream: Option<impl Read + Send + 'static>) -> std::thread::JoinHandle<String> {
         std::thread::spawn(move || {
             let mut bytes = Vec::new();
-            let mut stream = stream;
-            if let Some(stream) = &mut stream {
-                let _ = stream.take(MAX_BYTES).read_to_end(&mut bytes);
-            }
+            let _ = stream.map(|stream| stream.take(MAX_BYTES).read_to_end(&mut bytes));
             String::from_utf8_lossy(&bytes).into_owned()
         })
     }

@@ -1,7 +1,7 @@
 //! `echolume mesh`: the surface of a recording as triangles.
 
-use super::recordings::{OUTPUT, read_with_threshold, share_of};
-use crate::args::{GeometryArgs, check_number, check_outputs, open_recording, recording_help};
+use super::recordings::{OUTPUT, check_written, read_with_threshold, share_of};
+use crate::args::{GeometryArgs, check_number, open_recording, recording_help};
 use crate::mesh::Mesh;
 use crate::mesh::base::Base;
 use crate::mesh::files::{Colours, MeshFile};
@@ -99,9 +99,7 @@ impl MakeMesh {
         check_number("--base", self.base, |mm| mm > 0.0 && mm <= MAX_BASE, &base)?;
         check_number("--start", self.start, f64::is_finite, "must be a depth, mm")?;
         let mut recording = open_recording(&self.input, self.geometry.options())?;
-        let read = recording.files();
-        let read = read.iter().chain(&self.geometry.probe).map(PathBuf::as_path);
-        check_outputs(&[(OUTPUT, Some(self.output()))], read)?;
+        check_written(&[(OUTPUT, Some(self.output()))], &*recording, &self.geometry)?;
         let samples = Input { stored: recording.stored_type(), range: recording.range() };
         let (shift, world) = (recording.sample_type().shift(), recording.world_of(self.volume));
         let (geometry, volume, found) = read_with_threshold(&mut *recording, &self.input, self.volume, samples)?;

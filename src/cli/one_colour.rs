@@ -11,23 +11,19 @@ use crate::scene::{Layout, Mode, Scene, transfer};
 use crate::source::StoredType;
 use crate::source::describe::number;
 
-/// What fills a picture in which nothing is visible.
-enum Nothing {
-    /// A single colour: red, green, blue.
-    Colour([u8; 3]),
-    /// The ground behind the volume (`light.volume.ground`).
-    Ground,
-}
-
-/// What fills the picture if nothing is visible in it: all pixels have one colour, or show the ground. None otherwise, and for a picture of one
-/// pixel.
-fn of(scene: &Scene, picture: &Picture) -> Option<Nothing> {
+/// What fills the picture, in words, if nothing is visible in it: all pixels have one colour, or show the ground. None otherwise, and for a picture
+/// of one pixel.
+fn of(scene: &Scene, picture: &Picture) -> Option<String> {
     let mut pixels = picture.rgba.chunks_exact(4).map(|p| [p[0], p[1], p[2]]);
     let first = pixels.next().filter(|_| picture.rgba.len() > 4)?;
-    if pixels.all(|p| p == first) {
-        return Some(Nothing::Colour(first));
+    if !pixels.all(|p| p == first) {
+        return is_ground(scene, picture).then(|| "the ground alone (light.volume.ground)".into());
     }
-    is_ground(scene, picture).then_some(Nothing::Ground)
+    Some(match first {
+        [0, 0, 0] => "wholly black".into(),
+        [255, 255, 255] => "wholly white".into(),
+        [r, g, b] => format!("wholly of one colour (red {r}, green {g}, blue {b})"),
+    })
 }
 
 /// True if every pixel has the colour of the ground, to a level.
@@ -48,15 +44,9 @@ fn is_ground(scene: &Scene, picture: &Picture) -> bool {
 /// The warning about a picture of the renderer in which nothing is visible, with the cause; None for any other picture. `shift`: stored sample minus
 /// the value in the file; `name`: of the picture. An error if the volume cannot be read from the device.
 pub fn warning(renderer: &mut Renderer, picture: &Picture, shift: f64, name: &str) -> Result<Option<String>, GpuError> {
-    let Some(nothing) = of(renderer.scene(), picture) else { return Ok(None) };
+    let Some(shown) = of(renderer.scene(), picture) else { return Ok(None) };
     let volume = renderer.read(Slot::Volume)?;
     let why = volume.map_or("the scene has no volume".into(), |volume| cause(renderer.scene(), &volume, shift));
-    let shown = match nothing {
-        Nothing::Ground => "the ground alone (light.volume.ground)".into(),
-        Nothing::Colour([0, 0, 0]) => "wholly black".into(),
-        Nothing::Colour([255, 255, 255]) => "wholly white".into(),
-        Nothing::Colour([r, g, b]) => format!("wholly of one colour (red {r}, green {g}, blue {b})"),
-    };
     Ok(Some(format!("{name}: is {shown}: {why}")))
 }
 

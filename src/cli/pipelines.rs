@@ -1,7 +1,8 @@
 //! `echolume profile --pipelines`: statistics of the compiled pipelines.
 
 use crate::args::{
-    InputArgs, Output, ShaderArgs, check_messages, check_outputs, open_device_for_statistics, write_report,
+    InputArgs, Output, ShaderArgs, check_messages, check_outputs, open_device_for_statistics, write_if_asked,
+    write_report,
 };
 use crate::baselines::Stored;
 use crate::profile::pipelines::compare::compare;
@@ -34,9 +35,7 @@ impl Request<'_> {
         }
         let profile = self.measure()?;
         say!("{}", table(&profile).trim_end());
-        if let Some(file) = self.json {
-            write_report(file, &profile.to_json().map_err(failed)?)?;
-        }
+        write_if_asked(self.json, || profile.to_json())?;
         old.map_or(Ok(()), |old| self.judge(&old, &profile))
     }
 

@@ -2,7 +2,7 @@
 
 use super::against::{self, Other};
 use super::pipelines::Request;
-use crate::args::{InputArgs, Output, ShaderArgs, check_number, check_outputs, write_report};
+use crate::args::{InputArgs, Output, ShaderArgs, check_number, check_outputs, write_if_asked};
 use crate::baselines::{Stored, Threshold};
 use crate::files::replace_shared;
 use crate::profile as model;
@@ -140,10 +140,10 @@ impl Profile {
         }
         let (profile, spans) = run.finish();
         say!("{}", export::profile_table(&profile).trim_end());
-        self.write(&self.json, || profile.to_json().map_err(failed))?;
-        self.write(&self.csv, || Ok(export::csv(&profile)))?;
-        self.write(&self.csv_samples, || Ok(export::csv_samples(&profile)))?;
-        self.write(&self.trace, || export::chrome_trace(&profile, &spans).map_err(failed))
+        write_if_asked(self.json.as_deref(), || profile.to_json())?;
+        write_if_asked(self.csv.as_deref(), || Ok(export::csv(&profile)))?;
+        write_if_asked(self.csv_samples.as_deref(), || Ok(export::csv_samples(&profile)))?;
+        write_if_asked(self.trace.as_deref(), || export::chrome_trace(&profile, &spans).map_err(|e| e.to_string()))
     }
 
     /// Measures in turn with another run, and compares them.
@@ -153,11 +153,6 @@ impl Profile {
         }
         check_outputs(&[("--json", self.json.as_deref())], [])?;
         self.judge(&against::compared(other, self.repeat, self.warm_up, &self.criteria()?)?)
-    }
-
-    fn write(&self, file: &Option<PathBuf>, text: impl FnOnce() -> Result<String, Failure>) -> Result<(), Failure> {
-        let Some(file) = file else { return Ok(()) };
-        write_report(file, &text()?)
     }
 
     fn compare(&self, old: &Path, new: &Path) -> Result<(), Failure> {

@@ -14,7 +14,7 @@ use crate::source::sequence::{self, Sequence};
 use crate::source::volume_file::VolumeFile;
 use crate::source::volume_sequence::{self, VolumeSequence};
 use crate::source::{self, Description, Frame, Source};
-use crate::terminal::{Failure, failed, input, progress_bar, remark, say};
+use crate::terminal::{Failure, failed, input, progress_bar, remark, say, with_progress};
 use std::path::{Path, PathBuf};
 
 /// Name of the output file in messages.
@@ -59,6 +59,16 @@ pub(super) fn read_with_threshold(
 pub(super) fn share_of(asked: Option<f64>, found: Option<&EchoLevels>, file: &Path) -> Result<f64, Failure> {
     let none = || input(format!("{}: the echoes have no two classes; give --threshold", file.display()));
     asked.or(found.map(|levels| levels.threshold)).ok_or_else(none)
+}
+
+/// Checks outputs as [`check_outputs`] does. The inputs are the files of a recording and its probe file.
+pub(super) fn check_written(
+    outputs: &[Output],
+    recording: &dyn Source,
+    geometry: &GeometryArgs,
+) -> Result<(), Failure> {
+    let read = recording.files();
+    check_outputs(outputs, read.iter().chain(&geometry.probe).map(PathBuf::as_path))
 }
 
 #[derive(clap::Args)]
@@ -171,9 +181,8 @@ impl Convert {
         self.check_outputs(&[(OUTPUT, Some(self.output())), ("--mask", self.mask.as_deref())], &*recording)?;
         let each = recording.frames_per_volume();
         let (geometry, volume, there) = read_volume(&mut *recording, &self.input, number, |_, _| ())?;
-        let bar = progress_bar(grid.size[2] as u64).with_message("slices");
-        volume.write(&target, self.output(), || bar.inc(1)).map_err(failed)?;
-        bar.finish_and_clear();
+        let slices = grid.size[2] as u64;
+        with_progress(slices, "slices", |step| volume.write(&target, self.output(), step)).map_err(failed)?;
         self.write_mask(&volume, &target)?;
         let missing = if there < each { format!(", {there} of {each} frames are there") } else { String::new() };
         say!("volume: {}, {}{missing}", self.output().display(), self.voxels(&target, &geometry));
@@ -207,16 +216,16 @@ impl Convert {
         let sequence = VolumeSequence::of(&mut *recording, numbers, &self.input).map_err(input)?;
         // Of the first volume that is whole.
         let (geometry, target) = (recording.geometry(sequence.first()), self.target(&*recording, sequence.first())?);
-        let bar = progress_bar(sequence.volumes() as u64).with_message("volumes");
-        sequence.write(&mut *recording, &target, self.output(), || bar.inc(1)).map_err(failed)?;
-        bar.finish_and_clear();
+        let (count, written) = (sequence.volumes(), self.output());
+        let write = |step: &dyn Fn()| sequence.write(&mut *recording, &target, written, step);
+        with_progress(count as u64, "volumes", write).map_err(failed)?;
         let empty = Volume::new(geometry.clone(), recording.stored_type());
         self.write_mask(&empty, &target)?;
         let left_out = match sequence.left_out() {
             0 => String::new(),
             n => format!("; {n} volumes are left out, with frames missing"),
         };
-        let (shown, count) = (self.output().display(), sequence.volumes());
+        let shown = written.display();
         say!("sequence: {shown}, {count} volumes of {}{left_out}", self.voxels(&target, &geometry));
         if let Err(why) = sequence.times() {
             remark(&format!("{shown}: {why}"));
@@ -285,11 +294,10 @@ impl Convert {
         let target = self.target(&*recording, number)?;
         let share = share_of(self.threshold, found.as_ref(), &self.input)?;
         let threshold = samples.range[0] + share * (samples.range[1] - samples.range[0]);
-        let bar = progress_bar(target.grid.size[2] as u64).with_message("slices");
-        volume.write_tissue(&target, threshold, self.output(), || bar.inc(1)).map_err(failed)?;
-        bar.finish_and_clear();
-        self.write_mask(&volume, &target)?;
         let [x, y, z] = target.grid.size;
+        let write = |step: &dyn Fn()| volume.write_tissue(&target, threshold, self.output(), step);
+        with_progress(z as u64, "slices", write).map_err(failed)?;
+        self.write_mask(&volume, &target)?;
         let in_file = threshold - sample.shift();
         let shown = self.output().display();
         say!(
@@ -300,8 +308,7 @@ impl Convert {
     }
 
     fn check_outputs(&self, targets: &[Output], recording: &dyn Source) -> Result<(), Failure> {
-        let read = recording.files();
-        check_outputs(targets, read.iter().chain(&self.geometry.probe).map(PathBuf::as_path))
+        check_written(targets, recording, &self.geometry)
     }
 
     /// Writes the frames of all complete volumes as a PLUS sequence.
@@ -314,9 +321,8 @@ impl Convert {
         self.check_outputs(&[(OUTPUT, Some(self.output())), (OUTPUT, Some(&beside))], &*recording)?;
         let sequence = Sequence::of(&mut *recording, &self.input).map_err(input)?;
         let (frames, volumes) = (sequence.frames(), sequence.volumes());
-        let bar = progress_bar(volumes as u64).with_message("volumes");
-        sequence.write(&mut *recording, self.output(), || bar.inc(1)).map_err(failed)?;
-        bar.finish_and_clear();
+        let write = |step: &dyn Fn()| sequence.write(&mut *recording, self.output(), step);
+        with_progress(volumes as u64, "volumes", write).map_err(failed)?;
         let left_out = match sequence.left_out() {
             0 => String::new(),
             n => format!("; {n} volumes are left out, with frames missing or swept the same way twice"),
@@ -523,9 +529,7 @@ impl MakePhantom {
         say!("sweep: {}", self.output.display());
         Ok(())
     }
-}
 
-impl MakePhantom {
     /// Refuses files that cannot be written, and two outputs in one file.
     fn check_outputs(&self) -> Result<(), Failure> {
         let distance = self.truth.as_deref().map(distance_path);

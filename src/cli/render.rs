@@ -2,7 +2,7 @@
 
 use super::budget;
 use super::compare::CompareArgs;
-use super::drawing::{DrawFault, Job, draw_despite_losses, send_volume};
+use super::drawing::{DrawFault, Job, send_volume};
 use super::mesh_sheet;
 use super::one_colour;
 use super::series::SeriesArgs;
@@ -164,39 +164,21 @@ impl Render {
             return Err(input("--mesh: this mode has no distance map; use --mode sr or mixed"));
         }
         let finer = self.finer(&scene)?;
-        if let Some(folder) = &self.dump {
-            make_folder(folder)?;
-        }
-        let mut context = self.input.open_device(self.validate)?;
-        let mut options = job.options;
-        let scene = self.with_samples(&context, scene, &options)?;
-        let reopen = || self.input.open_device(self.validate);
-        let Drawn { mut renderer, picture, kept } = draw_despite_losses(
-            &mut context,
-            &mut options,
-            job.own_shaders,
-            reopen,
-            || 0,
-            |context, options, is_again| {
-                if is_again {
-                    source = self.open().map_err(DrawFault::Source)?.0;
-                }
-                self.draw(context, &mut *source, scene.clone(), options)
-            },
-        )?;
-        let compared = finer.map(|finer| (scene, finer));
-        let shown = marked::as_set(
-            &picture,
-            renderer.scene(),
-            u32::try_from(self.input.volume()?).ok(),
-            renderer.unveiled(),
-            self.input.demo(&*source),
-        )
-        .map_err(failed)?;
+        self.dump.as_deref().map_or(Ok(()), make_folder)?;
+        let mut device = job.open_device()?;
+        let scene = self.with_samples(&device.context, scene, &device.options)?;
+        let draw = |context: &Arc<Context>, options: &RendererOptions, is_again: bool| {
+            if is_again {
+                source = self.open()?.0;
+            }
+            self.draw(context, &mut *source, scene.clone(), options)
+        };
+        let Drawn { mut renderer, picture, kept } = device.draw(|| 0, draw)?;
+        let (volume, demo, unveiled) = (self.input.volume()?, self.input.demo(&*source), renderer.unveiled());
+        let of = u32::try_from(volume).ok();
+        let shown = marked::as_set(&picture, renderer.scene(), of, unveiled, demo).map_err(failed)?;
         output.write(|format| shown.encoded(format))?;
-        if let Some(outcome) =
-            renderer.unveiled().map(|unveiled| unveiled.outcome).filter(|outcome| !outcome.is_found())
-        {
+        if let Some(outcome) = unveiled.map(|unveiled| unveiled.outcome).filter(|outcome| !outcome.is_found()) {
             remark(&format!("unveil: {outcome}"));
         }
         let measured = renderer.take_times().map_err(failed)?;
@@ -216,18 +198,18 @@ impl Render {
             say!("{}", pass_time_table(&measured, renderer.scene()).trim_end());
         }
         if let Some((format, path)) = mesh {
-            let volume = self.input.volume()?;
             mesh_sheet::write(&mut renderer, &picture, source.world_of(volume), format, path)?;
         }
         if let Some(folder) = &self.dump {
             self.write_dump(folder, &mut renderer)?;
         }
         drop(renderer);
-        if let (Some(pair), Some(file)) = (compared, &self.error_map) {
-            let [picture, finer] = [pair.0, pair.1].map(|scene| in_floats(&context, scene, &options, &kept));
+        if let (Some(finer), Some(file)) = (finer, &self.error_map) {
+            let [picture, finer] =
+                [scene, finer].map(|scene| in_floats(&device.context, scene, &device.options, &kept));
             self.write_error_map(file, &picture?, &finer?)?;
         }
-        check_messages(&context)
+        check_messages(&device.context)
     }
 
     /// Sends a volume and draws its picture. The frames are kept for an error map.
@@ -240,7 +222,7 @@ impl Render {
     ) -> Result<Drawn, DrawFault> {
         let mut renderer = Renderer::new(context, scene, options)?;
         let mut kept = Vec::new();
-        let volume = self.input.volume().map_err(DrawFault::Source)?;
+        let volume = self.input.volume()?;
         let bar = progress_bar(source.frames_per_volume() as u64).with_message("frames");
         send_volume(&mut renderer, source, volume, |frame| {
             kept.extend(self.error_map.is_some().then(|| frame.clone()));

@@ -1,7 +1,7 @@
 //! `echolume segment`: finds the bodies of a recording, labels them, and measures their volumes.
 
-use super::recordings::{OUTPUT, read_volume};
-use crate::args::{GeometryArgs, check_number, check_outputs, open_recording, recording_help};
+use super::recordings::{OUTPUT, check_written, read_volume};
+use crate::args::{GeometryArgs, check_number, open_recording, recording_help};
 use crate::files::replace;
 use crate::mesh::files::{Colours, MeshFile};
 use crate::probe::{Geometry, Grid, World};
@@ -10,7 +10,7 @@ use crate::segment::bodies::{Body, Found, OPENING, SMOOTHING, Search, find};
 use crate::segment::{Field, Scale, cropped, files, usual_grid};
 use crate::source::convert::target_grid;
 use crate::source::segmentation;
-use crate::terminal::{Failure, failed, input, progress_bar, remark, say};
+use crate::terminal::{Failure, failed, input, remark, say, with_progress};
 use glam::DVec3;
 use std::path::PathBuf;
 
@@ -93,10 +93,8 @@ impl Segment {
             check_number(flag, value, |value| value.is_finite() && value >= 0.0, "must be 0 or more")?;
         }
         let mut recording = open_recording(&self.input, self.geometry.options())?;
-        let read = recording.files();
-        let read = read.iter().chain(&self.geometry.probe).map(PathBuf::as_path);
         let outputs = [(OUTPUT, Some(&*self.output)), ("--csv", self.csv.as_deref()), ("--stl", self.stl.as_deref())];
-        check_outputs(&outputs, read)?;
+        check_written(&outputs, &*recording, &self.geometry)?;
         let (range, world) = (recording.range(), recording.world_of(self.volume));
         let (geometry, volume, _) = read_volume(&mut *recording, &self.input, self.volume, |_, _| ())?;
         let grid = self.grid(&geometry)?;
@@ -107,11 +105,11 @@ impl Segment {
         let world = World::resampled(world, &geometry, &grid);
         let scale = self.scale()?.unwrap_or_else(|| Scale::by_speckle(&volume, range));
         let face = DVec3::Y * depth_offset(&geometry);
-        let bar = progress_bar(grid.size[2] as u64).with_message("slices");
         let of_file = |why: String| input(format!("{}: {why}", self.input.display()));
-        let field = Field::of(&volume, range, scale, grid, || bar.inc(1)).map_err(of_file)?;
+        let slices = grid.size[2] as u64;
+        let field =
+            with_progress(slices, "slices", |step| Field::of(&volume, range, scale, grid, step)).map_err(of_file)?;
         drop(volume);
-        bar.finish_and_clear();
         let search = Search {
             is_dark: self.dark,
             level: share.map(|share| scale.searched(share)),

@@ -1,6 +1,6 @@
 //! `echolume render --turntable` and `--volumes`: several pictures of one recording, drawn on one device.
 
-use super::drawing::{DrawFault, Job, draw_despite_losses, send_volume};
+use super::drawing::{DrawFault, Job, send_volume};
 use super::one_colour;
 use crate::args::{PictureSeries, SeriesTarget, check_messages, check_volume};
 use crate::files::signals::Writing;
@@ -85,12 +85,17 @@ impl Views {
         }
     }
 
+    /// The volume of a picture. None in a turn: all its pictures are of the same volume.
+    fn volume(&self, n: usize) -> Option<usize> {
+        match self {
+            Views::Turn(_) => None,
+            Views::Time(volumes) => Some(volumes[n]),
+        }
+    }
+
     /// The number of a picture in the name of its file.
     fn number(&self, n: usize) -> usize {
-        match self {
-            Views::Turn(_) => n,
-            Views::Time(volumes) => volumes[n],
-        }
+        self.volume(n).unwrap_or(n)
     }
 }
 
@@ -129,18 +134,10 @@ impl SeriesArgs {
         }
         // Dropped last: after everything is in order, a signal that arrived ends the process.
         let signals = Writing::begin();
-        let mut context = None;
-        self.draw_all(job, &target, &signals, &mut context)?;
-        context.as_deref().map_or(Ok(()), check_messages)
+        self.draw_all(job, &target, &signals)
     }
 
-    fn draw_all(
-        &self,
-        job: &Job,
-        target: &SeriesTarget,
-        signals: &Writing,
-        opened: &mut Option<Arc<Context>>,
-    ) -> Result<(), Failure> {
+    fn draw_all(&self, job: &Job, target: &SeriesTarget, signals: &Writing) -> Result<(), Failure> {
         let (mut source, scene) = self.open(job)?;
         let views = self.views(&*source, &scene, job, target)?;
         let numbers = (0..views.count()).map(|n| views.number(n));
@@ -148,19 +145,16 @@ impl SeriesArgs {
         if let Some(cut) = scene.probe().and_then(Probe::folded) {
             remark(&cut);
         }
-        let context = opened.insert(job.input.open_device(job.validate)?);
-        let mut options = job.options.clone();
+        let mut device = job.open_device()?;
         let bar = progress_bar(views.count() as u64).with_message("pictures");
         let (chosen, rate) = (job.input.volume()?, self.rate.unwrap_or(RATE));
         let written = PictureSeries::new(target, rate);
         let demo = job.input.demo(&*source);
         let mut series = Series { views, scene, demo, chosen, signals, bar, written, times: None };
-        let reopen = || job.input.open_device(job.validate);
         let progress = Cell::new(0);
-        let finished = || progress.get();
-        draw_despite_losses(context, &mut options, job.own_shaders, reopen, finished, |context, options, is_again| {
+        let draw = |context: &Arc<Context>, options: &RendererOptions, is_again: bool| {
             if is_again {
-                source = self.open(job).map_err(DrawFault::Source)?.0;
+                source = self.open(job)?.0;
             }
             let done = series.draw(context, &mut *source, options);
             progress.set(series.written.count());
@@ -169,8 +163,9 @@ impl SeriesArgs {
             let (written, count) = (series.written.count(), series.views.count());
             let kept = if matches!(target, SeriesTarget::Film(_)) { "; the film is not kept" } else { "" };
             remark(&format!("stopped by {signal} after {written} of {count} pictures{kept}"));
-            Err(DrawFault::Source(failed(format!("stopped by {signal}"))))
-        })?;
+            Err(failed(format!("stopped by {signal}")).into())
+        };
+        device.draw(|| progress.get(), draw)?;
         let Series { views, bar, written, times, .. } = series;
         written.finish()?;
         bar.finish_and_clear();
@@ -191,7 +186,7 @@ impl SeriesArgs {
             None if job.timings => say!("no times: the device was lost before they were read"),
             _ => {}
         }
-        Ok(())
+        check_messages(&device.context)
     }
 
     /// The recording, and the scene of its first picture.
@@ -216,7 +211,7 @@ impl SeriesArgs {
                 Ok(Views::Time((first..=end).collect()))
             }
             (None, Some(Volumes::Loop)) => {
-                let (cine, count) = (scene.settings.cine, source.volumes());
+                let (cine, count) = (scene.settings.drawn.cine, source.volumes());
                 let first = cine.first.unwrap_or_default();
                 let volumes = match target {
                     SeriesTarget::Film(_) => cine.film(count),
@@ -260,40 +255,37 @@ impl Series<'_> {
             return Ok(());
         }
         let mut renderer = Renderer::new(context, self.scene_of(self.written.count(), source)?, options)?;
-        let volume = |series: &Self, n: usize| match &series.views {
-            Views::Turn(_) => None,
-            Views::Time(volumes) => Some(volumes[n]),
-        };
         let mut is_empty = true;
         // Said when the fluid is lost, not of every picture without it.
         let mut was_found = true;
         while self.written.count() < self.views.count() {
             let n = self.written.count();
+            let volume = self.views.volume(n);
             if self.signals.signal().is_some() {
                 return Ok(());
             }
             let scene = self.scene_of(n, source)?;
             let rerun = renderer.change(scene.clone())?;
-            if is_empty || volume(self, n).is_some() || !matches!(rerun, Rerun::Steps { .. }) {
-                let is_whole = self.send(&mut renderer, source, volume(self, n))?;
+            if is_empty || volume.is_some() || !matches!(rerun, Rerun::Steps { .. }) {
+                let is_whole = self.send(&mut renderer, source, volume)?;
                 // What is missing of a volume is not to be filled by the one before.
                 if !is_whole && !is_empty {
                     renderer = Renderer::new(context, scene, options)?;
-                    self.send(&mut renderer, source, volume(self, n))?;
+                    self.send(&mut renderer, source, volume)?;
                 }
                 is_empty = false;
                 renderer.show(0)?;
             }
             let picture = renderer.picture()?;
-            let of = u32::try_from(volume(self, n).unwrap_or(self.chosen)).ok();
-            let shown = marked::as_set(&picture, renderer.scene(), of, renderer.unveiled(), self.demo)
-                .map_err(|e| DrawFault::Source(failed(e)))?;
+            let of = u32::try_from(volume.unwrap_or(self.chosen)).ok();
+            let shown =
+                marked::as_set(&picture, renderer.scene(), of, renderer.unveiled(), self.demo).map_err(failed)?;
             // Before the picture is written: a device that is lost here draws it again.
             let warning = match n {
                 0 => one_colour::warning(&mut renderer, &picture, source.sample_type().shift(), "the first picture")?,
                 _ => None,
             };
-            self.written.write(self.views.number(n), &shown).map_err(DrawFault::Source)?;
+            self.written.write(self.views.number(n), &shown)?;
             let start = renderer.unveiled().map(|start| start.outcome);
             let is_found = start.is_none_or(|outcome| outcome.is_found());
             if let Some(outcome) = start.filter(|_| was_found && !is_found) {
@@ -313,7 +305,7 @@ impl Series<'_> {
             Views::Turn(settings) => (self.scene.geometry.clone(), settings[n].clone()),
             Views::Time(volumes) => (source.geometry(volumes[n]), self.scene.settings.clone()),
         };
-        Scene::new(geometry, self.scene.input, settings).map_err(|e| DrawFault::Source(input(e)))
+        Ok(Scene::new(geometry, self.scene.input, settings).map_err(input)?)
     }
 
     /// Sends the frames of a volume; of the one that the arguments choose, if there is no other. True if none is missing.

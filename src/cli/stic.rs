@@ -118,7 +118,6 @@ impl Stic {
         frames_of(recording, self.volume, |frame| {
             motion.take(&frame);
             frames.push(frame);
-            Ok(())
         })?;
         if frames.len() < 2 {
             return Err(input(format!("{file}: a sweep of one frame; STIC needs the frames of several cycles")));

@@ -75,9 +75,7 @@ impl Stream {
         let update = self.stream.update()?;
         let layers = self.scene.layers(self.source.is_phantom(), &[])?;
         let settings = layers.clone().finish().map_err(input)?;
-        if let Some(folder) = &self.out {
-            make_folder(folder)?;
-        }
+        self.out.as_deref().map_or(Ok(()), make_folder)?;
         if let Some(file) = &self.record {
             check_record(file, self.source.path())?;
         }
@@ -278,8 +276,7 @@ pub fn check_record(file: &Path, played: &Path) -> Result<(), Failure> {
     if file.extension().is_none_or(|e| e != "frames") {
         return refuse("must end in .frames");
     }
-    let same = |other: &Path| other.canonicalize().is_ok_and(|o| file.canonicalize().is_ok_and(|f| f == o));
-    if same(played) {
+    if played.canonicalize().is_ok_and(|played| file.canonicalize().is_ok_and(|file| file == played)) {
         return refuse("would replace the recording that is played");
     }
     match file.exists() {

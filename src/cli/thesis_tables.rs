@@ -1,9 +1,9 @@
 //! `echolume report tables`: measures the tables of the thesis.
 
-use crate::args::{Output, check_outputs, open_device, write_report};
+use crate::args::{Output, check_outputs, open_device, write_if_asked, write_report};
 use crate::gpu::DeviceChoice;
 use crate::picture::Grey;
-use crate::terminal::{Failure, failed, input, progress_bar, say};
+use crate::terminal::{Failure, failed, input, say, with_progress};
 use crate::thesis_tables::export;
 use crate::thesis_tables::growth::growth;
 use crate::thesis_tables::row_times::{TableOptions, run};
@@ -55,9 +55,8 @@ impl ThesisTables {
         let context = open_device(self.device.clone(), false)?;
 
         let options = TableOptions { quick: self.quick, repeats: self.repeat as usize, warm_up: WARM_UP };
-        let bar = progress_bar(options.volumes() as u64).with_message("volumes");
-        let report = run(&context, &options, &mut || bar.inc(1));
-        bar.finish_and_clear();
+        let volumes = options.volumes() as u64;
+        let report = with_progress(volumes, "volumes", |step| run(&context, &options, &mut || step()));
         let mut report = report.map_err(failed)?;
         for (file, grey) in self.pictures.iter().zip(&greys) {
             let name = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy();
@@ -70,12 +69,7 @@ impl ThesisTables {
             None => say!("{}", written.trim_end()),
             Some(file) => write_report(file, &written)?,
         }
-        if let Some(file) = &self.csv {
-            write_report(file, &export::tables_csv(&report))?;
-        }
-        match growth_file {
-            Some(file) => write_report(&file, &export::growth_csv(&report.grown)),
-            None => Ok(()),
-        }
+        write_if_asked(self.csv.as_deref(), || Ok(export::tables_csv(&report)))?;
+        write_if_asked(growth_file.as_deref(), || Ok(export::growth_csv(&report.grown)))
     }
 }

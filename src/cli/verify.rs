@@ -1,12 +1,12 @@
 //! `echolume verify`: tests a device and its driver.
 
-use crate::args::{check_outputs, device_failure, write_report};
+use crate::args::{check_outputs, device_failure, write_if_asked};
 use crate::baselines::{Stored, Threshold};
 use crate::files::replace_for_all;
 use crate::files::signals::Held;
 use crate::gpu::{Context, ContextOptions, DeviceChoice, GpuError};
 use crate::machine;
-use crate::terminal::{Failure, failed, input, say};
+use crate::terminal::{Failure, failed, input, progress_bar, say};
 use crate::verify::gtest::{self, Filter};
 use crate::verify::isolation::{self, InjectedCrash, Workers};
 use crate::verify::progress::{self, Progress, Style};
@@ -48,18 +48,8 @@ pub struct Verify {
     /// Ratio to the baseline's time that counts as a failure. A time that is measured once fails above 3 times and 0.1 s more
     #[arg(long, value_name = "RATIO", default_value_t = 1.25, requires = "baseline")]
     threshold: f64,
-    /// Write JUnit XML, for CI
-    #[arg(long, value_name = "FILE")]
-    junit: Option<PathBuf>,
-    /// Write all measurements (JSON), for --baseline
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
-    /// Write an HTML page with pictures side by side
-    #[arg(long, value_name = "FILE")]
-    html: Option<PathBuf>,
-    /// Write metrics in Prometheus' text format, for the textfile collector of its node exporter (name it *.prom)
-    #[arg(long, value_name = "FILE")]
-    prometheus: Option<PathBuf>,
+    #[command(flatten)]
+    files: Files,
     /// Folder for the pictures of failures: actual, expected, difference. Created when needed
     #[arg(long, value_name = "FOLDER", default_value = "echolume-verify")]
     pictures: PathBuf,
@@ -119,6 +109,23 @@ pub struct Verify {
     inject_crash: Option<InjectedCrash>,
 }
 
+/// What the run is written to.
+#[derive(clap::Args)]
+struct Files {
+    /// Write JUnit XML, for CI
+    #[arg(long, value_name = "FILE")]
+    junit: Option<PathBuf>,
+    /// Write all measurements (JSON), for --baseline
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Write an HTML page with pictures side by side
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
+    /// Write metrics in Prometheus' text format, for the textfile collector of its node exporter (name it *.prom)
+    #[arg(long, value_name = "FILE")]
+    prometheus: Option<PathBuf>,
+}
+
 impl Verify {
     pub fn run(&self) -> Result<(), Failure> {
         if self.digest {
@@ -151,10 +158,10 @@ impl Verify {
         }
         let threshold = Threshold::new(self.threshold).map_err(|e| input(format!("--{e}")))?;
         let files = [
-            ("--json", &self.json),
-            ("--junit", &self.junit),
-            ("--html", &self.html),
-            ("--prometheus", &self.prometheus),
+            ("--json", &self.files.json),
+            ("--junit", &self.files.junit),
+            ("--html", &self.files.html),
+            ("--prometheus", &self.files.prometheus),
         ];
         check_outputs(&files.map(|(flag, file)| (flag, file.as_deref())), self.baseline.as_deref())?;
         let mut earlier =
@@ -183,7 +190,6 @@ impl Verify {
         let mut lines = Vec::new();
         let mut dut = self.open(level, &mut lines)?;
         let held = Held::first();
-        announce(&dut, &mut lines);
         let checks = self.checks(&dut, &mut lines)?;
         lines.iter().for_each(|line| say!("{line}"));
         let names: Vec<CheckName> = checks.iter().map(Check::title).collect();
@@ -191,7 +197,7 @@ impl Verify {
         let mut group = None;
         let what = "stopping after this check; a second signal stops at once and writes nothing";
         let outcomes = announcing_signals(&held, what, || {
-            self.run_each(&names, &chosen, progress::bar(), &held, |n| checks[n].run_after(&mut group, &mut dut))
+            self.run_each(&names, &chosen, progress_bar(0), &held, |n| checks[n].run_after(&mut group, &mut dut))
         });
         let device = machine::device(&dut.context);
         Ok((verify::run_on(device, dut.watched(), level, outcomes, begun), held.signal()))
@@ -206,7 +212,7 @@ impl Verify {
         let limit = Duration::from_secs(self.check_timeout);
         let what = "ending; the running check is interrupted";
         announcing_signals(&held, what, || {
-            let bar = progress::bar();
+            let bar = progress_bar(0);
             let (mut workers, ready) = match Workers::start(&command, limit, &signal, progress::echo(&bar)) {
                 Err(Failure::Failed(why)) => return Ok((verify::unstarted(level, why, begun), held.signal())),
                 started => started?,
@@ -251,7 +257,6 @@ impl Verify {
     fn reproduce(&self, level: Level, check: &str, folder: &Path) -> Result<(), Failure> {
         let mut lines = Vec::new();
         let mut dut = self.open(level, &mut lines)?;
-        announce(&dut, &mut lines);
         lines.iter().for_each(|line| say!("{line}"));
         let made = reproduce(&mut dut, check, folder).map_err(|error| match error {
             ReproduceError::NoPass(_) => input(format!("--reproduce {error}")),
@@ -271,7 +276,6 @@ impl Verify {
         self.inject_crash.iter().for_each(InjectedCrash::at_start);
         let mut lines = Vec::new();
         let opened = self.open(level, &mut lines).and_then(|dut| {
-            announce(&dut, &mut lines);
             let checks = self.checks(&dut, &mut lines)?;
             Ok((dut, checks))
         });
@@ -330,7 +334,6 @@ impl Verify {
     fn run_self_test(&self, level: Level) -> Result<Run, Failure> {
         let mut lines = Vec::new();
         let dut = self.open(level, &mut lines)?;
-        announce(&dut, &mut lines);
         lines.iter().for_each(|line| say!("{line}"));
         let begun = Instant::now();
         let tell = |detection: &Detection| {
@@ -383,6 +386,10 @@ impl Verify {
                 let blind = "validation sees nothing here: the layer is active and did not notice a missing barrier; its silence proves nothing";
                 lines.push(blind.into());
             }
+            let device = &dut.context.candidate;
+            let note = if device.is_software() { " (software: no GPU is used)" } else { "" };
+            let watched = if dut.watched() { "" } else { "; without the validation layer" };
+            lines.push(format!("device: {}{note}, {}{watched}", device.name, device.driver.trim()));
             Ok(dut)
         })
     }
@@ -436,10 +443,10 @@ impl Verify {
     }
 
     fn write(&self, run: &Run, compared: Option<&BaselineComparison>) -> Result<(), Failure> {
-        put(&self.json, || run.to_json())?;
-        put(&self.junit, || junit::junit(run, compared))?;
-        put(&self.html, || html::html(run, compared))?;
-        let Some(file) = &self.prometheus else { return Ok(()) };
+        write_if_asked(self.files.json.as_deref(), || run.to_json())?;
+        write_if_asked(self.files.junit.as_deref(), || junit::junit(run, compared))?;
+        write_if_asked(self.files.html.as_deref(), || html::html(run, compared))?;
+        let Some(file) = &self.files.prometheus else { return Ok(()) };
         // Written like those of a live run: node_exporter runs as another user.
         replace_for_all(file, prometheus(run, compared).as_bytes()).map_err(failed)?;
         say!("written: {}", file.display());
@@ -481,22 +488,9 @@ fn names(part: &str, check: &CheckName) -> bool {
     part == format!("{} / {}", check.group, check.name) || check.group.contains(part) || check.name.contains(part)
 }
 
-/// Writes a report file, if one was requested.
-fn put(file: &Option<PathBuf>, text: impl FnOnce() -> Result<String, String>) -> Result<(), Failure> {
-    let Some(file) = file else { return Ok(()) };
-    write_report(file, &text().map_err(failed)?)
-}
-
 /// The file of this program, which workers run.
 fn this_program() -> Result<PathBuf, Failure> {
     std::env::current_exe().map_err(|e| failed(format!("this program's file is not known: {e}")))
-}
-
-fn announce(dut: &DeviceUnderTest, lines: &mut Vec<String>) {
-    let device = &dut.context.candidate;
-    let note = if device.is_software() { " (software: no GPU is used)" } else { "" };
-    let watched = if dut.watched() { "" } else { "; without the validation layer" };
-    lines.push(format!("device: {}{note}, {}{watched}", device.name, device.driver.trim()));
 }
 
 /// Reports a signal at once, and `what` it does: the running check may take a minute.
@@ -522,12 +516,6 @@ fn context(options: &ContextOptions) -> Result<Arc<Context>, Failure> {
 
 /// A file name made of the letters and digits of a title, of bounded length.
 fn file_name(title: &str) -> String {
-    let plain = title.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' });
-    let mut name = String::new();
-    plain.for_each(|c| {
-        if c != '-' || !name.ends_with('-') {
-            name.push(c)
-        }
-    });
+    let name = gtest::identifier(title).to_ascii_lowercase().replace('_', "-");
     name.chars().take(100).collect::<String>().trim_matches('-').to_string()
 }

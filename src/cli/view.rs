@@ -60,24 +60,8 @@ pub struct View {
     /// /etc/echolume/echolume.toml, if it exists]
     #[arg(long, value_name = "FILE", conflicts_with_all = ["source", "probe", "rate", "real_time", "rounds", "tool", "clip", "spacing", "hole", "extent", "freehand_size", "motor"])]
     config: Option<PathBuf>,
-    /// Fill the screen
-    #[arg(long)]
-    full_screen: bool,
-    /// Monitor to fill, by part of its name
-    #[arg(long, value_name = "NAME")]
-    monitor: Option<String>,
-    /// Use a monitor without a desktop (VK_KHR_display); keys, mice and touch screens come from the kernel (needs the group input)
-    #[arg(long, conflicts_with = "full_screen")]
-    direct: bool,
-    /// Present on a surface that nobody sees (VK_EXT_headless_surface), without input: to measure a machine without a monitor. --size is its size
-    #[arg(long, conflicts_with_all = ["full_screen", "monitor", "direct", "kiosk", "config"])]
-    unseen: bool,
-    /// Refresh rate of the monitor [default: the highest at its size; --size selects a size]
-    #[arg(long, value_name = "HZ", requires = "direct")]
-    refresh: Option<f64>,
-    /// fifo: every picture, at the monitor's refresh; mailbox: only the newest picture, with less latency
-    #[arg(long, value_name = "HOW", default_value = "fifo")]
-    present: PresentMode,
+    #[command(flatten)]
+    screen: ScreenArgs,
     /// Show the picture alone: no panels, no marks, no messages. Leaving asks nothing, also if the loop is not saved
     #[arg(long)]
     no_ui: bool,
@@ -123,6 +107,29 @@ pub struct View {
     glsl: Option<PathBuf>,
 }
 
+/// Where pictures are presented.
+#[derive(clap::Args)]
+struct ScreenArgs {
+    /// Fill the screen
+    #[arg(long)]
+    full_screen: bool,
+    /// Monitor to fill, by part of its name
+    #[arg(long, value_name = "NAME")]
+    monitor: Option<String>,
+    /// Use a monitor without a desktop (VK_KHR_display); keys, mice and touch screens come from the kernel (needs the group input)
+    #[arg(long, conflicts_with = "full_screen")]
+    direct: bool,
+    /// Present on a surface that nobody sees (VK_EXT_headless_surface), without input: to measure a machine without a monitor. --size is its size
+    #[arg(long, conflicts_with_all = ["full_screen", "monitor", "direct", "kiosk", "config"])]
+    unseen: bool,
+    /// Refresh rate of the monitor [default: the highest at its size; --size selects a size]
+    #[arg(long, value_name = "HZ", requires = "direct")]
+    refresh: Option<f64>,
+    /// fifo: every picture, at the monitor's refresh; mailbox: only the newest picture, with less latency
+    #[arg(long, value_name = "HOW", default_value = "fifo")]
+    present: PresentMode,
+}
+
 impl View {
     pub fn run(self) -> Result<(), Failure> {
         if self.kiosk {
@@ -149,11 +156,11 @@ impl View {
             Some(Err(_)) if kiosk => WindowConfig::configured(&Config::default())?,
             Some(Err(fault)) => return Err(input(fault)),
         };
-        if self.direct || place.direct.is_some() {
+        if self.screen.direct || place.direct.is_some() {
             place.direct = Some(self.monitor_request(place.direct)?);
         }
-        place.unseen = self.unseen;
-        place.shape.full_screen |= self.full_screen;
+        place.unseen = self.screen.unseen;
+        place.shape.full_screen |= self.screen.full_screen;
         place.shape.stays_open = kiosk;
         place.shape.time = self.time.map(Into::into);
         (place.device.validation, place.device.deadline) = (self.validate, deadline);
@@ -354,22 +361,22 @@ impl View {
         if self.scene.has_size() {
             place.shape.size = self.scene.layers(false, &[])?.finish().map_err(input)?.picture.size;
         }
-        place.shape.full_screen = self.kiosk || self.monitor.is_some();
-        place.shape.monitor = self.monitor.clone();
-        place.shape.present_mode = self.present;
+        place.shape.full_screen = self.kiosk || self.screen.monitor.is_some();
+        place.shape.monitor = self.screen.monitor.clone();
+        place.shape.present_mode = self.screen.present;
         Ok(place)
     }
 
     /// The monitor and its mode. Flags override the configuration.
     fn monitor_request(&self, configured: Option<MonitorChoice>) -> Result<MonitorChoice, Failure> {
-        check_number("--refresh", self.refresh, |hz| (1.0..=1000.0).contains(&hz), "must lie in 1..=1000")?;
+        check_number("--refresh", self.screen.refresh, |hz| (1.0..=1000.0).contains(&hz), "must lie in 1..=1000")?;
         let configured = configured.unwrap_or_default();
         let size = match self.scene.has_size() {
             true => Some(self.scene.layers(false, &[])?.finish().map_err(input)?.picture.size),
             false => configured.size,
         };
-        let monitor = self.monitor.clone().or(configured.monitor);
-        Ok(MonitorChoice { monitor, size, refresh: self.refresh })
+        let monitor = self.screen.monitor.clone().or(configured.monitor);
+        Ok(MonitorChoice { monitor, size, refresh: self.screen.refresh })
     }
 
     fn budget(&self) -> Result<Option<Duration>, Failure> {

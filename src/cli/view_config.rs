@@ -13,6 +13,7 @@ use crate::source::live::SourceKind;
 use crate::sync::locked;
 use crate::terminal::{Failure, failed, input};
 use crate::ui::console::{Console, ConsoleOptions, StartupFault};
+use crate::ui::export::timestamp;
 use crate::ui::frame_budget::{Rung, built_in_ladder, measured_ladder};
 use crate::ui::source_supervisor::OpenSource;
 use crate::ui::window::{self, MakeConsole, WindowOptions};
@@ -116,7 +117,8 @@ impl ConsoleConfig {
     pub fn configured(config: &Config, scene: &SceneArgs) -> Result<ConsoleConfig, Failure> {
         let layers = config.layers().map_err(|e| input(config.flag_error(&e.to_string())))?;
         let (live, display, files) = (&config.live, &config.display, &config.files);
-        let record = live.record.as_ref().map(|folder| folder.join(format!("echolume-{}.frames", stamp())));
+        let record =
+            live.record.as_ref().map(|folder| folder.join(format!("echolume-{}.frames", timestamp(SystemTime::now()))));
         let layers = scene.layers_over(layers, &[])?;
         let options = ConsoleOptions {
             settings: layers.clone().finish().map_err(input)?,
@@ -181,11 +183,6 @@ impl ConsoleConfig {
         });
         (open, ConsoleOptions { scale, source: kind, wake, startup_fault, ..self.options })
     }
-}
-
-/// The current time, formatted for file names.
-fn stamp() -> String {
-    crate::ui::export::timestamp(SystemTime::now())
 }
 
 /// The quality ladder: changes of settings, from full quality to the fastest, of which a moving view chooses one to meet the frame budget. `report`:

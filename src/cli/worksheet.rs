@@ -1,6 +1,6 @@
 //! `echolume worksheet`: a report of the measurements of a workspace, with their pictures.
 
-use super::drawing::{DrawFault, draw_despite_losses, send_volume};
+use super::drawing::{DrawFault, DrawingDevice, send_volume};
 use crate::args::{InputArgs, Output, check_outputs, check_volume};
 use crate::digest::digest_of;
 use crate::files::{self, replace};
@@ -88,10 +88,10 @@ impl Worksheet {
         // A bar below a picture has the date: the same one again.
         let date =
             earlier.as_ref().map_or_else(|| marked::time_line(SystemTime::now()), |(_, sheet)| sheet.date.clone());
-        let mut context = self.input.open_device(false)?;
-        let drawn = self.draw(&mut context, &mut source, &blocks, &date)?;
+        let mut device = DrawingDevice::open(&self.input, false, false, RendererOptions::default())?;
+        let drawn = self.draw(&mut device, &mut source, &blocks, &date)?;
         let entries = blocks.iter().zip(&drawn).map(|(block, (picture, time))| block.entry(picture, *time)).collect();
-        let candidate = &context.candidate;
+        let candidate = &device.context.candidate;
         let sheet = Sheet {
             echolume_worksheet: VERSION,
             program: env!("CARGO_PKG_VERSION").into(),
@@ -144,7 +144,7 @@ impl Worksheet {
         let (name, chosen) = (self.input.name(), self.input.volume()?);
         let of_name = |why: String| input(format!("{name}: {why}"));
         let mut blocks = Vec::new();
-        for (index, measured) in scene.settings.measure.iter().enumerate().filter(|(_, of)| Block::is_for(of)) {
+        for (index, measured) in scene.settings.drawn.measure.iter().enumerate().filter(|(_, of)| Block::is_for(of)) {
             let volume = measured.made.as_ref().map_or(chosen, |made| made.volume as usize);
             check_volume(source, &format!("measurement {} is of volume", index + 1), volume, &name)?;
             let own = match volume == chosen {
@@ -168,38 +168,30 @@ impl Worksheet {
     /// Draws the pictures; the same one once.
     fn draw(
         &self,
-        context: &mut Arc<Context>,
+        device: &mut DrawingDevice,
         source: &mut Box<dyn Source>,
         blocks: &[Block],
         date: &str,
     ) -> Result<Vec<Drawn>, Failure> {
         let bar = progress_bar(blocks.len() as u64).with_message("pictures");
         let (mut drawn, count): (Vec<Drawn>, _) = (Vec::new(), Cell::new(0));
-        let reopen = || self.input.open_device(false);
-        let mut options = RendererOptions::default();
-        draw_despite_losses(
-            context,
-            &mut options,
-            false,
-            reopen,
-            || count.get(),
-            |context, options, is_again| {
-                if is_again {
-                    *source = self.input.open().map_err(DrawFault::Source)?.0;
-                }
-                while let Some(block) = blocks.get(drawn.len()) {
-                    let same = blocks.iter().zip(&drawn).find(|(other, _)| block.is_drawn_as(other));
-                    let one = match same {
-                        Some((_, drawn)) => drawn.clone(),
-                        None => self.draw_one(context, options, &mut **source, block, date)?,
-                    };
-                    drawn.push(one);
-                    count.set(drawn.len());
-                    bar.inc(1);
-                }
-                Ok(())
-            },
-        )?;
+        let draw = |context: &Arc<Context>, options: &RendererOptions, is_again: bool| {
+            if is_again {
+                *source = self.input.open()?.0;
+            }
+            while let Some(block) = blocks.get(drawn.len()) {
+                let same = blocks.iter().zip(&drawn).find(|(other, _)| block.is_drawn_as(other));
+                let one = match same {
+                    Some((_, drawn)) => drawn.clone(),
+                    None => self.draw_one(context, options, &mut **source, block, date)?,
+                };
+                drawn.push(one);
+                count.set(drawn.len());
+                bar.inc(1);
+            }
+            Ok(())
+        };
+        device.draw(|| count.get(), draw)?;
         bar.finish_and_clear();
         Ok(drawn)
     }
@@ -222,12 +214,12 @@ impl Worksheet {
         renderer.show(0)?;
         let picture = renderer.picture()?;
         let (scene, start, demo) = (renderer.scene(), renderer.unveiled(), self.input.demo(source));
-        let marked = match scene.settings.marks.bar {
+        let marked = match scene.settings.drawn.marks.bar {
             true => marked::marked(&picture, scene, Some(block.volume), start, date, demo.map(|_| DEMO_DATA)),
             false => marked::as_set(&picture, scene, Some(block.volume), start, demo).map(std::borrow::Cow::into_owned),
         };
-        let marked = marked.map_err(|fault| DrawFault::Source(failed(fault)))?;
-        Ok((Rc::new(marked), times.first().copied().flatten().filter(|time| time.is_finite())))
+        let time = times.first().copied().flatten().filter(|time| time.is_finite());
+        Ok((Rc::new(marked.map_err(failed)?), time))
     }
 }
 

@@ -4,7 +4,6 @@ use crate::passes::slots::frames_per_batch;
 use crate::passes::{DispatchArgs, Frequency, PASSES, Part, Pass, Slot, Stage, chain};
 use crate::scene::Scene;
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 use std::ops::Range;
 
 /// One dispatch of a plan. A pass that repeats has one step for each repetition.
@@ -93,84 +92,68 @@ impl Plan {
 
     /// A description of the plan in several lines: passes with the reason why each is needed or not, the visible region, and slots with their bytes.
     pub fn explain(&self, scene: &Scene) -> String {
-        let mut text = String::new();
-        let mut stage = None;
+        let (mut lines, mut stage) = (Vec::new(), None);
+        let names = |slots: Vec<Slot>| slots.into_iter().map(Slot::name).collect::<Vec<_>>().join(", ");
         for pass in PASSES {
             if stage != Some(pass.stage) {
                 stage = Some(pass.stage);
-                let _ = writeln!(text, "stage {}: {}", pass.stage as u32 + 1, pass.stage.name());
+                lines.push(format!("stage {}: {}", pass.stage as u32 + 1, pass.stage.name()));
             }
-            match pass.needed(scene) {
-                Ok(why) => {
-                    let [x, y, z] = pass
-                        .invocations(scene, &DispatchArgs { slices: pass.slices(scene), ..DispatchArgs::default() });
-                    let each = match pass.frequency {
-                        Frequency::Frame => "each frame",
-                        Frequency::Volume => "each volume",
-                        Frequency::Picture => "each picture",
-                    };
-                    let times = match (pass.repeat)(scene) {
-                        1 => String::new(),
-                        n => format!(", {n} times"),
-                    };
-                    let _ = writeln!(text, "  + {:<19} {x} x {y} x {z}, {each}{times}: {why}", pass.name);
-                    let names = |slots: Vec<crate::passes::Bind>| {
-                        slots.iter().map(|b| b.slot.name()).collect::<Vec<_>>().join(", ")
-                    };
-                    // A pass that repeats may use several pipelines; each is listed once.
-                    let mut listed = Vec::new();
-                    for args in
-                        (0..(pass.repeat)(scene)).map(|iteration| DispatchArgs { iteration, ..DispatchArgs::default() })
-                    {
-                        let shader = pass.shader(scene, &args);
-                        let pipeline = (shader, pass.constants(scene, &args));
-                        if !listed.contains(&pipeline) {
-                            listed.push(pipeline);
-                            let (reads, writes) = (pass.reads(scene, &args), pass.writes(scene, &args));
-                            let _ = writeln!(text, "    {:<19} {shader}: {} -> {}", "", names(reads), names(writes));
-                        }
-                    }
-                }
+            let why = match pass.needed(scene) {
+                Ok(why) => why,
                 Err(why) => {
-                    let _ = writeln!(text, "  - {:<19} {why}", pass.name);
+                    lines.push(format!("  - {:<19} {why}", pass.name));
+                    continue;
+                }
+            };
+            let all = DispatchArgs { slices: pass.slices(scene), ..DispatchArgs::default() };
+            let [x, y, z] = pass.invocations(scene, &all);
+            let each = match pass.frequency {
+                Frequency::Frame => "each frame",
+                Frequency::Volume => "each volume",
+                Frequency::Picture => "each picture",
+            };
+            let times = match (pass.repeat)(scene) {
+                1 => String::new(),
+                n => format!(", {n} times"),
+            };
+            lines.push(format!("  + {:<19} {x} x {y} x {z}, {each}{times}: {why}", pass.name));
+            // A pass that repeats may use several pipelines; each is listed once.
+            let mut listed = Vec::new();
+            for step in (0..(pass.repeat)(scene)).map(|iteration| Step { pass, iteration }) {
+                let shader = pass.shader(scene, &step.args());
+                let pipeline = (shader, pass.constants(scene, &step.args()));
+                if !listed.contains(&pipeline) {
+                    listed.push(pipeline);
+                    let (reads, writes) = (names(step.reads(scene)), names(step.writes(scene)));
+                    lines.push(format!("    {:<19} {shader}: {reads} -> {writes}", ""));
                 }
             }
         }
         if self.slots.contains(&Slot::Volume) {
-            let _ = writeln!(text, "slices: {}", self.slice_path(scene));
-            let _ = writeln!(text, "{}", scene.format_choice());
-            let _ = writeln!(text, "samples of the volume: {}", scene.sampling.words());
-            if let Some(choice) = scene.brick_choice() {
-                let _ = writeln!(text, "{choice}");
-            }
+            lines.push(format!("slices: {}", self.slice_path(scene)));
+            lines.push(scene.format_choice());
+            lines.push(format!("samples of the volume: {}", scene.sampling.words()));
+            lines.extend(scene.brick_choice());
         }
-        if let Some(choice) = scene.light_choice() {
-            let _ = writeln!(text, "{choice}");
-        }
-        for found in &scene.found {
-            let _ = writeln!(text, "chosen: {found}");
-        }
-        for size in &scene.resolved_sizes {
-            let _ = writeln!(text, "{size}");
-        }
+        lines.extend(scene.light_choice());
+        lines.extend(scene.found.iter().map(|found| format!("chosen: {found}")));
+        lines.extend(scene.resolved_sizes.iter().map(ToString::to_string));
         let (bounds, [columns, rows, slices]) = (&scene.visible_bounds, scene.volume_size());
-        let span = |axis: usize| format!("{}..{}", bounds.low[axis], bounds.high[axis]);
-        let _ = writeln!(
-            text,
-            "visible: columns {} of {columns}, rows {} of {rows}, slices {} of {slices}: {:.1} % of the volume; frames {:?}",
-            span(0),
-            span(1),
-            span(2),
+        let [x, y, z] = [0, 1, 2].map(|axis| format!("{}..{}", bounds.low[axis], bounds.high[axis]));
+        lines.push(format!(
+            "visible: columns {x} of {columns}, rows {y} of {rows}, slices {z} of {slices}: {:.1} % of the volume; frames {:?}",
             100.0 * scene.visible_share(),
             scene.visible_frames()
-        );
-        let _ = writeln!(text, "slots");
+        ));
+        lines.push("slots".into());
+        let row = |name: &str, bytes: u64| format!("    {name:<15} {bytes:>12} bytes");
         for slot in &self.slots {
             let shape = format!("{:?} {:?}", slot.shape(scene), slot.format(scene));
-            let _ = writeln!(text, "    {:<15} {:>12} bytes  {shape}", slot.name(), slot.bytes(scene));
+            lines.push(format!("{}  {shape}", row(slot.name(), slot.bytes(scene))));
         }
-        let _ = writeln!(text, "    {:<15} {:>12} bytes", "total", self.bytes(scene));
-        text
+        lines.push(row("total", self.bytes(scene)));
+        lines.join("\n") + "\n"
     }
 
     /// How slices get into the 3D image.
@@ -209,30 +192,22 @@ impl Plan {
         }
         let old = &Scene { visible_bounds: new.visible_bounds, kept_bounds: new.kept_bounds, ..old.clone() };
         let slots: Vec<Slot> = self.slots.iter().copied().filter(|s| s.differs(old, new)).collect();
-        let mut changed = slots.clone();
-        let mut steps = Vec::new();
-        for (i, step) in self.steps.iter().enumerate() {
-            let same = before.steps.iter().any(|s| s.is_same(step) && s.same_work(step, old, new));
-            let reads = step.pass.reads(new, &step.args());
-            if same && !reads.iter().any(|b| changed.contains(&b.slot)) {
-                continue;
-            }
-            if step.pass.frequency == Frequency::Frame {
-                return Rerun::Frames;
-            }
-            changed.extend(step.pass.writes(new, &step.args()).iter().map(|b| b.slot));
-            steps.push(i);
-        }
-        Rerun::Steps { steps, slots }
+        self.steps_again(new, slots, |step| {
+            !before.steps.iter().any(|s| s.id() == step.id() && s.same_work(step, old, new))
+        })
     }
 
     /// What has to run again in an unchanged scene after shaders were edited: the steps of these shaders and all that read their results.
     /// `is_changed` gets a shader's path below glsl/ with its variant.
     pub fn rerun_shaders(&self, scene: &Scene, is_changed: impl Fn(&str) -> bool) -> Rerun {
-        let (mut changed, mut steps) = (Vec::new(), Vec::new());
+        self.steps_again(scene, Vec::new(), |step| is_changed(step.pass.shader(scene, &step.args())))
+    }
+
+    /// What has to run again where the CPU computes `slots` again: the changed steps, and those that read what changes.
+    fn steps_again(&self, scene: &Scene, slots: Vec<Slot>, is_changed: impl Fn(&Step) -> bool) -> Rerun {
+        let (mut changed, mut steps) = (slots.clone(), Vec::new());
         for (i, step) in self.steps.iter().enumerate() {
-            let reads = step.reads(scene);
-            if !is_changed(step.pass.shader(scene, &step.args())) && !reads.iter().any(|s| changed.contains(s)) {
+            if !is_changed(step) && !step.reads(scene).iter().any(|slot| changed.contains(slot)) {
                 continue;
             }
             if step.pass.frequency == Frequency::Frame {
@@ -241,7 +216,7 @@ impl Plan {
             changed.extend(step.writes(scene));
             steps.push(i);
         }
-        Rerun::Steps { steps, slots: Vec::new() }
+        Rerun::Steps { steps, slots }
     }
 }
 
@@ -317,13 +292,7 @@ impl Step {
     }
 
     fn slots(&self, scene: &Scene) -> Vec<Slot> {
-        let reads = self.pass.reads(scene, &self.args());
-        let writes = self.pass.writes(scene, &self.args());
-        reads.iter().chain(&writes).map(|b| b.slot).collect()
-    }
-
-    fn is_same(&self, other: &Step) -> bool {
-        self.id() == other.id()
+        [self.reads(scene), self.writes(scene)].concat()
     }
 
     fn same_work(&self, other: &Step, old: &Scene, new: &Scene) -> bool {

@@ -7,7 +7,7 @@
 //!
 //! - of a struct: `default` (missing keys have the values of `Default`), `deny_unknown_fields`, `rename_all`;
 //! - of an enum: `rename_all`, `deny_unknown_fields` (of what variants hold), `untagged` with `expecting`, `tag`;
-//! - of a field: `default`, `default = "function"`, `rename`, `skip`, `skip_deserializing`, `skip_serializing_if = "function"`, `with = "module"`
+//! - of a field: `default`, `default = "function"`, `rename`, `flatten` (of a type that implements `Part`, in a struct with `default`), `skip`, `skip_deserializing`, `skip_serializing_if = "function"`, `with = "module"`
 //!   (with functions `from_node` and `to_node`);
 //! - of a variant: `rename`, `alias`.
 //!
@@ -69,6 +69,7 @@ struct Arguments {
     aliases: Vec<String>,
     rename_all: Option<LitStr>,
     skip: bool,
+    flatten: bool,
     skip_reading: bool,
     skip_if: Option<Path>,
     with: Option<Path>,
@@ -86,6 +87,7 @@ impl Arguments {
             aliases: Vec::new(),
             rename_all: None,
             skip: false,
+            flatten: false,
             skip_reading: false,
             skip_if: None,
             with: None,
@@ -105,6 +107,7 @@ impl Arguments {
                     "alias" => all.aliases.push(text()?.value()),
                     "rename_all" => all.rename_all = Some(text()?),
                     "skip" => all.skip = true,
+                    "flatten" => all.flatten = true,
                     "skip_deserializing" => all.skip_reading = true,
                     "skip_serializing_if" => all.skip_if = Some(text()?.parse()?),
                     "with" => all.with = Some(text()?.parse()?),
@@ -154,6 +157,17 @@ struct Named<'a> {
     key: String,
 }
 
+impl Named<'_> {
+    fn has_key(&self) -> bool {
+        !self.arguments.skip && !self.arguments.flatten
+    }
+}
+
+/// The field, if there is one, whose keys stand beside those of the others.
+fn flattened<'a>(fields: &'a [Named]) -> Option<&'a Ident> {
+    fields.iter().find(|field| field.arguments.flatten).map(|field| field.ident)
+}
+
 fn named<'a>(fields: impl IntoIterator<Item = &'a Field>, container: &Arguments) -> Result<Vec<Named<'a>>> {
     let each = |field: &'a Field| {
         let ident = field.ident.as_ref().ok_or_else(|| Error::new_spanned(field, "has no name"))?;
@@ -192,16 +206,28 @@ fn reading(input: &DeriveInput) -> Result<TokenStream> {
 
 /// Reads a table over the values of `Default`.
 fn table_over_default(fields: &[Named], denies_unknown: bool) -> TokenStream {
-    let slots = fields.iter().filter(|field| !field.arguments.skip).map(|Named { ident, arguments, key, .. }| {
+    let part = flattened(fields);
+    let slots = fields.iter().filter(|field| field.has_key()).map(|Named { ident, arguments, key, .. }| {
         let slot = match &arguments.with {
             None => quote!(&mut value.#ident),
             Some(with) => quote!(&mut ::echolume_base::tree::ReadBy(&mut value.#ident, #with::from_node)),
         };
         quote!((#key, #slot))
     });
+    let read = match part {
+        None => quote!(::echolume_base::tree::read_table(node, #denies_unknown, &mut [#(#slots),*])),
+        Some(part) => quote! {
+            ::echolume_base::tree::read_table_and(
+                node,
+                #denies_unknown,
+                &mut [#(#slots),*],
+                &mut ::echolume_base::tree::Part::slots(&mut value.#part),
+            )
+        },
+    };
     quote! {
         let mut value = <Self as ::core::default::Default>::default();
-        ::echolume_base::tree::read_table(node, #denies_unknown, &mut [#(#slots),*])?;
+        #read?;
         ::core::result::Result::Ok(value)
     }
 }
@@ -326,7 +352,15 @@ fn writing(input: &DeriveInput) -> Result<TokenStream> {
         Data::Struct(data) => {
             let fields = named(&data.fields, &container)?;
             let entries = entries(&fields, |ident| quote!(&self.#ident));
-            quote!(::echolume_base::tree::write_table(&[#(#entries),*]))
+            match flattened(&fields) {
+                None => quote!(::echolume_base::tree::write_table(&[#(#entries),*])),
+                Some(part) => quote! {
+                    ::echolume_base::tree::write_table_and(
+                        &[#(#entries),*],
+                        &::echolume_base::tree::Part::entries(&self.#part),
+                    )
+                },
+            }
         }
         Data::Enum(data) => writing_of_enum(data, &container)?,
         Data::Union(_) => return Err(Error::new_spanned(&input.ident, "is a union")),
@@ -344,7 +378,7 @@ fn writing(input: &DeriveInput) -> Result<TokenStream> {
 
 /// The key of each field with its value, or None if it is not written. `at`: a reference to a field.
 fn entries(fields: &[Named], at: impl Fn(&Ident) -> TokenStream) -> Vec<TokenStream> {
-    let written = fields.iter().filter(|field| !field.arguments.skip);
+    let written = fields.iter().filter(|field| field.has_key());
     let each = written.map(|Named { ident, arguments, key, .. }| {
         let at = at(ident);
         let value = match &arguments.with {

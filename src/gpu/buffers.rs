@@ -5,7 +5,8 @@ use super::context::Context;
 use super::error::{ErrorContext, GpuError};
 use super::memory::{Reserve, free, reserve};
 use crate::passes::fault_injection::Command;
-use crate::passes::slots::Shape;
+use crate::passes::slots::{Format, Shape};
+use crate::passes::{Slot, Texels};
 use ash::vk;
 use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::Allocation;
@@ -206,27 +207,37 @@ fn pieces(shape: Shape, texel_bytes: usize, parts: Range<u32>, most: u64) -> Vec
     cuts.map(|(part, row)| piece(part, 1, row..(row + rows).min(height))).collect()
 }
 
+/// Parts of a slot's image: layers of an array or slices of a 3D image. `copy` is the index of the volume image.
+#[derive(Clone, Debug)]
+pub(crate) struct SlotParts {
+    pub slot: Slot,
+    pub copy: u32,
+    pub parts: Range<u32>,
+}
+
 /// Staging buffers that hold the texels of some parts (slices or layers) of an image. There are several if one would be larger than the device
 /// allows.
 pub struct Upload {
     /// Each region of the image, with the buffer that holds its texels.
     pub pieces: Vec<(Piece, Buffer)>,
+    /// The parts of the image that the texels are for.
+    pub(crate) to: SlotParts,
 }
 
 impl Upload {
-    /// Fills staging buffers for the `parts` of an image of this shape. `texel_bytes`: bytes of a texel; `bytes`: the texels of these parts, part by
-    /// part. If bytes are missing at the end, the texels there are undefined.
+    /// Fills staging buffers for parts of an image of this shape and format. `bytes`: the texels of these parts, part by part. If bytes are missing
+    /// at the end, the texels there are undefined.
     ///
     /// # Errors
     /// Memory is exhausted, or the device fails.
-    pub fn new(
+    pub(crate) fn new(
         context: &Arc<Context>,
         name: &str,
-        (shape, texel_bytes): (Shape, usize),
-        parts: Range<u32>,
+        (shape, format): (Shape, Format),
+        to: SlotParts,
         bytes: &[u8],
     ) -> Result<Upload, GpuError> {
-        let cut = pieces(shape, texel_bytes, parts, context.candidate.max_buffer);
+        let cut = pieces(shape, format.texel_bytes(), to.parts.clone(), context.candidate.max_buffer);
         let filled = |piece: Piece| {
             let Range { start, end } = piece.bytes;
             let mut buffer = Buffer::new(context, name, end - start, Purpose::Staging)?;
@@ -234,7 +245,7 @@ impl Upload {
             buffer.write(0, &bytes[there]);
             Ok((piece, buffer))
         };
-        cut.into_iter().map(filled).collect::<Result<_, _>>().map(|pieces| Upload { pieces })
+        cut.into_iter().map(filled).collect::<Result<_, _>>().map(|pieces| Upload { pieces, to })
     }
 }
 
@@ -244,28 +255,31 @@ pub struct Readback {
     context: Arc<Context>,
     /// Each region of the image, with the buffer for its texels.
     pub pieces: Vec<(Piece, Buffer)>,
-    /// The image that they are for, and the bytes of its texels.
-    image: (Shape, usize),
+    /// Shape and format of the image that they are for.
+    pub image: (Shape, Format),
 }
 
 impl Readback {
-    /// Buffers for a complete image of this shape.
+    /// Buffers for a complete image of this shape and format.
     ///
     /// # Errors
     /// Memory is exhausted, or the device fails.
-    pub fn new(context: &Arc<Context>, name: &str, shape: Shape, texel_bytes: usize) -> Result<Readback, GpuError> {
-        let cut = pieces(shape, texel_bytes, 0..shape.parts(), context.candidate.max_buffer);
+    pub fn new(context: &Arc<Context>, name: &str, image: (Shape, Format)) -> Result<Readback, GpuError> {
+        let cut = pieces(image.0, image.1.texel_bytes(), 0..image.0.parts(), context.candidate.max_buffer);
         let made = |piece: Piece| {
             let bytes = piece.bytes.end - piece.bytes.start;
             Buffer::new(context, name, bytes, Purpose::Readback).map(|buffer| (piece, buffer))
         };
         let pieces = cut.into_iter().map(made).collect::<Result<_, _>>()?;
-        Ok(Readback { context: context.clone(), pieces, image: (shape, texel_bytes) })
+        Ok(Readback { context: context.clone(), pieces, image })
     }
 
-    /// True if the buffers are for an image of this shape, with texels of as many bytes.
-    pub fn is_for(&self, shape: Shape, texel_bytes: usize) -> bool {
-        self.image == (shape, texel_bytes)
+    /// The texels of the image, on the conditions of [`Readback::bytes`].
+    ///
+    /// # Errors
+    /// The device fails.
+    pub fn texels(&self) -> Result<Texels, GpuError> {
+        Ok(Texels::decode(self.image.0.size(), self.image.1, &self.bytes()?))
     }
 
     /// The texels of the image that the device wrote: row by row, and one slice or layer after the other, without gaps. The device must have finished

@@ -1,7 +1,7 @@
 //! Records one command buffer: dispatches and copies with the barriers that they need, labels, time stamps, and parameters.
 
 use super::bands::{Band, BandLimit, Work};
-use super::buffers::{Buffer, Purpose, Readback, Upload};
+use super::buffers::{Buffer, Purpose, Readback, SlotParts, Upload};
 use super::context::Context;
 use super::descriptor_sets::DescriptorSets;
 use super::device_queues::{DeviceQueues, memory_barrier};
@@ -38,14 +38,6 @@ pub struct Dispatch<'a> {
     pub scene: &'a Scene,
     pub pass: &'static Pass,
     pub args: &'a DispatchArgs,
-}
-
-/// Parts of a slot's image: layers of an array or slices of a 3D image. `copy` is the index of the volume image.
-#[derive(Clone, Debug)]
-pub(crate) struct SlotParts {
-    pub slot: Slot,
-    pub copy: u32,
-    pub parts: Range<u32>,
 }
 
 /// Layout of copied texels in a buffer, as in VkBufferImageCopy.
@@ -192,7 +184,6 @@ impl CommandRecorder {
                 serialize(&self.context.device, self.commands, self.queue, queues);
             }
             stamps.start(self.commands);
-            queues.stamped(self.queue);
             self.after_stamp(queues);
         }
         Ok(())
@@ -217,17 +208,17 @@ impl CommandRecorder {
 
     /// Where CPU time is counted, waits until what was recorded is done: the time since the last call is that of `pass`.
     fn count_cpu(&mut self, queues: &mut DeviceQueues, pass: &'static str) -> Result<(), GpuError> {
-        if !queues.timings.counts_cpu() {
-            return Ok(());
+        if queues.timings.cpu.is_some() {
+            self.cut(queues)?;
+            self.wait(queues)?;
+            queues.timings.cpu_of(Some(pass));
         }
-        self.cut(queues)?;
-        self.wait(queues)?;
-        queues.timings.cpu_of(Some(pass));
         Ok(())
     }
 
-    /// What has to follow a time stamp: where passes are timed, nothing may begin before it.
+    /// Notes a time stamp and records what has to follow it: where passes are timed, nothing may begin before the stamp.
     fn after_stamp(&self, queues: &mut DeviceQueues) {
+        queues.stamped(self.queue);
         // Once anything was drawn on a window, llvmpipe (Mesa 22.3, `lp_setup_end_query`) writes a time stamp only at its next flush, so
         // that the following dispatch would seem to take no time. A barrier is a flush.
         let needs_flush = self.context.presentation.is_some() && self.context.candidate.is_software();
@@ -251,7 +242,7 @@ impl CommandRecorder {
         self.collected_to = self.done_at;
         if let Some(stamps) = &self.stamps {
             queues.timings.add(&stamps.read(bits, period)?, bits, period);
-            queues.timings.leave_out(stamps.left_out());
+            queues.timings.untimed += stamps.left_out;
         }
         Ok(())
     }
@@ -266,7 +257,7 @@ impl CommandRecorder {
         self.collected_to = self.done_at;
         let Some(stamps) = &self.stamps else { return Ok(()) };
         if self.unread.len() >= MAX_UNREAD {
-            queues.timings.leave_out(stamps.count());
+            queues.timings.untimed += stamps.count();
             return Ok(());
         }
         let next = match self.spare.pop() {
@@ -291,7 +282,6 @@ impl CommandRecorder {
     pub fn submit(&mut self, queues: &mut DeviceQueues) -> Result<(), GpuError> {
         if let Some(stamps) = self.stamps.as_mut().filter(|_| self.time_stamps == TimeStamps::Ends) {
             stamps.end_of(self.commands, self.label, self.runs, std::mem::take(&mut self.open));
-            queues.stamped(self.queue);
             self.after_stamp(queues);
         }
         // SAFETY: the command buffer is being recorded.
@@ -404,7 +394,6 @@ impl CommandRecorder {
         match (&mut self.stamps, self.time_stamps) {
             (Some(stamps), TimeStamps::EachPass) => {
                 stamps.dispatch(commands, pass.name, self.runs, vec![work], repeat);
-                queues.stamped(self.queue);
                 self.after_stamp(queues);
             }
             _ => {
@@ -445,11 +434,8 @@ impl CommandRecorder {
         let offset = self.params_used.next_multiple_of(alignment);
         let end = offset + block.len() as u64;
         if end > PARAMS_BYTES {
-            return Err(GpuError::Limit {
-                what: "parameters of one command buffer".into(),
-                needed: end,
-                allowed: PARAMS_BYTES,
-            });
+            let what = "parameters of one command buffer".into();
+            return Err(GpuError::Limit { what, needed: end, allowed: PARAMS_BYTES });
         }
         self.params.write(offset as usize, block);
         self.params_used = end;
@@ -464,7 +450,6 @@ impl CommandRecorder {
     pub fn stamp(&mut self, queues: &mut DeviceQueues, name: &'static str) -> Result<(), GpuError> {
         if let Some(stamps) = self.stamps.as_mut().filter(|_| self.time_stamps == TimeStamps::EachPass) {
             stamps.end_of(self.commands, name, self.runs, Vec::new());
-            queues.stamped(self.queue);
             self.after_stamp(queues);
         }
         self.count_cpu(queues, name)
@@ -632,35 +617,30 @@ impl CommandRecorder {
     }
 
     /// Copies the texels of an upload into the parts of an image that it was made for.
-    pub fn upload(&mut self, queues: &mut DeviceQueues, from: &Upload, image: &Image, to: SlotParts) {
-        self.barrier(queues, &[Access::of_slot(to.slot, to.copy, to.parts, true, PipelineStage::Copy)]);
+    pub fn upload(&mut self, queues: &mut DeviceQueues, from: &Upload, image: &Image) {
+        let SlotParts { slot, copy, parts } = from.to.clone();
+        self.barrier(queues, &[Access::of_slot(slot, copy, parts, true, PipelineStage::Copy)]);
         for (piece, buffer) in &from.pieces {
             let region = region(image, piece.parts.clone(), piece.rows.clone(), BufferLayout::default());
             self.copy_to_image(buffer, image, vec![region]);
         }
     }
 
-    /// Copies a complete image into the buffers of a readback and makes them visible to the host.
-    pub(crate) fn copy_out(&mut self, queues: &mut DeviceQueues, image: &Image, slot: Slot, copy: u32, to: &Readback) {
-        let parts = image.shape.parts();
-        let read = Access::of_slot(slot, copy, 0..parts, false, PipelineStage::Copy);
+    /// Copies a complete image into the buffers of a readback and makes them visible to the host. `of`: its slot, and the volume image.
+    pub(crate) fn copy_out(&mut self, queues: &mut DeviceQueues, image: &Image, of: (Slot, u32), to: &Readback) {
+        let SlotParts { slot, copy, parts } = image.all_parts(of);
+        let read = Access::of_slot(slot, copy, parts, false, PipelineStage::Copy);
         let resource = barriers::Resource::Readback;
         let write = Access { resource, parts: 0..1, write: true, stage: PipelineStage::Copy };
         self.barrier(queues, &[read, write]);
+        let (device, general) = (&self.context.device, vk::ImageLayout::GENERAL);
         for (piece, buffer) in &to.pieces {
-            let region = region(image, piece.parts.clone(), piece.rows.clone(), BufferLayout::default());
-            if self.context.faults.breaks(Command::CopyToBuffer) {
-                continue;
-            }
-            // SAFETY: the buffer is as large as its piece of the image and both live until the device is done.
-            unsafe {
-                self.context.device.cmd_copy_image_to_buffer(
-                    self.commands,
-                    image.handle,
-                    vk::ImageLayout::GENERAL,
-                    buffer.handle,
-                    &[region],
-                );
+            let region = [region(image, piece.parts.clone(), piece.rows.clone(), BufferLayout::default())];
+            if !self.context.faults.breaks(Command::CopyToBuffer) {
+                // SAFETY: the buffer is as large as its piece of the image and both live until the device is done.
+                unsafe {
+                    device.cmd_copy_image_to_buffer(self.commands, image.handle, general, buffer.handle, &region)
+                };
             }
         }
         self.barrier(queues, &[Access { resource, parts: 0..1, write: false, stage: PipelineStage::Host }]);

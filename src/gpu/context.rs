@@ -216,7 +216,7 @@ impl Context {
         let candidate = candidates[device_selection::choose(&candidates, &options.device)?].clone();
         let has_statistics = options.compile_statistics && candidate.compile_statistics;
         let device = create_device(instance, &candidate, target.is_some(), has_statistics)?;
-        let allocator = Allocator::new(&AllocatorCreateDesc {
+        let made = Allocator::new(&AllocatorCreateDesc {
             instance: instance.clone(),
             device: device.clone(),
             physical_device: candidate.handle,
@@ -224,23 +224,13 @@ impl Context {
             buffer_device_address: false,
             allocation_sizes: block_sizes(&candidate),
         });
-        let allocator = match allocator {
-            Ok(allocator) => allocator,
-            Err(e) => {
-                // SAFETY: nothing made from the device is left.
-                unsafe { device.destroy_device(None) };
-                return Err(GpuError::Memory { operation: "create allocator".into(), fault: e.to_string() });
-            }
-        };
-        let messenger = match layer.map(|layer| Messenger::new(&entry, instance, layer)).transpose() {
-            Ok(messenger) => messenger,
-            Err(error) => {
-                drop(allocator);
-                // SAFETY: nothing made from the device is left.
-                unsafe { device.destroy_device(None) };
-                return Err(error);
-            }
-        };
+        let made = made.map_err(|e| GpuError::Memory { operation: "create allocator".into(), fault: e.to_string() });
+        let made = made.and_then(|allocator| {
+            let messenger = layer.map(|layer| Messenger::new(&entry, instance, layer)).transpose()?;
+            Ok((allocator, messenger))
+        });
+        // SAFETY: nothing made from the device is left after a failure.
+        let (allocator, messenger) = made.inspect_err(|_| unsafe { device.destroy_device(None) })?;
         let watchdog = Watchdog::new(options.deadline.on_device(candidate.is_software()), options.stop);
         let context = Arc::new(Context {
             push_descriptor: (candidate.push_descriptors)
@@ -436,7 +426,7 @@ impl Context {
         // SAFETY: the lock keeps the queue to one thread; the command buffers submitted are recorded and what they name is alive until
         // the timeline says it is done.
         unsafe { self.device.queue_submit2(*queue, submits, done) }?;
-        match self.faults.waits() {
+        match self.faults.waits.load(Ordering::Relaxed) {
             // SAFETY: the lock keeps the queue to this thread.
             true => unsafe { self.device.queue_wait_idle(*queue) },
             false => Ok(()),
@@ -469,9 +459,10 @@ impl Context {
     /// Adds the driver's report to an error, if the error is the loss of the device and the driver reports anything.
     pub(super) fn explain(&self, error: GpuError) -> GpuError {
         let GpuError::Vulkan { operation, result: vk::Result::ERROR_DEVICE_LOST } = error else { return error };
-        let report = self.faults.loss_report().unwrap_or_else(|| {
+        let pretended = locked(&self.faults.loss).clone();
+        let report = pretended.unwrap_or_else(|| {
             // A driver may only be asked about a device that it has lost itself.
-            if self.faults.pretends_loss() || self.is_given_up() {
+            if self.faults.has_lost.load(Ordering::Relaxed) || self.is_given_up() {
                 return LossReport::default();
             }
             let queues: Vec<_> = self.queues.iter().map(locked).collect();
@@ -486,7 +477,9 @@ impl Context {
     /// The current budget of the device's memory; `None` if the device reports none.
     pub(super) fn memory_budget(&self) -> Option<MemoryBudget> {
         let read = || self.candidate.budget.as_ref().map(|_| MemoryBudget::read(&self.instance, self.candidate.handle));
-        self.faults.budget().or_else(read)
+        // The lock ends before the driver is asked.
+        let pretended = locked(&self.faults.budget).clone();
+        pretended.or_else(read)
     }
 
     /// Runs `work` with exclusive access to the rendering queue, for uses other than [`Context::submit`].

@@ -66,16 +66,18 @@ pub struct Faults {
     hang: Mutex<Option<u32>>,
     slow: Mutex<Option<(&'static str, u32)>>,
     poison: Mutex<Option<Poison>>,
-    loss: Mutex<Option<LossReport>>,
-    budget: Mutex<Option<MemoryBudget>>,
+    /// The report that the device gives after its loss.
+    pub(super) loss: Mutex<Option<LossReport>>,
+    /// The memory budget that the device reports.
+    pub(super) budget: Mutex<Option<MemoryBudget>>,
     change: OnceLock<Change>,
     changes: AtomicU64,
-    /// A loss was injected that the driver knows nothing of.
-    has_lost: AtomicBool,
+    /// A loss was injected that the driver knows nothing of, so that it must not be asked for its cause.
+    pub(super) has_lost: AtomicBool,
     /// The host waits for each submission before the next.
-    waits: AtomicBool,
+    pub(super) waits: AtomicBool,
     /// Pictures in flight count as not done.
-    holds_pictures: AtomicBool,
+    pub(super) holds_pictures: AtomicBool,
 }
 
 impl Faults {
@@ -86,19 +88,13 @@ impl Faults {
 
     pub(super) fn check(&self, point: InjectionPoint) -> Result<(), vk::Result> {
         let mut planned = locked(&self.planned);
-        match planned.as_mut() {
-            Some((at, 0, result)) if *at == point => {
-                let result = *result;
-                *planned = None;
-                self.has_lost.fetch_or(result == vk::Result::ERROR_DEVICE_LOST, Ordering::Relaxed);
-                Err(result)
-            }
-            Some((at, left, _)) if *at == point => {
-                *left -= 1;
-                Ok(())
-            }
-            _ => Ok(()),
+        if let Some((_, left @ 1.., _)) = planned.as_mut().filter(|(at, ..)| *at == point) {
+            *left -= 1;
+            return Ok(());
         }
+        let Some((_, _, result)) = planned.take_if(|(at, ..)| *at == point) else { return Ok(()) };
+        self.has_lost.fetch_or(result == vk::Result::ERROR_DEVICE_LOST, Ordering::Relaxed);
+        Err(result)
     }
 
     /// The `after`-th submission from now (0: the next) and all later ones never reach the device, which then appears to hang.
@@ -109,14 +105,9 @@ impl Faults {
     /// True if the submission that follows must not reach the device, because the device is to appear to hang.
     pub(super) fn keeps_submission(&self) -> bool {
         let mut hang = locked(&self.hang);
-        match hang.as_mut() {
-            Some(0) => true,
-            Some(left) => {
-                *left -= 1;
-                false
-            }
-            None => false,
-        }
+        let is_due = *hang == Some(0);
+        *hang = hang.map(|left| left.saturating_sub(1));
+        is_due
     }
 
     /// From now on the host waits for each submission before it makes the next one. This is no fault: it hides faults of synchronization, and so
@@ -125,17 +116,9 @@ impl Faults {
         self.waits.store(true, Ordering::Relaxed);
     }
 
-    pub(super) fn waits(&self) -> bool {
-        self.waits.load(Ordering::Relaxed)
-    }
-
     /// After a call with `holds` true, until one with false, a picture in flight counts as not done, as on a slow device.
     pub fn hold_pictures(&self, holds: bool) {
         self.holds_pictures.store(holds, Ordering::Relaxed);
-    }
-
-    pub(super) fn holds_pictures(&self) -> bool {
-        self.holds_pictures.load(Ordering::Relaxed)
     }
 
     /// Cancels a failure of [`Faults::inject`] that has not happened yet.
@@ -148,25 +131,12 @@ impl Faults {
         *locked(&self.loss) = Some(report);
     }
 
-    /// True if the loss of the device was injected, so that the driver must not be asked for its cause.
-    pub(super) fn pretends_loss(&self) -> bool {
-        self.has_lost.load(Ordering::Relaxed)
-    }
-
-    pub(super) fn loss_report(&self) -> Option<LossReport> {
-        locked(&self.loss).clone()
-    }
-
     /// From now on the device reports a memory budget of `bytes` bytes, of which none are used: only a single allocation larger than that is refused,
     /// however many were made before.
     pub fn limit_memory(&self, bytes: u64) {
         let heap = HeapBudget { size: bytes, budget: bytes, used: 0, is_device_local: true };
         let types = vec![(0, vk::MemoryPropertyFlags::from_raw(u32::MAX)); 32];
         *locked(&self.budget) = Some(MemoryBudget { heaps: vec![heap], types });
-    }
-
-    pub(super) fn budget(&self) -> Option<MemoryBudget> {
-        locked(&self.budget).clone()
     }
 
     /// From now on newly allocated memory holds this content; `None`: it is not filled. Slots that must start with zeros still do
@@ -259,12 +229,11 @@ impl Faults {
 
     /// The bytes of an uploaded frame after the injected change.
     pub(super) fn changed_frame<'a>(&self, scene: &Scene, bytes: &'a [u8]) -> Cow<'a, [u8]> {
-        if !matches!(self.change.get(), Some(Change::Frame(_))) {
-            return Cow::Borrowed(bytes);
+        let mut changed = Cow::Borrowed(bytes);
+        if matches!(self.change.get(), Some(Change::Frame(_))) {
+            self.frame(scene, changed.to_mut());
         }
-        let mut changed = bytes.to_vec();
-        self.frame(scene, &mut changed);
-        Cow::Owned(changed)
+        changed
     }
 
     /// The bytes of a slot that is an input of a single pass, after the injected change.

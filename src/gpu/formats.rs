@@ -159,19 +159,18 @@ pub fn check(context: &Context, plan: &Plan, scene: &Scene) -> Result<(), GpuErr
                 _ => image,
             }
         };
-        let within = |needed: u32, allowed: u32| match needed <= allowed {
+        let fits = |needed: u64, allowed: u64| match needed <= allowed {
             true => Ok(()),
-            false => Err(GpuError::Limit { what: what(), needed: needed.into(), allowed: allowed.into() }),
+            false => Err(GpuError::Limit { what: what(), needed, allowed }),
         };
+        let within = |needed: u32, allowed: u32| fits(needed.into(), allowed.into());
         let bytes = slot.bytes(scene);
         // An image is never a buffer: what is uploaded and read back is cut into pieces.
         let allowed = match slot.shape(scene) {
             Shape::Buffer(_) => context.candidate.max_buffer,
             _ => context.candidate.max_allocation,
         };
-        if bytes > allowed {
-            return Err(GpuError::Limit { what: what(), needed: bytes, allowed });
-        }
+        fits(bytes, allowed)?;
         match slot.shape(scene) {
             Shape::Buffer(bytes) => {
                 within(bytes, limits.max_storage_buffer_range)?;
@@ -202,10 +201,7 @@ pub fn check(context: &Context, plan: &Plan, scene: &Scene) -> Result<(), GpuErr
         within(w, most.width)?;
         within(h, most.height)?;
         within(parts, if kind == vk::ImageType::TYPE_3D { most.depth } else { limits.max_array_layers })?;
-        let allowed = limits.max_resource_size;
-        if bytes > allowed {
-            return Err(GpuError::Limit { what: what(), needed: bytes, allowed });
-        }
+        fits(bytes, limits.max_resource_size)?;
     }
     Ok(())
 }
@@ -221,21 +217,8 @@ pub struct FormatSupport {
 
 /// The support of the device for every image format that slots have: for each format, which of the uses that slots make of images it allows.
 pub fn format_support(context: &Context) -> Vec<FormatSupport> {
-    let formats = [
-        Format::R8,
-        Format::R16,
-        Format::R16f,
-        Format::R32f,
-        Format::Rg16,
-        Format::Rg16f,
-        Format::Rg32f,
-        Format::R32u,
-        Format::Rg32u,
-        Format::Rgba16f,
-        Format::Rgba32f,
-        Format::Rgba8,
-        Format::Bgra8,
-    ];
+    use Format::*;
+    let formats = [R8, R16, R16f, R32f, Rg16, Rg16f, Rg32f, R32u, Rg32u, Rgba16f, Rgba32f, Rgba8, Bgra8];
     let uses = [
         ("sampled", vk::FormatFeatureFlags::SAMPLED_IMAGE),
         ("filtered", vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR),
@@ -245,15 +228,16 @@ pub fn format_support(context: &Context) -> Vec<FormatSupport> {
     ];
     let of = |format: Format| {
         let there = context.format_features(vulkan(format));
-        let (supported, unsupported): (Vec<_>, Vec<_>) = uses.iter().partition(|(_, needed)| there.contains(*needed));
+        let names = |is_there: bool| {
+            uses.iter().filter(|(_, needed)| there.contains(*needed) == is_there).map(|(name, _)| *name).collect()
+        };
         let edge = |kind| context.image_limits(vulkan(format), kind, vk::ImageUsageFlags::SAMPLED);
         let extent = |kind| edge(kind).map_or(vk::Extent3D::default(), |limits| limits.max_extent);
         let (flat, deep) = (extent(vk::ImageType::TYPE_2D), extent(vk::ImageType::TYPE_3D));
-        let names = |of: Vec<&(&'static str, vk::FormatFeatureFlags)>| of.iter().map(|(name, _)| *name).collect();
         FormatSupport {
             format: format!("{format:?}"),
-            supported: names(supported),
-            unsupported: names(unsupported),
+            supported: names(true),
+            unsupported: names(false),
             max_extent: [flat.width, flat.height, deep.width.min(deep.height).min(deep.depth)],
         }
     };

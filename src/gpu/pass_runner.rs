@@ -1,8 +1,8 @@
 //! Runs a single pass on given inputs: tests compare it with its CPU reference, benchmarks time it.
 
 use super::bands::BandLimit;
-use super::buffers::{Readback, Upload};
-use super::command_recorder::{CommandRecorder, Dispatch, SlotParts};
+use super::buffers::{Readback, SlotParts, Upload};
+use super::command_recorder::{CommandRecorder, Dispatch};
 use super::context::Context;
 use super::device_queues::DeviceQueues;
 use super::error::GpuError;
@@ -106,7 +106,8 @@ impl PassRunner {
 
         let mut staged = Vec::new();
         for bind in &reads {
-            let Some(bytes) = input(scene, bind, inputs) else { continue };
+            let given = inputs.iter().find(|(name, _)| *name == bind.name).map(|(_, texels)| texels);
+            let Some(bytes) = content(scene, bind.slot, given) else { continue };
             let bytes = self.context.faults.given(bind.slot, scene, bytes);
             match slots.buffer_mut(bind.slot) {
                 Some(buffer) => buffer.write(0, &bytes),
@@ -124,13 +125,13 @@ impl PassRunner {
         let mut keep = Vec::new();
         for (bind, bytes) in staged {
             let Some(image) = slots.image(bind.slot, args.image) else { continue };
-            let parts = match bind.part {
-                Part::Layers => args.layer..args.layer + args.slices,
-                _ => 0..image.shape.parts(),
+            let all = image.all_parts((bind.slot, args.image));
+            let to = match bind.part {
+                Part::Layers => SlotParts { parts: args.layer..args.layer + args.slices, ..all },
+                _ => all,
             };
-            let copy = if bind.slot.is_multibuffered() { args.image } else { 0 };
-            let upload = Upload::new(&self.context, "input", image.layout(), parts.clone(), &bytes)?;
-            recorder.upload(&mut queues, &upload, image, SlotParts { slot: bind.slot, copy, parts });
+            let upload = Upload::new(&self.context, "input", image.layout(), to, &bytes)?;
+            recorder.upload(&mut queues, &upload, image);
             keep.push(upload);
         }
         let dispatch = Dispatch { slots: &slots, pipeline: &pipeline, scene, pass, args };
@@ -138,24 +139,26 @@ impl PassRunner {
         let mut results = Vec::new();
         for bind in &writes {
             let Some(image) = slots.image(bind.slot, args.image) else { continue };
-            let buffer = Readback::new(&self.context, "output", image.shape, image.format.texel_bytes())?;
-            let copy = if bind.slot.is_multibuffered() { args.image } else { 0 };
-            recorder.copy_out(&mut queues, image, bind.slot, copy, &buffer);
-            results.push((bind, image.shape.size(), image.format, buffer));
+            let buffer = Readback::new(&self.context, "output", image.layout())?;
+            recorder.copy_out(&mut queues, image, (bind.slot, args.image), &buffer);
+            results.push((bind, buffer));
         }
-        recorder.submit(&mut queues)?;
-        let done = queues.timelines.wait_all();
-        // Everything above is freed at the end, also when waiting failed.
-        queues.timelines.drain();
-        done?;
+        finish(&mut recorder, &mut queues)?;
         let mut outputs = Arrays::default();
-        for (bind, size, format, buffer) in results {
-            let outside = Texels::stored(format, poison);
-            let part = Texels::decode(size, format, &buffer.bytes()?);
-            outputs.insert(bind.name, part.with_outside(bind.slot, scene, outside));
+        for (bind, buffer) in results {
+            let outside = Texels::stored(buffer.image.1, poison);
+            outputs.insert(bind.name, buffer.texels()?.with_outside(bind.slot, scene, outside));
         }
         Ok(outputs)
     }
+}
+
+/// Submits what was recorded and waits. What the caller frees afterwards is not in use any more, also when waiting failed.
+fn finish(recorder: &mut CommandRecorder, queues: &mut DeviceQueues) -> Result<(), GpuError> {
+    recorder.submit(queues)?;
+    let done = queues.timelines.wait_all();
+    queues.timelines.drain();
+    done
 }
 
 /// Measures the GPU time of a single pass of a scene, with slots of its own.
@@ -192,12 +195,11 @@ impl PassTimer {
             Frequency::Frame => DispatchArgs { slice: (visible.start + visible.end) / 2, ..DispatchArgs::default() },
             _ => DispatchArgs { slice: visible.start, slices: visible.end - visible.start, ..DispatchArgs::default() },
         };
-        let iterations: Vec<DispatchArgs> =
-            (0..(pass.repeat)(scene)).map(|iteration| DispatchArgs { iteration, ..first }).collect();
         let mut plan = Plan { steps: Vec::new(), slots: Vec::new() };
         let pipelines = Pipelines::shared(context, embedded(), texel_access)?;
         let mut dispatches = Vec::new();
-        for args in iterations {
+        for iteration in 0..(pass.repeat)(scene) {
+            let args = DispatchArgs { iteration, ..first };
             let binds = [pass.reads(scene, &args), pass.writes(scene, &args)].concat();
             plan.slots.extend(binds.iter().map(|b| b.slot));
             dispatches.push((args, pipelines.get(pass, scene, &args)?));
@@ -225,24 +227,15 @@ impl PassTimer {
         self.recorder.clear_new(&mut self.queues, &self.slots, &new);
         let mut keep = Vec::new();
         for &(slot, copy) in &new {
-            let given = contents.iter().find(|(s, _)| *s == slot);
-            let given = given.map(|(_, t)| t.stored_part(slot, &self.scene).encode(slot.format(&self.scene)));
-            let bytes = match (given, slot.initializer()) {
-                (Some(bytes), _) => bytes,
-                (None, Initializer::ByScene(make)) => encoded(slot.format(&self.scene), &make(&self.scene)),
-                _ => continue,
-            };
+            let given = contents.iter().find(|(s, _)| *s == slot).map(|(_, texels)| texels);
+            let Some(bytes) = content(&self.scene, slot, given) else { continue };
             let Some(image) = self.slots.image(slot, copy) else { continue };
-            let place = SlotParts { slot, copy, parts: 0..image.shape.parts() };
-            let upload = Upload::new(&self.context, "contents", image.layout(), place.parts.clone(), &bytes)?;
-            self.recorder.upload(&mut self.queues, &upload, image, place);
+            let to = image.all_parts((slot, copy));
+            let upload = Upload::new(&self.context, "contents", image.layout(), to, &bytes)?;
+            self.recorder.upload(&mut self.queues, &upload, image);
             keep.push(upload);
         }
-        self.recorder.submit(&mut self.queues)?;
-        let done = self.queues.timelines.wait_all();
-        // The staging buffers are freed at the end, also when waiting failed.
-        self.queues.timelines.drain();
-        done
+        finish(&mut self.recorder, &mut self.queues)
     }
 
     /// Runs the pass, with as many dispatches in a row as it has in a picture, in one submission, and waits. Returns the device's time for all of
@@ -267,16 +260,11 @@ impl PassTimer {
     /// The device fails.
     pub fn read(&mut self, slot: Slot) -> Result<Option<Texels>, GpuError> {
         let Some(image) = self.slots.image(slot, 0) else { return Ok(None) };
-        let buffer = Readback::new(&self.context, "read", image.shape, image.format.texel_bytes())?;
+        let buffer = Readback::new(&self.context, "read", image.layout())?;
         self.recorder.begin(&mut self.queues)?;
-        self.recorder.copy_out(&mut self.queues, image, slot, 0, &buffer);
-        self.recorder.submit(&mut self.queues)?;
-        let done = self.queues.timelines.wait_all();
-        // The buffer is freed at the end, also when waiting failed.
-        self.queues.timelines.drain();
-        done?;
-        let part = Texels::decode(image.shape.size(), image.format, &buffer.bytes()?);
-        Ok(Some(part.with_outside(slot, &self.scene, 0.0)))
+        self.recorder.copy_out(&mut self.queues, image, (slot, 0), &buffer);
+        finish(&mut self.recorder, &mut self.queues)?;
+        Ok(Some(buffer.texels()?.with_outside(slot, &self.scene, 0.0)))
     }
 }
 
@@ -293,21 +281,15 @@ impl Drop for PassTimer {
 /// The device cannot hold a slot, a shader does not compile, or the device fails.
 pub fn time_pass(context: &Arc<Context>, scene: &Scene, pass: &'static Pass, count: u32) -> Result<Vec<f64>, GpuError> {
     let mut timed = PassTimer::new(context, scene, pass, &[])?;
-    let mut times = Vec::new();
-    for _ in 0..count {
-        times.extend(timed.run()?);
-    }
-    Ok(times)
+    (0..count).filter_map(|_| timed.run().transpose()).collect()
 }
 
-/// The content of an input slot: the caller's, or what the scene computes.
-fn input(scene: &Scene, bind: &Bind, inputs: &Arrays) -> Option<Vec<u8>> {
-    let format = bind.slot.format(scene);
-    if let Some((_, texels)) = inputs.iter().find(|(name, _)| *name == bind.name) {
-        return Some(texels.stored_part(bind.slot, scene).encode(format));
-    }
-    match bind.slot.initializer() {
-        Initializer::ByScene(make) => Some(encoded(format, &make(scene))),
+/// The content of a slot: the caller's, or what the scene computes.
+fn content(scene: &Scene, slot: Slot, given: Option<&Texels>) -> Option<Vec<u8>> {
+    let format = slot.format(scene);
+    match (given, slot.initializer()) {
+        (Some(texels), _) => Some(texels.stored_part(slot, scene).encode(format)),
+        (None, Initializer::ByScene(make)) => Some(encoded(format, &make(scene))),
         _ => None,
     }
 }

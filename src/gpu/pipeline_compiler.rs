@@ -57,13 +57,9 @@ enum Work {
 
 impl Queue {
     fn next(&mut self) -> Option<Work> {
-        let work = match self.asked.pop_front() {
-            Some(job) => Some(Work::Asked(job)),
-            None => match self.in_advance.pop_front() {
-                Some(job) => Some(Work::InAdvance(job)),
-                None => self.scenes.pop_front().map(Work::Scene),
-            },
-        };
+        let asked = self.asked.pop_front().map(Work::Asked);
+        let work = asked.or_else(|| self.in_advance.pop_front().map(Work::InAdvance));
+        let work = work.or_else(|| self.scenes.pop_front().map(Work::Scene));
         self.is_warming = matches!(work, Some(Work::InAdvance(_) | Work::Scene(_)));
         work
     }

@@ -64,6 +64,12 @@ pub type Shaders = dyn Fn(&str) -> Result<Vec<u32>, String> + Send + Sync;
 /// A pipeline that was compiled just now.
 type Compiled = (Key, Arc<Pipeline>);
 
+/// The pipelines of a plan, one for each step, or the first fault.
+pub type PlanPipelines = Result<Vec<Arc<Pipeline>>, GpuError>;
+
+/// Is asked with the number of missing pipelines compiled so far and the number of missing ones; false ends the compilation.
+pub type GoesOn<'a> = dyn Fn(usize, usize) -> bool + Sync + 'a;
+
 /// The compiled pipelines, so that returning to an earlier setting compiles nothing. Of the pipelines that no plan uses, the most recently used
 /// [`ContextOptions::max_unused_pipelines`](super::ContextOptions::max_unused_pipelines) are kept.
 pub struct Pipelines {
@@ -185,12 +191,7 @@ impl Pipelines {
     /// # Errors
     /// A shader does not exist, disagrees with the declaration of its pass, or is refused by the driver: the fault of the first step that has one.
     /// Pipelines that were compiled are kept.
-    pub(super) fn of_plan_while(
-        &self,
-        plan: &Plan,
-        scene: &Scene,
-        goes_on: &(dyn Fn(usize, usize) -> bool + Sync),
-    ) -> Result<Vec<Arc<Pipeline>>, GpuError> {
+    pub(super) fn of_plan_while(&self, plan: &Plan, scene: &Scene, goes_on: &GoesOn) -> PlanPipelines {
         let (steps, compiled) = self.complete(plan, scene, |key| self.cached(key), goes_on);
         compiled.into_iter().for_each(|(key, pipeline)| self.keep(key, pipeline));
         steps
@@ -201,12 +202,7 @@ impl Pipelines {
     ///
     /// # Errors
     /// A shader does not exist, disagrees with the declaration of its pass, or is refused by the driver; the previous pipelines stay.
-    pub(super) fn recompile(
-        &self,
-        shaders: &HashSet<String>,
-        plan: &Plan,
-        scene: &Scene,
-    ) -> Result<Vec<Arc<Pipeline>>, GpuError> {
+    pub(super) fn recompile(&self, shaders: &HashSet<String>, plan: &Plan, scene: &Scene) -> PlanPipelines {
         let is_current = |key: &Key| !shaders.contains(key.0);
         let current = |key: &Key| is_current(key).then(|| self.cached(key)).flatten();
         let (steps, compiled) = self.complete(plan, scene, current, &|_, _| true);
@@ -222,8 +218,8 @@ impl Pipelines {
         plan: &Plan,
         scene: &Scene,
         cached: impl Fn(&Key) -> Option<Arc<Pipeline>>,
-        goes_on: &(dyn Fn(usize, usize) -> bool + Sync),
-    ) -> (Result<Vec<Arc<Pipeline>>, GpuError>, Vec<Compiled>) {
+        goes_on: &GoesOn,
+    ) -> (PlanPipelines, Vec<Compiled>) {
         let keys: Vec<Key> = plan.steps.iter().map(|step| self.key(step.pass, scene, &step.args())).collect();
         let mut found: HashMap<&Key, Arc<Pipeline>> = HashMap::new();
         let mut missing: Vec<usize> = Vec::new();

@@ -65,22 +65,19 @@ impl Preparation {
         let own = progress.clone();
         let work = move || {
             let _end = End { progress: own.clone(), wake: wake.clone() };
-            let compile = || {
-                let compiler = options.compiler(&context)?;
-                let (scene, plan) = compiler.plan(scene);
-                let goes_on = |done: usize, count: usize| {
-                    own.count.store(count, Ordering::Relaxed);
-                    // Two may end at the same time.
-                    own.done.fetch_max(done, Ordering::Relaxed);
-                    wake();
-                    !own.is_cancelled.load(Ordering::Relaxed)
-                };
-                let made = compiler.compile_while(&plan, &scene, &goes_on)?;
-                let count = own.done.load(Ordering::Relaxed) as u64;
-                context.counts.async_pipelines.fetch_add(count, Ordering::Relaxed);
-                Ok(Prepared { _compiler: compiler, _made: made })
+            let compiler = options.compiler(&context)?;
+            let (scene, plan) = compiler.plan(scene);
+            let goes_on = |done: usize, count: usize| {
+                own.count.store(count, Ordering::Relaxed);
+                // Two may end at the same time.
+                own.done.fetch_max(done, Ordering::Relaxed);
+                wake();
+                !own.is_cancelled.load(Ordering::Relaxed)
             };
-            compile()
+            let made = compiler.compile_while(&plan, &scene, &goes_on)?;
+            let count = own.done.load(Ordering::Relaxed) as u64;
+            context.counts.async_pipelines.fetch_add(count, Ordering::Relaxed);
+            Ok(Prepared { _compiler: compiler, _made: made })
         };
         let thread = std::thread::Builder::new().name("preparing".into()).spawn(work);
         let thread =

@@ -1,6 +1,6 @@
 //! Images that own their memory, and the images and buffers of the slots in a scene's plan.
 
-use super::buffers::{Buffer, Purpose};
+use super::buffers::{Buffer, Purpose, SlotParts};
 use super::context::Context;
 use super::error::{ErrorContext, GpuError};
 use super::formats;
@@ -147,21 +147,6 @@ impl Image {
         Ok(Image { handle: raw.handle, raw, extent, shape, format })
     }
 
-    /// True if the other image has the same shape and format.
-    #[cfg(feature = "view")]
-    pub(super) fn is_like(&self, other: &Image) -> bool {
-        (self.shape, self.format) == (other.shape, other.format)
-    }
-
-    /// Makes another image of the same slot, shape and format, in layout UNDEFINED.
-    ///
-    /// # Errors
-    /// The device has no memory for it.
-    #[cfg(feature = "view")]
-    pub(super) fn another(&self, context: &Arc<Context>, slot: Slot) -> Result<Image, GpuError> {
-        Image::new(context, slot, self.shape, self.format)
-    }
-
     /// Records a copy of the complete image to `to`, an image of the same shape and format that nothing in flight uses. This image must be in layout
     /// GENERAL and written before a barrier for copies. Afterwards `to` is in layout GENERAL, and its content is visible to copies.
     #[cfg(feature = "view")]
@@ -180,10 +165,20 @@ impl Image {
         barrier(general, [write, vk::AccessFlags2::TRANSFER_READ]);
     }
 
-    /// The image's shape, and the number of bytes of a texel.
-    pub fn layout(&self) -> (Shape, usize) {
-        (self.shape, self.format.texel_bytes())
+    /// The image's shape and format.
+    pub fn layout(&self) -> (Shape, Format) {
+        (self.shape, self.format)
     }
+
+    /// All parts of the image, which is that of this slot for this volume image.
+    pub(crate) fn all_parts(&self, (slot, image): (Slot, u32)) -> SlotParts {
+        SlotParts { slot, copy: copy_of(slot, image), parts: 0..self.shape.parts() }
+    }
+}
+
+/// Which copy of a slot belongs to a volume image.
+fn copy_of(slot: Slot, image: u32) -> u32 {
+    if slot.is_multibuffered() { image } else { 0 }
 }
 
 /// The first layer of an image, for copies.
@@ -319,7 +314,7 @@ impl SlotResources {
     /// # Panics
     /// If the plan has no such slot. A plan lists every slot that its passes declare.
     pub fn get(&self, slot: Slot, image: u32) -> &Resource {
-        let key = (slot, if slot.is_multibuffered() { image } else { 0 });
+        let key = (slot, copy_of(slot, image));
         match self.resources.get(&key) {
             Some(resource) => resource,
             None => panic!("slot '{}' {} is not in the plan", slot.name(), key.1),
@@ -327,7 +322,7 @@ impl SlotResources {
     }
 
     pub fn image(&self, slot: Slot, image: u32) -> Option<&Image> {
-        match self.resources.get(&(slot, if slot.is_multibuffered() { image } else { 0 })) {
+        match self.resources.get(&(slot, copy_of(slot, image))) {
             Some(Resource::Image(image)) => Some(image),
             _ => None,
         }
@@ -359,7 +354,7 @@ impl Resource {
     /// True if it has the shape and format that the slot has in a scene.
     fn matches(&self, slot: Slot, scene: &Scene) -> bool {
         match self {
-            Resource::Image(image) => image.shape == slot.shape(scene) && image.format == slot.format(scene),
+            Resource::Image(image) => image.layout() == (slot.shape(scene), slot.format(scene)),
             Resource::Buffer(buffer) => Shape::Buffer(buffer.size as u32) == slot.shape(scene),
         }
     }

@@ -4,7 +4,7 @@ use super::context::Context;
 use super::error::GpuError;
 use super::formats::{self, TexelAccess};
 use super::pipeline_compiler::{AsyncPipelineCompiler, SceneMaker, Wake};
-use super::pipelines::{Pipeline, Pipelines, Shaders};
+use super::pipelines::{GoesOn, Pipelines, PlanPipelines, Shaders};
 use crate::plan::Plan;
 use crate::scene::{DeviceFacts, Scene};
 use std::collections::HashSet;
@@ -14,7 +14,7 @@ use std::sync::Arc;
 pub(super) struct SceneCompiler {
     /// Started at its first use. It ends before the pipelines do.
     background: Option<AsyncPipelineCompiler>,
-    pipelines: Arc<Pipelines>,
+    pub pipelines: Arc<Pipelines>,
     /// How single texels are read.
     pub texel_access: TexelAccess,
     frames_at_once: Option<u32>,
@@ -52,12 +52,7 @@ impl SceneCompiler {
     ///
     /// # Errors
     /// The device cannot hold a slot, or a shader does not compile.
-    pub(crate) fn compile_while(
-        &self,
-        plan: &Plan,
-        scene: &Scene,
-        goes_on: &(dyn Fn(usize, usize) -> bool + Sync),
-    ) -> Result<Vec<Arc<Pipeline>>, GpuError> {
+    pub(crate) fn compile_while(&self, plan: &Plan, scene: &Scene, goes_on: &GoesOn) -> PlanPipelines {
         formats::check(&self.pipelines.context, plan, scene)?;
         self.pipelines.of_plan_while(plan, scene, goes_on)
     }
@@ -66,23 +61,15 @@ impl SceneCompiler {
     ///
     /// # Errors
     /// The device cannot hold a slot, or a shader does not compile.
-    pub fn compile(&self, plan: &Plan, scene: &Scene) -> Result<Vec<Arc<Pipeline>>, GpuError> {
+    pub fn compile(&self, plan: &Plan, scene: &Scene) -> PlanPipelines {
         self.compile_while(plan, scene, &|_, _| true)
     }
 
-    /// The pipelines of a plan, one for each step, after those that use `shaders` were compiled again.
-    pub(crate) fn recompile(
-        &mut self,
-        shaders: &HashSet<String>,
-        plan: &Plan,
-        scene: &Scene,
-    ) -> Result<Vec<Arc<Pipeline>>, GpuError> {
-        self.pipelines.recompile(shaders, plan, scene)
-    }
-
-    /// Ends compilation in the background, which may use the previous source of a shader.
-    pub fn stop(&mut self) {
+    /// The pipelines of a plan after those that use `shaders` were compiled again. This ends compilation in the background, which may use the
+    /// previous source of a shader.
+    pub(crate) fn recompile(&mut self, shaders: &HashSet<String>, plan: &Plan, scene: &Scene) -> PlanPipelines {
         self.background = None;
+        self.pipelines.recompile(shaders, plan, scene)
     }
 
     /// True if every pipeline of the scene is compiled. Otherwise the missing ones are compiled in the background from now on.

@@ -104,13 +104,8 @@ impl ShaderFolder {
     /// Why the present sources are not all in use: the first fault, which may have several lines. None if there is no fault.
     pub fn fault(&self) -> Option<String> {
         let state = locked(&self.state);
-        state
-            .unreadable
-            .iter()
-            .chain(state.faults.values())
-            .chain(state.refused.iter().map(|(_, fault)| fault))
-            .next()
-            .cloned()
+        let refused = state.refused.iter().map(|(_, fault)| fault);
+        state.unreadable.iter().chain(state.faults.values()).chain(refused).next().cloned()
     }
 
     /// The shaders whose source changed and was compiled since the last call, so that pipelines of them are out of date. None if there are none.

@@ -145,11 +145,6 @@ impl Timeline {
         self.progress(|progress| progress.busy_since()).unwrap_or_else(Instant::now)
     }
 
-    /// How long the device has been busy without finishing a submission of this queue; zero if it is idle.
-    pub(super) fn busy_for(&self) -> Duration {
-        self.busy_since().elapsed()
-    }
-
     /// Blocks until the submission with this timeline value is done.
     ///
     /// # Errors
@@ -247,7 +242,7 @@ impl Timelines {
 
     /// How long a queue of the device has been busy without finishing a submission, the longest of all queues; zero if all are idle.
     pub fn busy_for(&self) -> Duration {
-        self.0.iter().map(Timeline::busy_for).max().unwrap_or_default()
+        self.0.iter().map(|timeline| timeline.busy_since().elapsed()).max().unwrap_or_default()
     }
 
     /// Waits for all submissions to all queues, or, if that fails, for an idle device. Call it before resources in flight are destroyed.

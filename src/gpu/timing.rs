@@ -34,8 +34,8 @@ pub(crate) struct Stamps {
     /// The stamp that the next interval begins with.
     since: Option<u32>,
     intervals: Vec<Interval>,
-    /// Number of runs for which there was no room.
-    left_out: u64,
+    /// Number of runs that were not stamped, because the capacity was used up.
+    pub(super) left_out: u64,
     statistics: Option<vk::QueryPool>,
     /// Number of statistics queries used.
     counted: u32,
@@ -90,13 +90,17 @@ impl Stamps {
         if queue.valid_bits == 0 {
             return Ok(None);
         }
-        let create = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(capacity);
-        // SAFETY: the create structure is complete.
-        let pool =
-            unsafe { context.device.create_query_pool(&create, None) }.context(|| "create time stamps".into())?;
+        let pool_of = |create: vk::QueryPoolCreateInfo, operation: &str| {
+            let create = create.query_count(capacity);
+            // SAFETY: the create structure is complete, and what it needs is enabled.
+            let pool = unsafe { context.device.create_query_pool(&create, None) }.context(|| operation.into())?;
+            // SAFETY: the pool was just made, with so many queries.
+            unsafe { context.device.reset_query_pool(pool, 0, capacity) };
+            Ok(pool)
+        };
+        let create = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP);
+        let pool = pool_of(create, "create time stamps")?;
         context.name(pool, "time stamps");
-        // SAFETY: the pool was just made, with so many queries.
-        unsafe { context.device.reset_query_pool(pool, 0, capacity) };
         let mut stamps = Stamps {
             context: context.clone(),
             pool,
@@ -111,14 +115,9 @@ impl Stamps {
         if statistics && context.candidate.pipeline_statistics && queue.computes {
             let create = vk::QueryPoolCreateInfo::default()
                 .query_type(vk::QueryType::PIPELINE_STATISTICS)
-                .pipeline_statistics(vk::QueryPipelineStatisticFlags::COMPUTE_SHADER_INVOCATIONS)
-                .query_count(capacity);
-            // SAFETY: the create structure is complete and the feature enabled; a failure drops `stamps`, which frees its pool.
-            let pool = unsafe { context.device.create_query_pool(&create, None) };
-            let pool = pool.context(|| "create statistics".into())?;
-            // SAFETY: the pool was just made, with so many queries.
-            unsafe { context.device.reset_query_pool(pool, 0, capacity) };
-            stamps.statistics = Some(pool);
+                .pipeline_statistics(vk::QueryPipelineStatisticFlags::COMPUTE_SHADER_INVOCATIONS);
+            // A failure drops `stamps`, which frees its pool.
+            stamps.statistics = Some(pool_of(create, "create statistics")?);
         }
         Ok(Some(stamps))
     }
@@ -155,7 +154,7 @@ impl Stamps {
 
     /// Notes that the work of the last interval goes on in the next submission.
     pub(super) fn continues(&mut self) {
-        self.intervals.iter_mut().last().into_iter().for_each(|last| last.runs = 0);
+        self.intervals.last_mut().into_iter().for_each(|last| last.runs = 0);
     }
 
     /// Records a dispatch with `record`, writes a stamp, and counts invocations if enabled.
@@ -200,11 +199,6 @@ impl Stamps {
         self.intervals.iter().map(|interval| u64::from(interval.runs)).sum::<u64>() + self.left_out
     }
 
-    /// Number of runs that were not stamped, because the capacity was used up.
-    pub(super) fn left_out(&self) -> u64 {
-        self.left_out
-    }
-
     /// Reads the stamps, one entry for each interval, and updates the expected times of its dispatches. The device must have finished the recording.
     ///
     /// # Errors
@@ -226,8 +220,8 @@ impl Stamps {
 
     fn results(&self, pool: vk::QueryPool, count: u32) -> Result<Vec<u64>, GpuError> {
         let mut results = vec![0u64; count as usize];
-        if count == 0 {
-            return Ok(Vec::new());
+        if results.is_empty() {
+            return Ok(results);
         }
         // SAFETY: the pool is alive; every query read was written by the command buffer that has finished.
         unsafe { self.context.device.get_query_pool_results(pool, 0, &mut results, vk::QueryResultFlags::TYPE_64) }
@@ -249,14 +243,14 @@ impl Drop for Stamps {
 /// Times of passes, spans and CPU times that were measured since they were last taken.
 pub(crate) struct Timings {
     times: Vec<PassTime>,
-    /// Passes and copies that could not be timed.
-    untimed: u64,
+    /// Passes and copies that could not be timed, since this was last taken.
+    pub untimed: u64,
     spans: Option<SpanLog>,
-    cpu: Option<CpuLog>,
+    pub cpu: Option<CpuLog>,
 }
 
 /// CPU time of each pass since it was last taken, ns.
-struct CpuLog {
+pub(crate) struct CpuLog {
     since: CpuTime,
     passes: Vec<(&'static str, f64)>,
 }
@@ -285,10 +279,6 @@ impl Timings {
     /// Counts CPU time too, if the system reports it.
     pub(crate) fn start_cpu(&mut self) {
         self.cpu = CpuTime::now().map(|since| CpuLog { since, passes: Vec::new() });
-    }
-
-    pub fn counts_cpu(&self) -> bool {
-        self.cpu.is_some()
     }
 
     /// Assigns the CPU time of all threads since the last call to this pass; with None, to no pass.
@@ -336,16 +326,6 @@ impl Timings {
                 spans.list.push(Span { name, on_device: true, begin, end: begin + ns, runs, invocations });
             }
         }
-    }
-
-    /// Counts passes and copies that cannot be timed.
-    pub fn leave_out(&mut self, count: u64) {
-        self.untimed += count;
-    }
-
-    /// Number of passes and copies since the last call that could not be timed.
-    pub fn take_untimed(&mut self) -> u64 {
-        std::mem::take(&mut self.untimed)
     }
 
     pub fn take_times(&mut self) -> Vec<PassTime> {

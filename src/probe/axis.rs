@@ -56,6 +56,11 @@ impl Axis {
         self.at(self.len().saturating_sub(1) as f64)
     }
 
+    /// Largest distance of a position from zero, by the first and the last.
+    pub(crate) fn outermost(&self) -> f64 {
+        self.first().abs().max(self.last().abs())
+    }
+
     /// Mean distance between neighbours; 0 for fewer than two positions.
     pub fn pitch(&self) -> f64 {
         match self {

@@ -4,9 +4,9 @@
 
 use super::axis::Axis;
 use super::geometry::{Advance, Array, Firing, GeometryError, Motion, Probe, Volumes};
-use super::motor::MotorTable;
+use super::motor::{Direction, MotorTable};
 use crate::files::{self, InputError};
-use crate::tree::{self, FromNode, Node};
+use crate::tree::{self, Defaults, FromNode, Node};
 use std::path::{Path, PathBuf};
 
 /// Largest size of a probe file, bytes.
@@ -229,10 +229,8 @@ impl ProbeFile {
                 return self.fault("motion.steady", fault);
             }
         };
-        let said = format!(
-            "the motor travels {ratio:.3} of the way to the next frame while {lines} lines take {:.2} ms{after}",
-            frame_time * 1e3
-        );
+        let while_taken = format!("while {lines} lines take {:.2} ms{after}", frame_time * 1e3);
+        let said = format!("the motor travels {ratio:.3} of the way to the next frame {while_taken}");
         if ratio > 1.0 + ROUNDED {
             return self.fault(field, format!("{said}: at most 1"));
         }
@@ -263,9 +261,9 @@ impl ProbeFile {
 
     fn motion(&self, frames: usize) -> Result<(Motion, Axis), InputError> {
         let motion = &self.tables.motion;
-        let slab = Motion::Still { thickness: motion.thickness_mm.unwrap_or(SLAB) };
-        let (kind, slices) = match motion.kind {
-            MotionKind::Still => (slab, Axis::centred(1.0, 1)),
+        let slab = (Motion::Still { thickness: motion.thickness_mm.unwrap_or(SLAB) }, Axis::centred(1.0, 1));
+        let swept = match motion.kind {
+            MotionKind::Still => return Ok(slab),
             MotionKind::Translated => {
                 let slices = match (motion.pitch_mm, &motion.frame_positions_mm) {
                     (Some(pitch), None) => Axis::centred(pitch, frames),
@@ -287,7 +285,7 @@ impl ProbeFile {
             }
         };
         // A single frame is no sweep: it is drawn as a slab.
-        if frames == 1 { Ok((slab, Axis::centred(1.0, 1))) } else { Ok((kind, slices)) }
+        Ok(if frames == 1 { slab } else { swept })
     }
 
     fn lines(&self, count: usize) -> Result<(Array, Axis), InputError> {
@@ -323,10 +321,9 @@ impl ProbeFile {
             return self.fault(field, format!("has {} entries, but there are {count} {of}", table.len()));
         }
         let axis = Axis::from_table(table.to_vec());
-        if axis.is_valid() {
-            Ok(axis)
-        } else {
-            self.fault(field, "must be finite numbers that rise from one to the next")
+        match axis.is_valid() {
+            true => Ok(axis),
+            false => self.fault(field, "must be finite numbers that rise from one to the next"),
         }
     }
 }
@@ -400,14 +397,6 @@ enum MotionKind {
     Still,
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode)]
-#[tree(rename_all = "lowercase")]
-enum Direction {
-    #[default]
-    Forward,
-    Backward,
-}
-
 #[derive(Clone, Debug, PartialEq, FromNode)]
 #[tree(deny_unknown_fields)]
 struct MotionTable {
@@ -443,16 +432,11 @@ impl MotionTable {
     }
 }
 
-#[derive(Clone, Debug, PartialEq, FromNode)]
+#[derive(Clone, Debug, PartialEq, Defaults, FromNode)]
 #[tree(deny_unknown_fields)]
 struct SoundTable {
+    #[value(1540.0)]
     speed_m_per_s: f64,
-}
-
-impl Default for SoundTable {
-    fn default() -> SoundTable {
-        SoundTable { speed_m_per_s: 1540.0 }
-    }
 }
 
 #[derive(Clone, Debug, Default, PartialEq, FromNode)]

@@ -109,7 +109,7 @@ impl Probe {
     /// True if lines of a curved array lie 90 degrees or more off the depth axis, as those of a radial probe do: half-planes do not
     /// bound such a sector, and it reaches above its apex.
     pub fn is_radial(&self) -> bool {
-        matches!(self.array, Array::Curved { .. }) && self.lines.first().abs().max(self.lines.last().abs()) >= PI / 2.0
+        matches!(self.array, Array::Curved { .. }) && self.lines.outermost() >= PI / 2.0
     }
 
     /// Y of the wobble axis, mm: radius of the array minus wobble radius (Ra - Rw). 0 unless the motion is a fan.
@@ -152,6 +152,14 @@ impl Probe {
             Advance::None => 0.0,
             Advance::Same(a) => *a,
             Advance::Each(table) => interpolated(table, slice),
+        }
+    }
+
+    /// [`Probe::advance_at`] a slice itself, without interpolation.
+    pub fn advance_of(&self, slice: usize) -> f64 {
+        match &self.advance {
+            Advance::Each(table) => table.get(slice).copied().unwrap_or(0.0),
+            Advance::None | Advance::Same(_) => self.advance_at(0.0),
         }
     }
 
@@ -268,11 +276,8 @@ impl Probe {
     pub fn folded(&self) -> Option<String> {
         let share = 100.0 * self.folded_share();
         (share > 0.0).then(|| {
-            let axis = self.axis_depth();
-            format!(
-                "{share:.2} % of each frame is not drawn: it lies before the wobble axis, at y = {axis:.2} mm, where the sweep turns the \
-                 other way"
-            )
+            let place = format!("at y = {:.2} mm, where the sweep turns the other way", self.axis_depth());
+            format!("{share:.2} % of each frame is not drawn: it lies before the wobble axis, {place}")
         })
     }
 
@@ -339,37 +344,31 @@ impl Probe {
     /// The first number that is out of its range, or numbers that the maps cannot invert.
     pub fn check(&self) -> Result<(), GeometryError> {
         // Larger values belong to no real probe, and their squares would be infinite in f32.
-        let positive = |field, value: f64| match (1e-6..=1e6).contains(&value) {
+        let at_least = |least: f64, field, value: f64| match (least..=1e6).contains(&value) {
             true => Ok(()),
-            false => fault(field, format!("is {}, must lie in 1e-6..=1e6", short(value))),
+            false => fault(field, format!("is {}, must lie in {}..=1e6", short(value), short(least))),
         };
-        let not_negative = |field, value: f64| match (0.0..=1e6).contains(&value) {
-            true => Ok(()),
-            false => fault(field, format!("is {}, must lie in 0..=1e6", short(value))),
-        };
-        positive("sample pitch", self.sample_pitch)?;
-        positive("sound speed", self.sound_speed)?;
-        not_negative("start depth", self.start_depth)?;
-        not_negative("array radius", self.array_radius())?;
+        at_least(1e-6, "sample pitch", self.sample_pitch)?;
+        at_least(1e-6, "sound speed", self.sound_speed)?;
+        at_least(0.0, "start depth", self.start_depth)?;
+        at_least(0.0, "array radius", self.array_radius())?;
         if self.samples < 2 {
             return fault("samples", format!("{} a line, at least 2 are needed", self.samples));
         }
         if self.lines.len() < 2 {
             return fault("scan lines", format!("{} a frame, at least 2 are needed", self.lines.len()));
         }
-        let outermost = self.lines.first().abs().max(self.lines.last().abs());
-        if !self.lines.is_valid() || outermost > 1e6 {
+        if !self.lines.is_valid() || self.lines.outermost() > 1e6 {
             return fault("scan lines", "positions must be finite and rise from line to line");
         }
-        let outermost = self.slices.first().abs().max(self.slices.last().abs());
-        if !self.slices.is_valid() || outermost > 1e6 {
+        if !self.slices.is_valid() || self.slices.outermost() > 1e6 {
             return fault("frames", "positions must be finite and rise from slice to slice");
         }
         if self.slices.len() < 2 && !matches!(self.motion, Motion::Still { .. }) {
             return fault("frames", "a sweep has at least 2 frames a volume; a single frame needs motion 'still'");
         }
         if let Array::Curved { .. } = self.array {
-            let widest = self.lines.first().abs().max(self.lines.last().abs());
+            let widest = self.lines.outermost();
             if widest >= PI {
                 return fault("sector angle", format!("{:.1} deg off axis, must stay under 180", widest.to_degrees()));
             }
@@ -388,29 +387,24 @@ impl Probe {
         }
         match self.motion {
             Motion::Still { thickness } => {
-                positive("slice thickness", thickness)?;
+                at_least(1e-6, "slice thickness", thickness)?;
                 if self.slices.len() != 1 {
                     return fault("frames", "a still probe has one frame a volume");
                 }
             }
             Motion::Translated => {}
             Motion::Fan { wobble_radius } => {
-                not_negative("wobble radius", wobble_radius)?;
+                at_least(0.0, "wobble radius", wobble_radius)?;
                 let (first, last) = self.slice_bounds();
                 let widest = first.abs().max(last.abs());
                 if widest >= PI / 2.0 {
                     return fault("fan angle", format!("{:.1} deg off axis, must stay under 90", widest.to_degrees()));
                 }
-                let farthest = self.sector_bounds().1[1];
-                if farthest <= self.axis_depth() {
-                    return fault(
-                        "wobble radius",
-                        format!(
-                            "the sector ends at y = {farthest:.2} mm but the wobble axis is at {:.2} mm: \
-                             nothing of the sector is beyond the axis",
-                            self.axis_depth()
-                        ),
-                    );
+                let (farthest, axis) = (self.sector_bounds().1[1], self.axis_depth());
+                if farthest <= axis {
+                    let places =
+                        format!("the sector ends at y = {farthest:.2} mm but the wobble axis is at {axis:.2} mm");
+                    return fault("wobble radius", format!("{places}: nothing of the sector is beyond the axis"));
                 }
             }
         }
@@ -419,7 +413,7 @@ impl Probe {
 }
 
 /// How the frames of a recording make up volumes, and how the motor moves in them.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Volumes {
     /// Number of frames of a volume (K).
     pub frames: usize,
@@ -452,15 +446,7 @@ pub enum Firing {
 impl Volumes {
     /// `count` volumes of `frames` frames, all swept forwards by a motor that stops for each frame.
     pub fn forward(frames: usize, count: usize) -> Volumes {
-        Volumes {
-            frames,
-            count,
-            left_over: 0,
-            both_ways: false,
-            first_backward: false,
-            speed_ratio: 0.0,
-            firing: Firing::Forward,
-        }
+        Volumes { frames, count, ..Volumes::default() }
     }
 
     /// True if the volume with this index was swept backwards.

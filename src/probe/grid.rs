@@ -66,9 +66,7 @@ impl Geometry {
             Geometry::Cartesian(grid) => grid.size[2],
         }
     }
-}
 
-impl Geometry {
     /// True if the two geometries differ at most in the motor's travel during a frame ([`Advance`]), which leaves line 0 of each slice where it is.
     pub fn equals_except_advance(&self, other: &Geometry) -> bool {
         match (self, other) {

@@ -23,4 +23,4 @@ pub use geometry::{Advance, Array, Firing, GeometryError, Indices, Motion, Probe
 pub use grid::{Geometry, Grid};
 pub use rigid::Rigid;
 pub use samples::{SampleType, StoredType};
-pub use world::{AxisOrder, DepthAxis, World, is_rigid};
+pub use world::{AxisOrder, DepthAxis, World, is_rigid, is_rotation};

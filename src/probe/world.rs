@@ -9,6 +9,8 @@ use glam::{DAffine3, DMat3, DMat4, DVec3};
 
 /// Largest cosine of the angle between two axes that counts as perpendicular: 0.06 degrees, as files round their matrices.
 const MAX_COSINE: f64 = 1e-3;
+/// Names of the axes of a stored volume.
+const AXES: [&str; 3] = ["x", "y", "z"];
 /// Letters of the directions of the world: along x, y and z, and against them.
 const LETTERS: [[&str; 2]; 3] = [["left", "right"], ["posterior", "anterior"], ["superior", "inferior"]];
 
@@ -143,13 +145,16 @@ const RIGID_TOLERANCE: f64 = 1e-3;
 /// Farthest place of a pose, mm.
 const MAX_DISTANCE: f64 = 1e6;
 
-/// True if the map is a rotation (its axes are perpendicular to within 0.06 degrees and have length 1 to within 0.05 %) and a translation of at most
-/// 1 km along each axis.
+/// True if the matrix is a rotation: its axes are perpendicular to within 0.06 degrees and have length 1 to within 0.05 %.
+pub fn is_rotation(turn: &DMat3) -> bool {
+    let off = (turn.transpose() * *turn - DMat3::IDENTITY).to_cols_array();
+    turn.determinant() > 0.0 && off.iter().all(|v| v.abs() <= RIGID_TOLERANCE)
+}
+
+/// True if the map is a rotation ([`is_rotation`]) and a translation of at most 1 km along each axis.
 pub fn is_rigid(pose: &DAffine3) -> bool {
-    let turn = pose.matrix3;
-    let off = (turn.transpose() * turn - DMat3::IDENTITY).to_cols_array();
-    let is_turn = turn.determinant() > 0.0 && off.iter().all(|v| v.abs() <= RIGID_TOLERANCE);
-    is_turn && pose.translation.is_finite() && pose.translation.abs().max_element() <= MAX_DISTANCE
+    let shift = pose.translation;
+    is_rotation(&pose.matrix3) && shift.is_finite() && shift.abs().max_element() <= MAX_DISTANCE
 }
 
 /// Voxel indices to the drawn space of a grid, mm.
@@ -181,7 +186,7 @@ pub struct DepthAxis {
 impl std::fmt::Display for DepthAxis {
     fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
         let sign = if self.reversed { "-" } else { "" };
-        write!(f, "{sign}{}", ["x", "y", "z"][self.axis.min(2)])
+        write!(f, "{sign}{}", AXES[self.axis.min(2)])
     }
 }
 
@@ -189,14 +194,11 @@ impl std::str::FromStr for DepthAxis {
     type Err = String;
 
     fn from_str(text: &str) -> Result<DepthAxis, String> {
-        let (reversed, name) = match text.strip_prefix('-') {
-            Some(rest) => (true, rest),
-            None => (false, text),
-        };
-        match ["x", "y", "z"].iter().position(|axis| name.eq_ignore_ascii_case(axis)) {
-            Some(axis) => Ok(DepthAxis { axis, reversed }),
-            None => Err("must be x, y, z, -x, -y or -z".into()),
-        }
+        let reversed = text.strip_prefix('-');
+        let name = reversed.unwrap_or(text);
+        let axis =
+            AXES.iter().position(|axis| name.eq_ignore_ascii_case(axis)).ok_or("must be x, y, z, -x, -y or -z")?;
+        Ok(DepthAxis { axis, reversed: reversed.is_some() })
     }
 }
 
@@ -225,15 +227,8 @@ impl AxisOrder {
         let letters: Vec<char> = word.chars().chain("A".chars().filter(|_| word.len() == 2)).collect();
         let mut order = AxisOrder { stored: [3; 3], reversed: [false; 3] };
         for (stored, letter) in letters.iter().enumerate() {
-            let (drawn, reversed) = match letter {
-                'M' => (0, false),
-                'U' => (0, true),
-                'F' => (1, false),
-                'N' => (1, true),
-                'A' => (2, false),
-                'D' => (2, true),
-                _ => return None,
-            };
+            // For each drawn axis its two letters, the second of which reverses it.
+            let (drawn, reversed) = "MUFNAD".find(*letter).map(|n| (n / 2, n % 2 == 1))?;
             (order.stored[drawn], order.reversed[drawn]) = (stored, reversed);
         }
         (letters.len() == 3 && order.stored.iter().all(|n| *n < 3)).then_some(order)
@@ -270,7 +265,7 @@ impl AxisOrder {
 
     /// The stored axes in drawn order as text, for example "x, -z, y"; a minus means reversed.
     pub fn names(&self) -> String {
-        let name = |n: usize| format!("{}{}", if self.reversed[n] { "-" } else { "" }, ["x", "y", "z"][self.stored[n]]);
+        let name = |n: usize| DepthAxis { axis: self.stored[n], reversed: self.reversed[n] }.to_string();
         [0, 1, 2].map(name).join(", ")
     }
 

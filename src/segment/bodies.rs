@@ -1,10 +1,9 @@
 //! Bodies that are brighter or darker than what is around them: found by threshold or grown from a seed, counted, and measured.
 
 use crate::distance::distances;
-use crate::field::Field;
-use crate::field::Scale;
+use crate::field::{Field, Scale};
 use crate::labels::Labels;
-use crate::lattice::{self, Region, voxel};
+use crate::lattice::{self, Region, nearest, voxel};
 use crate::probe::{Grid, World};
 use crate::source::convert::Volume;
 use crate::volume::{self, Measured};
@@ -110,16 +109,15 @@ pub fn find(field: &Field, world: World, search: &Search) -> Result<Found, Strin
     let grid = *field.grid();
     let mut labels = Labels::new(grid, world)?;
     let smoothed = field.smoothed(search.smoothing);
-    let seed = search.seed.map(|seed| seed_of(&grid, seed)).transpose()?;
+    let seed_at = |seed| nearest(grid.size, (seed - DVec3::from(grid.origin)) / DVec3::from(grid.spacing));
+    let seed = search.seed.map(|seed| seed_at(seed).ok_or("the seed lies outside the box")).transpose()?;
     let (level, mut bodies) = match search.level {
         Some(level) => (level, bodies_at(&smoothed, &grid, search, seed, level)?),
         None => settled(field, &smoothed, search, seed)?,
     };
     let left_out = bodies.len().saturating_sub(MAX_BODIES);
     bodies.truncate(MAX_BODIES);
-    for (body, label) in bodies.iter().zip(1..=u8::MAX) {
-        body.iter().for_each(|n| labels.voxels_mut()[*n as usize] = label);
-    }
+    bodies.iter().zip(1..=u8::MAX).for_each(|(body, label)| labels.set(body, label));
     let mut measured = Vec::new();
     for (body, label) in bodies.iter().zip(1..=u8::MAX) {
         let shell = volume::measure(field, &labels, label, body, search.smoothing);
@@ -191,8 +189,7 @@ fn classes_at_surface(field: &Field, search: &Search, bodies: &[Vec<u32>]) -> Op
     let gap = 1.5 * search.smoothing + spacing.iter().copied().fold(0.0, f64::max);
     let all: Vec<u32> = bodies.concat();
     let region = Region::around(&all, field.grid(), 3.0 * gap);
-    let mut is_body = vec![false; region.voxels()];
-    all.iter().for_each(|n| is_body[region.own(voxel(*n as usize, size))] = true);
+    let is_body = region.mask(&all, size);
     // Means need not every voxel.
     let every = (region.voxels().div_ceil(MAX_SAMPLES) as f64).cbrt().ceil() as usize;
     let coarse = region.size.map(|count| count.div_ceil(every));
@@ -234,10 +231,10 @@ fn bodies_at(
         Some(seed) => parts.into_iter().filter(|body| body.contains(&(seed as u32))).collect(),
     };
     bodies.sort_by_key(|body| std::cmp::Reverse(body.len()));
-    match (bodies.is_empty(), seed) {
-        (false, _) => Ok(bodies),
-        (true, None) => Err("no body is that large at this threshold".into()),
-        (true, Some(_)) => Err("the seed lies in no body".into()),
+    match seed {
+        _ if !bodies.is_empty() => Ok(bodies),
+        None => Err("no body is that large at this threshold".into()),
+        Some(_) => Err("the seed lies in no body".into()),
     }
 }
 
@@ -256,8 +253,7 @@ fn opened(grid: &Grid, radius: f64, is_in: impl Fn(usize) -> bool + Sync) -> Vec
     drop(depths);
     let dilated = |core: &Vec<u32>| {
         let region = Region::around(core, grid, reach);
-        let mut is_core = vec![false; region.voxels()];
-        core.iter().for_each(|n| is_core[region.own(voxel(*n as usize, size))] = true);
+        let is_core = region.mask(core, size);
         let away = distances(region.size, spacing, reach, |n| is_core[n]);
         let all = region.indices(size).zip(away);
         all.filter(|(n, away)| f64::from(*away) <= radius && is_in(*n)).map(|(n, _)| n as u32).collect()
@@ -291,14 +287,6 @@ fn neighbours(n: usize, size: [usize; 3]) -> impl Iterator<Item = Option<usize>>
     let at = voxel(n, size);
     let steps = [1, size[0], size[0] * size[1]];
     (0..3).flat_map(move |a| [(at[a] > 0).then(|| n - steps[a]), (at[a] + 1 < size[a]).then(|| n + steps[a])])
-}
-
-/// The voxel at a place, mm.
-fn seed_of(grid: &Grid, seed: DVec3) -> Result<usize, String> {
-    let at = ((seed - DVec3::from(grid.origin)) / DVec3::from(grid.spacing)).round();
-    let is_there = (0..3).all(|a| (0.0..grid.size[a] as f64).contains(&at[a]));
-    let [x, y, z] = at.to_array().map(|n| n as usize);
-    is_there.then(|| (z * grid.size[1] + y) * grid.size[0] + x).ok_or_else(|| "the seed lies outside the box".into())
 }
 
 /// The threshold that separates two classes best, and their means (Otsu, A threshold selection method from gray-level histograms, IEEE

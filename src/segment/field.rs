@@ -82,10 +82,11 @@ impl Scale {
     /// The quantity that bodies are searched in, for a sample at `share` (0..=1) of the sample range: the echo itself if linear, otherwise the
     /// amplitude of the echo, in which speckle is weaker than in its power; 0..=1.
     pub fn searched(self, share: f64) -> f64 {
-        match self {
-            Scale::Linear => self.echo(share),
-            Scale::Decibels(_) => self.echo(share).sqrt(),
-        }
+        self.searched_of(self.echo(share))
+    }
+
+    fn searched_of(self, echo: f64) -> f64 {
+        if self == Scale::Linear { echo } else { echo.sqrt() }
     }
 
     /// The share of the sample range, 0..=1, at which the searched quantity has this value (0..=1): the inverse of [`Scale::searched`]. 0 for what
@@ -120,10 +121,7 @@ impl Field {
         let mut slice = vec![0.0; grid.size[0] * grid.size[1]];
         for z in 0..grid.size[2] {
             linear.slice(&grid, z, &mut slice);
-            amplitudes.extend(slice.iter().map(|echo| match scale {
-                Scale::Linear => *echo as f32,
-                Scale::Decibels(_) => echo.sqrt() as f32,
-            }));
+            amplitudes.extend(slice.iter().map(|echo| scale.searched_of(*echo) as f32));
             each();
         }
         Ok(Field { grid, scale, amplitudes })
@@ -155,18 +153,29 @@ impl Field {
     /// The searched quantity at each voxel, smoothed by a Gaussian whose standard deviation is `deviation` mm.
     pub(crate) fn smoothed(&self, deviation: f64) -> Vec<f32> {
         let Grid { size, spacing, .. } = self.grid;
-        let each = size[0] * size[1];
-        let mut smoother = Smoother::new(size, spacing, deviation);
-        let (mut smoothed, mut slice) = (Vec::with_capacity(self.amplitudes.len()), vec![0.0; each]);
-        for z in 0..size[2] {
-            smoother.slice(z, &mut slice, |z, out| {
-                let from = &self.amplitudes[z * each..][..each];
-                out.iter_mut().zip(from).for_each(|(out, value)| *out = f64::from(*value));
-            });
-            smoothed.extend(slice.iter().map(|value| *value as f32));
-        }
-        smoothed
+        smoothed(size, spacing, deviation, |n| f64::from(self.amplitudes[n]), |value| value as f32)
     }
+}
+
+/// The values of the voxels of a lattice (`value`, by the linear index), smoothed by a Gaussian whose standard deviation is `deviation` mm, in the
+/// form in which `kept` keeps them.
+pub(crate) fn smoothed<T>(
+    size: [usize; 3],
+    spacing: [f64; 3],
+    deviation: f64,
+    value: impl Fn(usize) -> f64,
+    kept: impl Fn(f64) -> T,
+) -> Vec<T> {
+    let each = size[0] * size[1];
+    let (mut smoother, mut slice) = (Smoother::new(size, spacing, deviation), vec![0.0; each]);
+    let mut all = Vec::with_capacity(each * size[2]);
+    for z in 0..size[2] {
+        smoother.slice(z, &mut slice, |z, out| {
+            out.iter_mut().enumerate().for_each(|(n, out)| *out = value(z * each + n));
+        });
+        all.extend(slice.iter().map(|value| kept(*value)));
+    }
+    all
 }
 
 /// The same volume with linear echoes.

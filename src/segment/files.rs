@@ -70,10 +70,8 @@ pub fn read(path: &Path, options: OpenOptions) -> Result<(Labels, Vec<Segment>),
     memory::check(count as u64).map_err(|why| fault(format!("take memory: a label volume {why}")))?;
     let mut voxels = Vec::with_capacity(count);
     for _ in 0..grid.size[2] {
-        match recording.next_frame()? {
-            Some(frame) => voxels.extend(frame.bytes),
-            None => break,
-        }
+        let Some(frame) = recording.next_frame()? else { break };
+        voxels.extend(frame.bytes);
     }
     Ok((Labels::of(grid, world, voxels).map_err(fault)?, segments))
 }
@@ -89,10 +87,8 @@ pub fn shown(
     geometry: &Geometry,
     world: Option<World>,
 ) -> Result<LabelVolume, String> {
-    let (colour, to_space) = (
-        |label: u8| segments.iter().find(|segment| segment.label == label).map(|segment| segment.colour),
-        to_space(labels, geometry, world),
-    );
+    let colour = |label: u8| segments.iter().find(|segment| segment.label == label).map(|segment| segment.colour);
+    let to_space = to_space(labels, geometry, world);
     let volume = LabelVolume::new(labels.grid().size, labels.voxels(), to_space, colour)?;
     match volume.overlaps(geometry) {
         true => Ok(volume),

@@ -1,6 +1,6 @@
 //! A label for each voxel of a lattice, and the brush that edits it.
 
-use crate::lattice::{self, Region, voxel};
+use crate::lattice::{self, Region, nearest, voxel};
 use crate::memory;
 use crate::probe::{Grid, World};
 use glam::{DAffine3, DVec3};
@@ -82,10 +82,6 @@ impl Labels {
         &self.voxels
     }
 
-    pub(crate) fn voxels_mut(&mut self) -> &mut [u8] {
-        &mut self.voxels
-    }
-
     /// Sets the label of the voxels of a stroke; 0 removes it. With `only`, only voxels that have this label are changed. Returns how many
     /// changed.
     pub fn paint(&mut self, brush: &Brush, label: u8, only: Option<u8>) -> usize {
@@ -116,10 +112,8 @@ impl Labels {
             DAffine3::from_scale(DVec3::from(spacing).recip()) * DAffine3::from_translation(-DVec3::from(origin));
         let to_own = to_index * to_place;
         let is_labelled = |n: &usize| {
-            let at = to_own.transform_point3(DVec3::from(voxel(*n, size).map(|i| i as f64))).round();
-            let is_there = (0..3).all(|a| at[a] >= 0.0 && at[a] < own[a] as f64);
-            let [x, y, z] = at.to_array().map(|n| n as usize);
-            is_there && self.voxels[(z * own[1] + y) * own[0] + x] > 0
+            let at = to_own.transform_point3(DVec3::from(voxel(*n, size).map(|i| i as f64)));
+            nearest(own, at).is_some_and(|n| self.voxels[n] > 0)
         };
         (0..size.iter().product()).filter(is_labelled).map(|n| n as u32).collect()
     }

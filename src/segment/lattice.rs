@@ -85,13 +85,10 @@ impl Region {
                 high[axis] = high[axis].max(at[axis]);
             }
         }
-        let mut region = Region { low, size: [0; 3] };
-        for axis in 0..3 {
-            let more = (margin / grid.spacing[axis]).ceil() as usize;
-            region.low[axis] = low[axis].saturating_sub(more);
-            region.size[axis] = (high[axis] + more).min(grid.size[axis] - 1) + 1 - region.low[axis];
-        }
-        region
+        let more = grid.spacing.map(|spacing| (margin / spacing).ceil() as usize);
+        let low = [0, 1, 2].map(|axis| low[axis].saturating_sub(more[axis]));
+        let size = [0, 1, 2].map(|axis| (high[axis] + more[axis]).min(grid.size[axis] - 1) + 1 - low[axis]);
+        Region { low, size }
     }
 
     /// Linear indices in the lattice of the voxels of the box; x is the fastest. `size`: that of the lattice.
@@ -114,11 +111,27 @@ impl Region {
         self.size.iter().product()
     }
 
+    /// For each voxel of the box whether it is one of those with these linear indices in the lattice, which must be in the box. `size`: that of the
+    /// lattice.
+    pub fn mask(&self, voxels: &[u32], size: [usize; 3]) -> Vec<bool> {
+        let mut mask = vec![false; self.voxels()];
+        voxels.iter().for_each(|n| mask[self.own(voxel(*n as usize, size))] = true);
+        mask
+    }
+
     /// Linear index within the box of the voxel with the index `at` in the lattice. It must be in the box.
     pub fn own(&self, at: [usize; 3]) -> usize {
         let [x, y, z] = [0, 1, 2].map(|axis| at[axis] - self.low[axis]);
         (z * self.size[1] + y) * self.size[0] + x
     }
+}
+
+/// The linear index of the voxel that is nearest to a fractional index (x, y, z); None outside of the lattice.
+pub(crate) fn nearest(size: [usize; 3], at: DVec3) -> Option<usize> {
+    let at = at.round();
+    let is_there = (0..3).all(|axis| (0.0..size[axis] as f64).contains(&at[axis]));
+    let [x, y, z] = at.to_array().map(|n| n as usize);
+    is_there.then(|| (z * size[1] + y) * size[0] + x)
 }
 
 /// The index (x, y, z) of the voxel with the linear index `n`.

@@ -14,13 +14,11 @@
 //! that is 10 % larger or smaller.
 
 use crate::distance::distances;
-use crate::field::Field;
+use crate::field::{Field, smoothed};
 use crate::labels::Labels;
 use crate::lattice::{self, Region, voxel};
-use crate::mesh::smooth::Smoother;
-use crate::statistics;
-use crate::statistics::mix;
-use std::collections::HashMap;
+use crate::statistics::{self, mix};
+use std::collections::BTreeMap;
 
 /// Half of the thickness of the shell, in standard deviations of the smoothing that found the surface, and the most, in inner radii.
 const SHELL: f64 = 1.75;
@@ -97,11 +95,11 @@ pub(crate) fn measure(
     let grid = labels.grid();
     let widest = grid.spacing.iter().copied().fold(0.0, f64::max);
     let half = (SHELL * smoothing).max(2.0 * widest);
-    let region = Region::around(body, grid, BAND * half + widest);
+    let reach = BAND * half + widest;
+    let region = Region::around(body, grid, reach);
     let numbers: Vec<u32> = region.indices(grid.size).map(|n| n as u32).collect();
     let is_known = |n: usize| !field.amplitudes()[numbers[n] as usize].is_nan();
     let of = |n: usize| labels.voxels()[numbers[n] as usize];
-    let reach = BAND * half + widest;
     let rounded = rounded(region.size, grid.spacing, ROUNDING * smoothing, |n| of(n) == label);
     // What is inside takes no part of another body.
     let is_in = |n: usize| rounded[n] && (of(n) == label || of(n) == 0);
@@ -132,13 +130,8 @@ pub(crate) fn measure(
             let band = match at {
                 _ if at.abs() < half => 1,
                 _ if at.abs() > BAND * half => continue,
-                _ => {
-                    if at < 0.0 {
-                        0
-                    } else {
-                        2
-                    }
-                }
+                _ if at < 0.0 => 0,
+                _ => 2,
             };
             let edge = PATCH * half;
             let place = voxel(n, region.size);
@@ -152,9 +145,7 @@ pub(crate) fn measure(
     };
     let found = sums(half);
     let each = lattice::voxel_volume(grid);
-    let mut patches: Vec<([u32; 3], Patch)> = found.patches.into_iter().collect();
-    patches.sort_by_key(|(patch, _)| *patch);
-    let patches: Vec<Patch> = patches.into_iter().map(|(_, patch)| patch).collect();
+    let patches: Vec<Patch> = found.patches.into_values().collect();
     let all = total(patches.iter());
     share_of(&all, 0).filter(|share| (0.0..=1.0).contains(share)).ok_or("no step at its surface")?;
     // What the echoes of the shell say beyond the labels: of that the patches differ by speckle alone, not by their shape.
@@ -182,23 +173,17 @@ pub(crate) fn measure(
 /// A set without its small dents and bumps: where a Gaussian of the set is at least a half. Speckle made them, and a shell that followed them would
 /// have more of the bright speckle inside. A set of which nothing is left stays as it is.
 fn rounded(size: [usize; 3], spacing: [f64; 3], deviation: f64, is_in: impl Fn(usize) -> bool + Sync) -> Vec<bool> {
-    let each = size[0] * size[1];
-    let (mut smoother, mut slice) = (Smoother::new(size, spacing, deviation), vec![0.0; each]);
-    let mut rounded = Vec::with_capacity(each * size[2]);
-    for z in 0..size[2] {
-        smoother.slice(z, &mut slice, |z, out| {
-            out.iter_mut().enumerate().for_each(|(n, out)| *out = f64::from(u8::from(is_in(z * each + n))));
-        });
-        rounded.extend(slice.iter().map(|value| *value >= 0.5));
-    }
-    if rounded.contains(&true) { rounded } else { (0..each * size[2]).map(is_in).collect() }
+    let shares = |n: usize| f64::from(u8::from(is_in(n)));
+    let rounded: Vec<bool> = smoothed(size, spacing, deviation, shares, |share| share >= 0.5);
+    if rounded.contains(&true) { rounded } else { (0..rounded.len()).map(is_in).collect() }
 }
 
 /// What is found in a region.
 #[derive(Default)]
 struct Found {
     core: usize,
-    patches: HashMap<[u32; 3], Patch>,
+    /// In their order, so that sums are the same in every run.
+    patches: BTreeMap<[u32; 3], Patch>,
     shell: Vec<u32>,
 }
 
@@ -224,9 +209,9 @@ impl Shell {
         let count = ((self.measured.volume / each).round() as usize).saturating_sub(self.core);
         let mut shell: Vec<u32> = self.shell.clone();
         shell.sort_unstable_by(|a, b| order(*b as usize).total_cmp(&order(*a as usize)));
-        for (n, voxel) in shell.into_iter().enumerate() {
-            labels.voxels_mut()[voxel as usize] = if n < count { label } else { 0 };
-        }
+        let (body, others) = shell.split_at(count.min(shell.len()));
+        labels.set(body, label);
+        labels.set(others, 0);
     }
 }
 

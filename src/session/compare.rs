@@ -82,10 +82,7 @@ pub struct Difference {
 /// # Errors
 /// One line: pictures of different sizes, or the scale cannot be drawn.
 pub fn difference(first: &Picture, second: &Picture) -> Result<Difference, String> {
-    let size = [first.width, first.height];
-    if size != [second.width, second.height] {
-        return Err(format!("a picture of {} x {} is compared with another size", first.width, first.height));
-    }
+    let size = common_size(first, second)?;
     let pairs = first.brightness().into_iter().zip(second.brightness());
     let pairs: Vec<[i32; 2]> = pairs.map(|(a, b)| [a, b].map(i32::from)).collect();
     // What one volume alone holds differs by more than tissue does.
@@ -104,6 +101,14 @@ pub fn difference(first: &Picture, second: &Picture) -> Result<Difference, Strin
     let rms = (squares / off.len().max(1) as f64).sqrt();
     scale(&mut picture, end)?;
     Ok(Difference { picture, end, rms })
+}
+
+fn common_size(first: &Picture, second: &Picture) -> Result<[u32; 2], String> {
+    let size = [first.width, first.height];
+    match size == [second.width, second.height] {
+        true => Ok(size),
+        false => Err(format!("a picture of {} x {} is compared with another size", first.width, first.height)),
+    }
 }
 
 /// The colour of a difference, -1..=1 of the scale.
@@ -157,10 +162,7 @@ impl Drawing for Scale {
 /// # Errors
 /// One line: pictures of different sizes.
 pub fn wipe(first: &Picture, second: &Picture, share: f64) -> Result<Picture, String> {
-    let size = [first.width, first.height];
-    if size != [second.width, second.height] {
-        return Err(format!("a picture of {} x {} is compared with another size", first.width, first.height));
-    }
+    let size = common_size(first, second)?;
     let column = (share.clamp(0.0, 1.0) * f64::from(first.width)).round() as u32;
     let mut picture = second.clone();
     let row = 4 * first.width as usize;

@@ -1,8 +1,7 @@
 //! A volume with fewer samples, for small pictures of it: means of neighbouring samples, lines and frames, in the same sector.
 
 use crate::Frame;
-use crate::probe::StoredType;
-use crate::probe::{Advance, Axis, Geometry, Grid, Probe};
+use crate::probe::{Advance, Axis, Geometry, Grid, Probe, StoredType};
 use rayon::prelude::*;
 use std::sync::Arc;
 

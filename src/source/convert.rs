@@ -1,12 +1,12 @@
 //! Conversion of a sweep to a Cartesian volume file: each voxel is interpolated in the polar frames, trilinearly in sample, line and slice.
 //! In f64 on the CPU, one slice of the result at a time, so that only the sweep itself has to fit into memory.
 
+use super::samples::put;
 use super::segmentation::{self, Segment};
 use super::volume_file::VolumeFile;
 use crate::files::InputError;
 use crate::probe::{Geometry, Grid, Indices, World};
-use crate::{Frame, Source, VolumeFrames};
-use crate::{SampleType, StoredType};
+use crate::{Frame, SampleType, Source, StoredType, VolumeFrames};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::io::{self, Write};
@@ -325,9 +325,7 @@ impl Volume {
         let mask = Target { sample: SampleType::U8, outside: 0.0, capture: None, ..*target };
         write_voxels(&mask, path, |voxel| self.value(target, voxel).map(|_| 1.0), || ())
     }
-}
 
-impl Volume {
     /// Writes a segmentation on the grid of `target`: label 1, "tissue", in voxels with a stored value of at least `threshold`, otherwise 0. It is
     /// DICOM if the file's name ends in `.seg.dcm`, otherwise NRRD. `each` is called once for each slice.
     ///
@@ -395,7 +393,7 @@ fn write_slices(
     for z in 0..grid.size[2] {
         slice.par_chunks_mut(grid.size[0] * sample.bytes()).enumerate().for_each(|(y, row)| {
             for (x, voxel) in row.chunks_exact_mut(sample.bytes()).enumerate() {
-                store(sample, value([x, y, z]).map_or(outside, shown), voxel);
+                put(sample, value([x, y, z]).map_or(outside, shown), voxel);
             }
         });
         file.write_all(&slice)?;
@@ -407,14 +405,4 @@ fn write_slices(
 /// The centre of a voxel, mm.
 pub(super) fn place_of(grid: &Grid, voxel: [usize; 3]) -> DVec3 {
     DVec3::from(grid.origin) + DVec3::from(grid.spacing) * DVec3::from_array(voxel.map(|n| n as f64))
-}
-
-/// Writes a value in the type of the file, rounded to nearest.
-fn store(sample: SampleType, value: f64, voxel: &mut [u8]) {
-    match sample {
-        SampleType::U8 => voxel.copy_from_slice(&[value.round() as u8]),
-        SampleType::U16 => voxel.copy_from_slice(&(value.round() as u16).to_le_bytes()),
-        SampleType::I16 => voxel.copy_from_slice(&(value.round() as i16).to_le_bytes()),
-        SampleType::F32 => voxel.copy_from_slice(&(value as f32).to_le_bytes()),
-    }
 }

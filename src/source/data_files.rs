@@ -189,11 +189,7 @@ fn joined(header: &Path, mut parts: Vec<Pixels>, part_bytes: u64) -> Result<Pixe
         return Ok(only);
     }
     for part in &parts {
-        let most = match part.is_compressed() {
-            true => part.length.saturating_mul(part.encoding.most()).saturating_add(1024),
-            false => part.length,
-        };
-        if most < part_bytes {
+        if part.most_bytes() < part_bytes {
             let fault = format!("cut short, {} bytes cannot hold {part_bytes} bytes of samples", part.length);
             return Err(InputError::new(&part.path, "data", fault));
         }
@@ -316,10 +312,7 @@ impl Reordered {
     fn read(&self) -> io::Result<Arc<[u8]>> {
         let mut stream = self.inner.open(0)?;
         let mut stored = Vec::new();
-        stream.fill(self.bytes, &mut stored)?;
-        if stored.len() as u64 != self.bytes {
-            return Err(io::ErrorKind::UnexpectedEof.into());
-        }
+        stream.fill_whole(self.bytes, &mut stored)?;
         let more = stream.finish()?;
         if more > 0 {
             tracing::warn!(bytes = more, "more samples than the sizes of the header; not read");

@@ -33,13 +33,11 @@ impl Rows for Vec<(String, String)> {
     }
 
     fn add_frame(&mut self, is_sweep: bool, [first, second]: [usize; 2]) {
-        self.add(
-            "frame",
-            match is_sweep {
-                true => format!("{second} lines of {first} samples"),
-                false => format!("{first} x {second} pixels"),
-            },
-        );
+        let text = match is_sweep {
+            true => format!("{second} lines of {first} samples"),
+            false => format!("{first} x {second} pixels"),
+        };
+        self.add("frame", text);
     }
 
     fn add_geometry(&mut self, geometry: &Geometry) {
@@ -94,27 +92,24 @@ pub(super) fn grid(grid: &Grid) -> Vec<(String, String)> {
 
 pub(super) fn probe(probe: &Probe) -> Vec<(String, String)> {
     let mut rows = Vec::new();
-    match probe.array {
-        Array::Curved { radius } => {
-            rows.add("array", format!("curved, radius {} mm", number(radius)));
-            rows.add("scan lines", axis(&probe.lines, "deg", 180.0 / std::f64::consts::PI));
-        }
-        Array::Linear => {
-            rows.add("array", "linear");
-            rows.add("scan lines", axis(&probe.lines, "mm", 1.0));
-        }
-    }
+    let (degrees, mm) = (("deg", 180.0 / std::f64::consts::PI), ("mm", 1.0));
+    let (array, unit) = match probe.array {
+        Array::Curved { radius } => (format!("curved, radius {} mm", number(radius)), degrees),
+        Array::Linear => ("linear".into(), mm),
+    };
+    rows.add("array", array);
+    rows.add("scan lines", axis(&probe.lines, unit));
     let last = probe.start_depth + probe.sample_pitch * (probe.samples.max(1) - 1) as f64;
     let pitch = number(probe.sample_pitch);
     rows.add("depth", format!("{} .. {} mm, {pitch} mm a sample", number(probe.start_depth), number(last)));
     match probe.motion {
         Motion::Fan { wobble_radius } => {
             rows.add("motion", format!("fan about an axis {} mm behind the face", number(wobble_radius)));
-            rows.add("slices", axis(&probe.slices, "deg", 180.0 / std::f64::consts::PI));
+            rows.add("slices", axis(&probe.slices, degrees));
         }
         Motion::Translated => {
             rows.add("motion", "translated");
-            rows.add("slices", axis(&probe.slices, "mm", 1.0));
+            rows.add("slices", axis(&probe.slices, mm));
         }
         Motion::Still { thickness } => rows.add("motion", format!("still, drawn {} mm thick", number(thickness))),
     }
@@ -125,7 +120,8 @@ pub(super) fn probe(probe: &Probe) -> Vec<(String, String)> {
     rows
 }
 
-fn axis(axis: &Axis, unit: &str, scale: f64) -> String {
+/// `unit`: the name of the unit that is shown, and how many of these make one unit of the axis (rad or mm).
+fn axis(axis: &Axis, (unit, scale): (&str, f64)) -> String {
     let [first, last, pitch] = [axis.first(), axis.last(), axis.pitch()].map(|v| number(v * scale));
     let even = if matches!(axis, Axis::Even { .. }) { "" } else { " on average, uneven" };
     match axis.len() {
@@ -138,6 +134,9 @@ pub(super) fn times(times: &BTreeMap<usize, f64>) -> Option<(String, String)> {
     let (first, last) = (times.values().next()?, times.values().next_back()?);
     Some(("time stamps".into(), format!("{} .. {} s, {} of them", number(*first), number(*last), times.len())))
 }
+
+/// What users must know of a file: pairs of title and text. They never contain a field about the patient.
+pub(super) type Remarks = Vec<(String, String)>;
 
 /// Logs a warning about a file, and returns it as a row for users: it says what a user must know before they trust a picture.
 pub(super) fn warned(file: &Path, title: &str, text: String) -> (String, String) {

@@ -1,6 +1,6 @@
 //! Cartesian volumes as they are drawn: the order of their axes, their lattice and their place in the world.
 
-use super::layout::Cartesian;
+use super::layout::{Cartesian, Remarks};
 use crate::files::InputError;
 use crate::probe::file::geometry_error;
 use crate::probe::{AxisOrder, DepthAxis, Grid, World};
@@ -32,7 +32,7 @@ impl Drawn {
         file: &Cartesian,
         depth: Option<DepthAxis>,
         bytes: usize,
-        remarks: &mut Vec<(String, String)>,
+        remarks: &mut Remarks,
     ) -> Result<Drawn, InputError> {
         let (mut world, mut order) = (file.world, file.order);
         let size = order.size(file.size);

@@ -3,8 +3,8 @@
 
 use super::keys::{self, Row};
 use super::layout::Layout;
-use super::packed::InputFile;
-use super::{OpenOptions, dicom, kretz, metaimage, nifti, nrrd, piped_file, plus, recorder, stack};
+use super::packed::{GZIP, InputFile};
+use super::{OpenOptions, dicom, kretz, metaimage, nifti, nrrd, plus, recorder, stack};
 use crate::files::InputError;
 use std::fs::{self, File};
 use std::io::Read;
@@ -15,8 +15,6 @@ pub use super::pictures::ENDINGS as PICTURES;
 
 /// Number of bytes at the start of a file by which its format is recognised.
 pub(super) const START: u64 = 1024;
-/// The mark of a file that is packed as a whole.
-const GZIP: [u8; 2] = [0x1f, 0x8b];
 /// The ending of a file that is packed as a whole.
 const PACKED: &str = "gz";
 
@@ -112,7 +110,7 @@ pub static FORMATS: [Format; 8] = [
         name: "stream of frames",
         endings: &[],
         data: &[],
-        is_one: piped_file::PipedFile::is_one,
+        is_one: |start| start.starts_with(b"{"),
         reads: Reads::Stream,
         keys: Vec::new,
     },

@@ -56,11 +56,8 @@ pub(super) const POSE_BYTES: usize = 96;
 
 /// Decodes a stored pose. None if it is not finite or not rigid.
 pub(super) fn read_pose(bytes: &[u8; POSE_BYTES]) -> Option<DAffine3> {
-    let mut rows = [0.0; 12];
-    for (value, word) in rows.iter_mut().zip(bytes.as_chunks::<8>().0) {
-        *value = f64::from_le_bytes(*word);
-    }
-    let column = |c: usize| DVec3::new(rows[c], rows[4 + c], rows[8 + c]);
+    let words = bytes.as_chunks::<8>().0;
+    let column = |c: usize| DVec3::from([0, 4, 8].map(|row| f64::from_le_bytes(words[row + c])));
     let pose = DAffine3::from_cols(column(0), column(1), column(2), column(3));
     is_rigid(&pose).then_some(pose)
 }
@@ -245,10 +242,8 @@ impl<'a> VolumeFrames<'a> {
     /// # Errors
     /// Data that cannot be read.
     pub fn read(&mut self) -> Result<Option<Frame>, InputError> {
-        self.left = match self.left.checked_sub(1) {
-            Some(left) => left,
-            None => return Ok(None),
-        };
+        let Some(left) = self.left.checked_sub(1) else { return Ok(None) };
+        self.left = left;
         // After an incomplete volume the next frame belongs to another one.
         let next = self.source.next_frame()?;
         let next = next.filter(|frame| *self.number.get_or_insert(frame.volume) == frame.volume);

@@ -1,8 +1,9 @@
 //! The keys of each format: how its reader treats them, and which keys of a file it did not use. A part of docs/formats.md is generated
 //! from the tables.
 
-use super::describe::warned;
-use crate::files::escaped;
+use super::describe::{Remarks, warned};
+use crate::files::{InputError, escaped};
+use crate::tree::Name;
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::Path;
@@ -12,13 +13,16 @@ use std::sync::LazyLock;
 const MAX_NAME: usize = 64;
 const MAX_NAMES: usize = 256;
 
-/// What a key of a file's header describes: a property of the samples, or anything else.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// What a key of a file's header describes: a property of the samples, or anything else. The names are those of docs/formats.md.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Name)]
+#[tree(rename_all = "lowercase")]
 pub enum Aspect {
     /// Sizes, spacings and positions.
     Geometry,
     /// The meaning of the sample values.
+    #[tree(rename = "values")]
     Value,
+    #[tree(rename = "times")]
     Time,
     /// The directions of the axes.
     Orientation,
@@ -29,18 +33,6 @@ pub enum Aspect {
 }
 
 impl Aspect {
-    /// Name of the property in messages and in docs/formats.md.
-    pub fn name(self) -> &'static str {
-        match self {
-            Aspect::Geometry => "geometry",
-            Aspect::Value => "values",
-            Aspect::Time => "times",
-            Aspect::Orientation => "orientation",
-            Aspect::Storage => "storage",
-            Aspect::About => "about",
-        }
-    }
-
     /// True if whoever looks at a picture must know that such a key was not used.
     fn matters(self) -> bool {
         matches!(self, Aspect::Geometry | Aspect::Value | Aspect::Time | Aspect::Orientation)
@@ -218,12 +210,8 @@ impl Stated {
     /// The keys that were not used; call it when everything was read. What a user must know of them is added to `remarks` as warnings.
     ///
     /// # Errors
-    /// Name and fault of a key for which the file has to be refused.
-    pub(super) fn finish(
-        mut self,
-        path: &Path,
-        remarks: &mut Vec<(String, String)>,
-    ) -> Result<Unused, (&'static str, String)> {
+    /// A key for which the file has to be refused.
+    pub(super) fn finish(mut self, path: &Path, remarks: &mut Remarks) -> Result<Unused, InputError> {
         let asked = self.asked.take();
         for key in self.keys.iter().filter(|key| !asked.contains(key.name)) {
             let Some(value) = self.values.get(key.name) else { continue };
@@ -237,32 +225,20 @@ impl Stated {
 /// Treats a key that the file states and no reader used as [`Key::done`] says: adds a warning to `remarks`, refuses the file, or does nothing.
 ///
 /// # Errors
-/// Name and fault of a key for which the file has to be refused.
-pub(super) fn not_used(
-    path: &Path,
-    key: &Key,
-    value: &str,
-    remarks: &mut Vec<(String, String)>,
-) -> Result<(), (&'static str, String)> {
-    match key.done {
+/// The file has to be refused because of this key.
+pub(super) fn not_used(path: &Path, key: &Key, value: &str, remarks: &mut Remarks) -> Result<(), InputError> {
+    let why = match key.done {
         Use::Refused(neutral) if !is_neutral(value, neutral) => {
-            Err((key.name, "is stated and is not read: without it the samples would be read wrong".into()))
+            let fault = "is stated and is not read: without it the samples would be read wrong";
+            return Err(InputError::new(path, key.name, fault));
         }
-        Use::Used if key.aspect.matters() => {
-            warn(path, key, "is stated, but another key comes before it", remarks);
-            Ok(())
-        }
-        Use::Warned(neutral) if !is_neutral(value, neutral) => {
-            warn(path, key, "is stated and is not read", remarks);
-            Ok(())
-        }
-        _ => Ok(()),
-    }
-}
-
-fn warn(path: &Path, key: &Key, why: &str, remarks: &mut Vec<(String, String)>) {
+        Use::Used if key.aspect.matters() => "is stated, but another key comes before it",
+        Use::Warned(neutral) if !is_neutral(value, neutral) => "is stated and is not read",
+        _ => return Ok(()),
+    };
     let text = format!("{} {why}; it concerns {}", key.name, key.aspect.name());
     remarks.push(warned(path, "not used", text));
+    Ok(())
 }
 
 #[cfg(test)]
@@ -277,7 +253,7 @@ mod tests {
         Key::new("Name", Aspect::About, Use::Listed),
     ];
 
-    fn finished(fields: &[(&str, &str)], asked: &[&str]) -> (Result<Vec<String>, &'static str>, usize) {
+    fn finished(fields: &[(&str, &str)], asked: &[&str]) -> (Result<Vec<String>, String>, usize) {
         let mut stated = Stated::new(&KEYS);
         for (name, value) in fields {
             stated.put(name, value).expect("once");
@@ -286,8 +262,8 @@ mod tests {
             stated.get(name);
         }
         let mut remarks = Vec::new();
-        let unused = stated.finish(Path::new("a"), &mut remarks).map(|unused| unused.lines()).map_err(|(name, _)| name);
-        (unused, remarks.len())
+        let unused = stated.finish(Path::new("a"), &mut remarks);
+        (unused.map(|unused| unused.lines()).map_err(|fault| fault.field().into()), remarks.len())
     }
 
     #[test]
@@ -298,7 +274,7 @@ mod tests {
         assert_eq!(finished(&[("Slope", "1.0"), ("Name", "x")], &[]), (lines(&["Name", "Slope"]), 0));
         assert_eq!(finished(&[("Slope", "2")], &[]), (lines(&["Slope"]), 1));
         assert_eq!(finished(&[("SliceHeader", "0")], &[]), (lines(&["SliceHeader"]), 0));
-        assert_eq!(finished(&[("SliceHeader", "8")], &[]), (Err("SliceHeader"), 0));
+        assert_eq!(finished(&[("SliceHeader", "8")], &[]), (Err("SliceHeader".into()), 0));
         assert_eq!(finished(&[("Other", "8")], &[]), (lines(&["Other"]), 0));
     }
 

@@ -2,7 +2,7 @@
 //! FFFF,FFFF. Groups 0110 and 0120 hold the patient's identity: their bytes are skipped, never read.
 
 use super::keys::{Aspect, Key, Unused, Use};
-use super::layout::{Cartesian, Layout, LineOrder, StoredGeometry, extent};
+use super::layout::{Cartesian, Layout, LineOrder, Remarks, StoredGeometry, extent};
 use super::packed::{InputFile, Pixels};
 use super::pixel::{Number, PixelFormat};
 use crate::files::InputError;
@@ -10,7 +10,7 @@ use crate::probe::file::SLAB;
 use crate::probe::{Advance, Array, Axis, AxisOrder, Grid, Motion, Probe, World};
 use std::collections::HashMap;
 use std::f64::consts::FRAC_PI_2;
-use std::io::{self, Read};
+use std::io;
 use std::path::Path;
 
 const MAGIC: &[u8; 16] = b"KRETZFILE 1.0   ";
@@ -100,7 +100,7 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
     if items.no_end {
         remarks.push(("end mark".into(), "FFFF,FFFF is missing; the items before it are whole".into()));
     }
-    let geometry = items.geometry(samples, lines, frames, volumes)?;
+    let geometry = items.geometry([samples, lines, frames], volumes)?;
     let falls = |tag, count| items.table(tag, "angles").map(|table| table.len() == count && is_falling(&table));
     let line_order = if falls(LINE_ANGLES, lines)? { LineOrder::Reversed } else { LineOrder::InOrder };
     let backward = frames > 1 && falls(SWEEP_ANGLES, frames)?;
@@ -125,9 +125,9 @@ impl<'a> Items<'a> {
         };
         let there = file.most_bytes();
         let mut input = file.open().map_err(unreadable)?;
-        let mut magic = [0; 16];
-        let found = fill(&mut input, &mut magic).map_err(unreadable)?;
-        if found < magic.len() || magic != *MAGIC {
+        let mut head = Vec::new();
+        input.fill(MAGIC.len() as u64, &mut head).map_err(unreadable)?;
+        if head != *MAGIC {
             return Err(InputError::new(path, "magic", "is not 'KRETZFILE 1.0   ', the only version that is read"));
         }
         let mut items = Items {
@@ -143,16 +143,15 @@ impl<'a> Items<'a> {
         };
         let mut at = MAGIC.len() as u64;
         for _ in 0..MAX_ITEMS {
-            let mut head = [0; 8];
-            let found = fill(&mut input, &mut head).map_err(unreadable)?;
-            if found == 0 && items.voxels.or(items.sequence).is_some() {
+            head.clear();
+            input.fill(8, &mut head).map_err(unreadable)?;
+            if head.is_empty() && items.voxels.or(items.sequence).is_some() {
                 items.no_end = true;
                 return Ok(items);
             }
-            if found < head.len() {
+            let [g0, g1, e0, e1, l0, l1, l2, l3] = head[..] else {
                 return Err(InputError::new(path, "items", format!("cut short after {there} bytes, before FFFF,FFFF")));
-            }
-            let [g0, g1, e0, e1, l0, l1, l2, l3] = head;
+            };
             let tag = (u16::from_le_bytes([g0, g1]), u16::from_le_bytes([e0, e1]));
             let length = u64::from(u32::from_le_bytes([l0, l1, l2, l3]));
             at += head.len() as u64;
@@ -184,7 +183,7 @@ impl<'a> Items<'a> {
                     return Err(InputError::new(path, name(tag, "item"), why));
                 }
                 let mut bytes = Vec::new();
-                (&mut input).take(length).read_to_end(&mut bytes).map_err(unreadable)?;
+                input.fill(length, &mut bytes).map_err(unreadable)?;
                 unread = length - bytes.len() as u64;
                 items.small.insert(tag, bytes);
             }
@@ -196,7 +195,7 @@ impl<'a> Items<'a> {
 
     /// Offset and length of the voxels, and the number of volumes: all those in time if their bytes are whole volumes of `each` bytes,
     /// otherwise the still one.
-    fn choose(&self, each: u64, remarks: &mut Vec<(String, String)>) -> Result<(u64, u64, usize), InputError> {
+    fn choose(&self, each: u64, remarks: &mut Remarks) -> Result<(u64, u64, usize), InputError> {
         let in_time = self.sequence.filter(|(_, length)| *length >= each && length.is_multiple_of(each));
         match (in_time, self.voxels) {
             (Some((offset, length)), still) => {
@@ -274,20 +273,14 @@ impl<'a> Items<'a> {
         if axis.is_valid() { Ok(axis) } else { self.fault(tag, title, "must rise or fall from each to the next") }
     }
 
-    fn geometry(
-        &self,
-        samples: usize,
-        lines: usize,
-        frames: usize,
-        volumes: usize,
-    ) -> Result<StoredGeometry, InputError> {
+    fn geometry(&self, size: [usize; 3], volumes: usize) -> Result<StoredGeometry, InputError> {
+        let [samples, lines, frames] = size;
         let step = self.number(RADIAL_STEP, "radial step")? * 1e3;
         if !(step > 0.0 && step.is_finite()) {
             return self.fault(RADIAL_STEP, "radial step", format!("is {step} mm, must be above 0"));
         }
         let tables = [SWEEP_ANGLES, LINE_ANGLES].map(|tag| self.small.get(&tag).is_some_and(|b| !b.is_empty()));
         if tables == [false, false] {
-            let size = [samples, lines, frames];
             let world = World::of(&Grid { size, spacing: [step; 3], origin: [0.0; 3] });
             return Ok(StoredGeometry::Cartesian(Cartesian { size, volumes, world, order: AxisOrder::STORED }));
         }
@@ -320,18 +313,4 @@ fn is_falling(table: &[f64]) -> bool {
 
 fn name((group, element): Tag, title: &str) -> String {
     format!("{group:04X},{element:04X} ({title})")
-}
-
-/// Fills the buffer as far as the file goes; the number of its bytes.
-fn fill(input: &mut impl Read, buffer: &mut [u8]) -> io::Result<usize> {
-    let mut found = 0;
-    while found < buffer.len() {
-        match input.read(&mut buffer[found..]) {
-            Ok(0) => break,
-            Ok(more) => found += more,
-            Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
-            Err(e) => return Err(e),
-        }
-    }
-    Ok(found)
 }

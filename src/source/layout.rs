@@ -1,6 +1,6 @@
 //! The layout of a recorded file: what a reader finds out before any sample is read.
 
-pub(super) use super::describe::warned;
+pub(super) use super::describe::{Remarks, warned};
 use super::keys::Unused;
 use super::packed::Pixels;
 use super::pixel::PixelFormat;
@@ -12,6 +12,8 @@ use std::path::Path;
 
 /// Most samples, lines or frames.
 const MAX_EXTENT: u64 = 65_536;
+/// Most frames of all volumes.
+const MAX_FRAMES: usize = 1 << 20;
 /// Largest frame, bytes.
 const MAX_FRAME_BYTES: u64 = 1 << 30;
 
@@ -37,8 +39,7 @@ pub(super) struct Layout {
     pub times: BTreeMap<usize, f64>,
     /// True if the file says that its samples are of the phantom.
     pub synthetic: bool,
-    /// Remarks for users: pairs of title and text. They never contain a field about the patient.
-    pub remarks: Vec<(String, String)>,
+    pub remarks: Remarks,
     /// Names of keys that the file states and that were not used.
     pub unused: Unused,
 }
@@ -117,18 +118,29 @@ impl Layout {
         if self.frame_bytes() > MAX_FRAME_BYTES {
             return fault(size_field, format!("one frame has {} bytes, at most 1 GiB is read", self.frame_bytes()));
         }
-        // Cannot overflow: at most 2^16 frames of at most 2^30 bytes.
+        // Cannot overflow: at most 2^32 frames of at most 2^30 bytes.
         let claimed = self.frame_bytes() * self.frames as u64;
         let there = self.pixels.length;
-        if !self.pixels.is_compressed() && claimed > there {
-            return fault("data", format!("cut short, {there} of {claimed} bytes are there"));
+        match (claimed > self.pixels.most_bytes(), self.pixels.is_compressed()) {
+            (false, _) => Ok(()),
+            (true, false) => fault("data", format!("cut short, {there} of {claimed} bytes are there")),
+            (true, true) => {
+                fault("data", format!("{there} compressed bytes cannot hold the {claimed} bytes of {size_field}"))
+            }
         }
-        let most = there.saturating_mul(self.pixels.encoding.most()).saturating_add(1024);
-        if self.pixels.is_compressed() && claimed > most {
-            return fault("data", format!("{there} compressed bytes cannot hold the {claimed} bytes of {size_field}"));
-        }
-        Ok(())
     }
+}
+
+/// The number of frames of all volumes of a file. `make`: the verb of `field` in the message.
+///
+/// # Errors
+/// One line: there are too many.
+pub(super) fn frames(file: &Path, field: &str, make: &str, slices: usize, volumes: usize) -> Result<usize, InputError> {
+    let frames = slices.saturating_mul(volumes);
+    if frames > MAX_FRAMES {
+        return Err(InputError::new(file, field, format!("{make} {frames} frames, at most {MAX_FRAMES} are read")));
+    }
+    Ok(frames)
 }
 
 /// Checks that a number of samples, lines or frames is within its range. `which`: words before it in messages.

@@ -7,6 +7,15 @@
 
 #![forbid(unsafe_code)]
 
+/// Methods of a trait that do nothing but call the same method of another value.
+macro_rules! passed_on {
+    ($self:ident to $to:expr; $($name:ident($($given:ident: $kind:ty)?) -> $result:ty;)+) => {
+        $(fn $name(&$self $(, $given: $kind)?) -> $result {
+            $to.$name($($given)?)
+        })+
+    };
+}
+
 pub mod cardiac;
 pub mod coarse;
 pub mod convert;

@@ -2,6 +2,7 @@
 
 use super::frame::{Frame, Header, Source};
 use super::freehand::CompoundingOptions;
+use crate::files::InputError;
 use glam::DAffine3;
 use std::time::{Duration, Instant};
 
@@ -99,7 +100,8 @@ pub struct PlaybackSource {
     lasted: f64,
     /// When the next round begins, at the earliest.
     resumes: Option<Instant>,
-    header: Option<Header>,
+    /// The header was passed on.
+    is_begun: bool,
     /// Of all frames without one of their own.
     pose: Option<DAffine3>,
     /// A frame that is not due yet, and when it is.
@@ -121,7 +123,7 @@ impl PlaybackSource {
             playing: None,
             lasted: 0.0,
             resumes: None,
-            header: None,
+            is_begun: false,
             pose: None,
             waiting: None,
             frames: 0,
@@ -129,26 +131,22 @@ impl PlaybackSource {
     }
 
     /// The next frame, and when it is due.
-    fn read(&mut self) -> Result<Option<(Instant, Frame)>, String> {
-        let mut frame = match self.source.next_frame().map_err(|e| e.to_string())? {
-            Some(frame) => frame,
-            None => {
-                self.round += 1;
-                if self.round >= self.rounds || self.frames == 0 {
-                    return Ok(None);
-                }
-                // The time stamps begin again. The last volume lasts as long as the one before it: nothing states its end.
-                self.begun = None;
-                let lasted = Duration::try_from_secs_f64(self.lasted).unwrap_or_default();
-                self.resumes = self.playing.take().map(|(_, due, _)| due + lasted);
-                self.base = self.highest.wrapping_add(1);
-                self.source.skip_to_volume(0).map_err(|e| e.to_string())?;
-                match self.source.next_frame().map_err(|e| e.to_string())? {
-                    Some(frame) => frame,
-                    None => return Ok(None),
-                }
+    fn read(&mut self) -> Result<Option<(Instant, Frame)>, InputError> {
+        let mut next = self.source.next_frame()?;
+        if next.is_none() {
+            self.round += 1;
+            if self.round >= self.rounds || self.frames == 0 {
+                return Ok(None);
             }
-        };
+            // The time stamps begin again. The last volume lasts as long as the one before it: nothing states its end.
+            self.begun = None;
+            let lasted = Duration::try_from_secs_f64(self.lasted).unwrap_or_default();
+            self.resumes = self.playing.take().map(|(_, due, _)| due + lasted);
+            self.base = self.highest.wrapping_add(1);
+            self.source.skip_to_volume(0)?;
+            next = self.source.next_frame()?;
+        }
+        let Some(mut frame) = next else { return Ok(None) };
         frame.volume = frame.volume.wrapping_add(self.base);
         frame.pose = frame.pose.or(self.pose);
         self.highest = frame.volume;
@@ -180,17 +178,15 @@ const MAX_SPAN: f64 = 864_000.0;
 
 impl Live for PlaybackSource {
     fn next(&mut self, patience: Duration) -> Event {
-        if self.header.is_none() {
-            let header = self.source.header();
+        if !std::mem::replace(&mut self.is_begun, true) {
             self.pose = self.source.pose();
-            self.header = Some(header.clone());
-            return Event::Begin(Box::new(header));
+            return Event::Begin(Box::new(self.source.header()));
         }
         if self.waiting.is_none() {
             match self.read() {
                 Ok(Some(next)) => self.waiting = Some(next),
                 Ok(None) => return Event::End(None),
-                Err(fault) => return Event::End(Some(fault)),
+                Err(fault) => return Event::End(Some(fault.to_string())),
             }
         }
         let Some((due, frame)) = self.waiting.take() else { return Event::Idle };

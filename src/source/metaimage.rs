@@ -3,10 +3,10 @@
 use super::data_files::{self, Pattern};
 use super::frame::DEMO_DATA;
 use super::keys::{Aspect, Keys, Stated, Use, keys};
-use super::layout::{Layout, StoredGeometry, extent, warned};
-use super::packed::{Encoding, InputFile, Pixels};
+use super::layout::{Layout, Remarks, StoredGeometry, extent, frames, warned};
+use super::packed::{Encoding, GZIP, InputFile, Pixels};
 use super::pixel::{Number, PixelFormat};
-use super::plus::{PlusFrames, PlusWords};
+use super::plus::{PlusFrames, PlusWords, spread};
 use super::sequence::COMMENT;
 use super::units::millimetres;
 use crate::files::{InputError, quoted};
@@ -15,12 +15,6 @@ use crate::probe::{Advance, Array, Axis, Motion, Probe, World};
 use glam::DVec3;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
-
-/// Pairs of title and text.
-type Remarks = Vec<(String, String)>;
-
-/// Most frames of all volumes.
-const MAX_FRAMES: u64 = 1 << 20;
 
 /// File name endings: `mha` for header and samples in one file, `mhd` for a header with its samples in another file.
 pub(super) const ENDINGS: [&str; 2] = ["mha", "mhd"];
@@ -56,16 +50,11 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
         return header.fault("ElementType", format!("{} is not read, only {names} are", quoted(word)));
     };
     let mut remarks = Vec::new();
-    let mut pixel = PixelFormat { number: *number, channels: 1, big_endian: false, scale: None };
+    let mut pixel = PixelFormat::grey(*number);
     pixel.big_endian = is_big_endian(&header, pixel.bytes(), &mut remarks)?;
     pixel.channels = channels;
-    let Dimensions { size, volumes } = dimensions(path, &header)?;
-    let [width, height, depth] = size;
-    let frames = depth as u64 * volumes as u64;
-    if frames > MAX_FRAMES {
-        return header.fault("DimSize", format!("makes {frames} frames, at most {MAX_FRAMES} are read"));
-    }
-    let frames = frames as usize;
+    let ([width, height, depth], volumes) = dimensions(path, &header)?;
+    let frames = frames(path, "DimSize", "makes", depth, volumes)?;
     let is_sequence = is_sequence(&header, &mut remarks)?;
     let world = world(&header, &mut remarks)?;
     let words = PlusWords {
@@ -98,18 +87,16 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
     if let Some(orientation) = words.orientation.1 {
         remarks.push(("orientation".into(), quoted(orientation)));
     }
-    let times = header.frames.times(if header.dimensions() < 4 { 1 } else { depth }, frames);
-    let poses = header.frames.poses(path, if header.dimensions() < 4 { 1 } else { depth }, &mut remarks);
+    let of_volume = if header.dimensions() < 4 { 1 } else { depth };
+    let times = spread(&header.frames.times, of_volume, frames);
+    let poses = header.frames.poses(path, of_volume, &mut remarks);
     let pixels = file.pixels(header.length);
     let stated = Layout::new(format, pixel, [width, height], frames, pixels, geometry);
     let (line_order, synthetic) = (lines, header.synthetic);
     let mut layout = Layout { line_order, volumes, states_geometry, poses, times, synthetic, remarks, ..stated };
     find_pixels(file, &header, &mut layout)?;
     layout.check(path, "DimSize")?;
-    layout.unused = header
-        .stated
-        .finish(path, &mut layout.remarks)
-        .map_err(|(field, fault)| InputError::new(path, field, fault))?;
+    layout.unused = header.stated.finish(path, &mut layout.remarks)?;
     Ok(layout)
 }
 
@@ -123,14 +110,8 @@ fn is_big_endian(header: &Header, bytes: usize, remarks: &mut Remarks) -> Result
     Ok(stated.unwrap_or(false))
 }
 
-/// Voxels of a volume, and the number of volumes.
-struct Dimensions {
-    size: [usize; 3],
-    volumes: usize,
-}
-
-/// Two to four dimensions; the fourth is volumes one after another.
-fn dimensions(path: &Path, header: &Header) -> Result<Dimensions, InputError> {
+/// Voxels of a volume, and the number of volumes: two to four dimensions; the fourth is volumes one after another.
+fn dimensions(path: &Path, header: &Header) -> Result<([usize; 3], usize), InputError> {
     let count = match header.integer("NDims")? {
         Some(count @ (2..=4)) => count as usize,
         Some(other) => return header.fault("NDims", format!("is {other}, must be 2 to 4")),
@@ -148,7 +129,7 @@ fn dimensions(path: &Path, header: &Header) -> Result<Dimensions, InputError> {
         all[i] = extent(path, "DimSize", &which(i, count), value)?;
     }
     let [x, y, z, volumes] = all;
-    Ok(Dimensions { size: [x, y, z], volumes })
+    Ok(([x, y, z], volumes))
 }
 
 /// Whether the last axis is time. `Kinds = domain domain list` alone does not say so of pictures: the PLUS toolkit writes it into its
@@ -352,7 +333,7 @@ fn deflated(pixels: &Pixels) -> Result<Encoding, InputError> {
         .open(0)
         .and_then(|mut data| data.fill(2, &mut start))
         .map_err(|e| InputError::unreadable(&pixels.path, &e))?;
-    Ok(if start == [0x1f, 0x8b] { Encoding::Gzip } else { Encoding::Zlib })
+    Ok(if start == GZIP { Encoding::Gzip } else { Encoding::Zlib })
 }
 
 /// Longest header, bytes and lines: those of tracked sequences have some ten lines for every frame.
@@ -523,14 +504,11 @@ impl<'a> Header<'a> {
         if words.len() != count {
             return self.fault(field, format!("has {} entries, must have {count}", words.len()));
         }
-        let mut numbers = Vec::new();
-        for (i, word) in words.iter().enumerate() {
-            match word.parse::<f64>() {
-                Ok(number) if number.is_finite() => numbers.push(number),
-                _ => return self.fault(field, format!("{}{} is not a finite number", which(i, count), quoted(word))),
-            }
-        }
-        Ok(numbers)
+        let number = |(i, word): (usize, &&str)| match word.parse::<f64>() {
+            Ok(number) if number.is_finite() => Ok(number),
+            _ => self.fault(field, format!("{}{} is not a finite number", which(i, count), quoted(word))),
+        };
+        words.iter().enumerate().map(number).collect()
     }
 
     /// One number above 0, or at least 0.

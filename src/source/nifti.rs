@@ -2,7 +2,7 @@
 //! becomes LPS.
 
 use super::keys::{Aspect, Keys, Unused, Use, keys, not_used};
-use super::layout::{Cartesian, Layout, StoredGeometry, extent, warned};
+use super::layout::{Cartesian, Layout, Remarks, StoredGeometry, extent, frames, warned};
 use super::packed::{Encoding, InputFile, Pixels};
 use super::pixel::{Number, PixelFormat};
 use crate::files::InputError;
@@ -15,8 +15,6 @@ use std::io::Read;
 /// Sizes of the two headers, bytes.
 const SIZE_1: usize = 348;
 const SIZE_2: usize = 540;
-/// Most frames of all volumes.
-const MAX_FRAMES: u64 = 1 << 20;
 /// From RAS to LPS.
 const TO_LPS: DVec3 = DVec3::new(-1.0, -1.0, 1.0);
 
@@ -150,10 +148,7 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
         return fault("header", format!("cut short, {} of {needed} bytes are there", header.bytes.len()));
     }
     let (size, volumes) = sizes(file, &header)?;
-    let frames = size[2] as u64 * volumes as u64;
-    if frames > MAX_FRAMES {
-        return fault("dim", format!("makes {frames} frames, at most {MAX_FRAMES} are read"));
-    }
+    let frames = frames(path, "dim", "makes", size[2], volumes)?;
     let (number, channels) = match header.integer((70, 2), (12, 2)) {
         2 => (Number::U8, 1),
         4 => (Number::I16, 1),
@@ -183,11 +178,11 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
     let world = world(file, &header, &mut remarks)?;
     let format = if version == 1 { "NIfTI-1" } else { "NIfTI-2" };
     let geometry = StoredGeometry::Cartesian(Cartesian { size, volumes, world, order: AxisOrder::STORED });
-    let stated = Layout::new(format, pixel, [size[0], size[1]], frames as usize, pixels(file, &header)?, geometry);
+    let stated = Layout::new(format, pixel, [size[0], size[1]], frames, pixels(file, &header)?, geometry);
     let times = times(file, &header, size[2], volumes, &mut remarks);
     let unused = unused(file, &header, &mut remarks);
     let mut layout = Layout { times, unused, remarks, ..stated };
-    let claimed = layout.frame_bytes() * frames;
+    let claimed = layout.frame_bytes() * frames as u64;
     if !layout.pixels.is_compressed() && layout.pixels.length > claimed {
         let more = layout.pixels.length - claimed;
         layout.remarks.push(("more data".into(), format!("{more} bytes behind the samples; not read")));
@@ -198,7 +193,7 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
 }
 
 /// The fields that are not 0 and not read.
-fn unused(file: &InputFile, header: &Bytes, remarks: &mut Vec<(String, String)>) -> Unused {
+fn unused(file: &InputFile, header: &Bytes, remarks: &mut Remarks) -> Unused {
     let mut unused = Unused::default();
     for (name, one, two) in NOT_READ {
         let Some((at, length)) = (if header.version == 1 { one } else { two }) else { continue };
@@ -262,7 +257,7 @@ fn pixels(file: &InputFile, header: &Bytes) -> Result<Pixels, InputError> {
 }
 
 /// The world: that of the sform, otherwise of the qform, otherwise the spacing alone.
-fn world(file: &InputFile, header: &Bytes, remarks: &mut Vec<(String, String)>) -> Result<World, InputError> {
+fn world(file: &InputFile, header: &Bytes, remarks: &mut Remarks) -> Result<World, InputError> {
     let unit = match header.integer((123, 1), (500, 4)) & 7 {
         0 => {
             remarks.push(("units".into(), "not stated, taken as mm".into()));
@@ -290,12 +285,7 @@ fn world(file: &InputFile, header: &Bytes, remarks: &mut Vec<(String, String)>) 
         let origin = DVec3::from([0, 1, 2].map(|n| header.real(268, 376, n))) * TO_LPS;
         let rotation = quaternion(b, c, d);
         let hand = if header.pixdim(0) < 0.0 { -1.0 } else { 1.0 };
-        let axes = [
-            rotation.x_axis * TO_LPS * spacing[0],
-            rotation.y_axis * TO_LPS * spacing[1],
-            rotation.z_axis * TO_LPS * spacing[2] * hand,
-        ];
-        made(axes, origin)
+        made([0, 1, 2].map(|n| rotation.col(n) * TO_LPS * spacing[n] * [1.0, 1.0, hand][n]), origin)
     };
     if has_sform {
         let column = |n: usize| {
@@ -346,7 +336,7 @@ fn times(
     header: &Bytes,
     slices: usize,
     volumes: usize,
-    remarks: &mut Vec<(String, String)>,
+    remarks: &mut Remarks,
 ) -> BTreeMap<usize, f64> {
     let (step, first) = (header.pixdim(4), header.real(136, 216, 0));
     if volumes < 2 || !(step > 0.0 && step.is_finite() && first.is_finite()) {

@@ -15,7 +15,8 @@ use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-const GZIP: [u8; 2] = [0x1f, 0x8b];
+/// The mark of a file that is packed as a whole, and of each member of one.
+pub(super) const GZIP: [u8; 2] = [0x1f, 0x8b];
 
 /// How the samples of a file are compressed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,36 +32,34 @@ pub(super) enum Encoding {
 }
 
 impl Encoding {
-    /// Name of the compression for users; "none" without one.
-    pub fn name(self) -> &'static str {
+    /// Name of the compression for users, and its largest ratio.
+    ///
+    /// Deflate: 258 bytes from two bits, so 1032 (zlib, "technical details"). Bzip2: a block of 900 kB holds runs of 259 bytes in 5, 46 MB from about 40
+    /// bytes. PNG: that of deflate, whose bits may be pixels of 3 bytes. RLE: 128 bytes from 2. JPEG: one bit for a block of 64 pixels; with shared
+    /// colours 6 bits for 256 pixels of 3 bytes. Lossless JPEG: one bit for a number of 2 bytes. JPEG 2000 has no limit, as a few bytes can state that a
+    /// whole picture is 0; a ratio is refused that real data do not reach.
+    fn about(self) -> (&'static str, u64) {
         match self {
-            Encoding::Raw | Encoding::Dicom(Coding::Native) => "none",
-            Encoding::Zlib => "zlib",
-            Encoding::Gzip => "gzip",
-            Encoding::Bzip2 => "bzip2",
-            Encoding::Pictures => "that of the pictures",
-            Encoding::Dicom(Coding::Rle) => "RLE",
-            Encoding::Dicom(Coding::Jpeg) => "JPEG",
-            Encoding::Dicom(Coding::JpegLossless) => "lossless JPEG",
-            Encoding::Dicom(Coding::Jpeg2000) => "JPEG 2000",
+            Encoding::Raw | Encoding::Dicom(Coding::Native) => ("none", 1),
+            Encoding::Zlib => ("zlib", 1032),
+            Encoding::Gzip => ("gzip", 1032),
+            Encoding::Bzip2 => ("bzip2", 1_200_000),
+            Encoding::Pictures => ("that of the pictures", 1032 * 24),
+            Encoding::Dicom(Coding::Rle) => ("RLE", 64),
+            Encoding::Dicom(Coding::Jpeg) => ("JPEG", 1024),
+            Encoding::Dicom(Coding::JpegLossless) => ("lossless JPEG", 16),
+            Encoding::Dicom(Coding::Jpeg2000) => ("JPEG 2000", 1032 * 24),
         }
     }
 
-    /// Largest ratio of decompressed to compressed bytes that is accepted. Deflate: 258 bytes from two bits, so 1032 (zlib, "technical
-    /// details"). Bzip2: a block of 900 kB holds runs of 259 bytes in 5, 46 MB from about 40 bytes. PNG: that of deflate, whose bits may be
-    /// pixels of 3 bytes. RLE: 128 bytes from 2. JPEG: one bit for a block of 64 pixels; with shared colours 6 bits for 256 pixels of 3 bytes.
-    /// Lossless JPEG: one bit for a number of 2 bytes. JPEG 2000 has no limit, as a few bytes can state that a whole picture is 0; a ratio is
-    /// refused that real data do not reach.
+    /// Name of the compression for users; "none" without one.
+    pub fn name(self) -> &'static str {
+        self.about().0
+    }
+
+    /// Largest ratio of decompressed to compressed bytes that is accepted.
     pub fn most(self) -> u64 {
-        match self {
-            Encoding::Raw | Encoding::Dicom(Coding::Native) => 1,
-            Encoding::Dicom(Coding::Rle) => 64,
-            Encoding::Dicom(Coding::Jpeg) => 1024,
-            Encoding::Dicom(Coding::JpegLossless) => 16,
-            Encoding::Zlib | Encoding::Gzip => 1032,
-            Encoding::Bzip2 => 1_200_000,
-            Encoding::Pictures | Encoding::Dicom(Coding::Jpeg2000) => 1032 * 24,
-        }
+        self.about().1
     }
 }
 
@@ -125,10 +124,9 @@ impl<'a> InputFile<'a> {
 
     /// Upper limit of the number of bytes that the file can have unpacked.
     pub(crate) fn most_bytes(&self) -> u64 {
-        match (self.part, self.packed) {
-            (Some((_, length)), _) => length,
-            (None, true) => self.bytes.saturating_mul(Encoding::Gzip.most()).saturating_add(1024),
-            (None, false) => self.bytes,
+        match self.part {
+            Some((_, length)) => length,
+            None => self.pixels(0).most_bytes(),
         }
     }
 
@@ -176,6 +174,24 @@ impl Pixels {
     /// All files that the samples are read from, after the path that the user named.
     pub(super) fn files(&self) -> Vec<PathBuf> {
         [self.path.clone()].into_iter().chain(self.gathered.iter().flat_map(|gathered| gathered.files())).collect()
+    }
+
+    /// Upper limit of the number of bytes that the samples can have decompressed.
+    pub(crate) fn most_bytes(&self) -> u64 {
+        match self.is_compressed() {
+            true => self.length.saturating_mul(self.encoding.most()).saturating_add(1024),
+            false => self.length,
+        }
+    }
+
+    /// Makes the samples begin so many bytes later: decompressed ones, if they are compressed.
+    pub(crate) fn leave_out(&mut self, bytes: u64) {
+        if self.is_compressed() {
+            self.inside = self.inside.saturating_add(bytes);
+            return;
+        }
+        let bytes = bytes.min(self.length);
+        (self.offset, self.length) = (self.offset + bytes, self.length - bytes);
     }
 
     /// True unless the encoding is [`Encoding::Raw`]: pictures and frames of DICOM count as compressed, also where they are not.
@@ -226,11 +242,17 @@ impl PixelStream {
     /// # Errors
     /// The file cannot be read, or is cut short or corrupt.
     pub fn fill(&mut self, bytes: u64, out: &mut Vec<u8>) -> io::Result<()> {
-        match self {
-            PixelStream::Raw(file) => file.take(bytes).read_to_end(out)?,
-            PixelStream::Packed(stream) => stream.take(bytes).read_to_end(out)?,
-        };
-        Ok(())
+        self.take(bytes).read_to_end(out).map(drop)
+    }
+
+    /// Appends the next `bytes` bytes to `out`, as [`PixelStream::fill`] does.
+    ///
+    /// # Errors
+    /// The file cannot be read, or is corrupt, or there are fewer bytes.
+    pub(crate) fn fill_whole(&mut self, bytes: u64, out: &mut Vec<u8>) -> io::Result<()> {
+        let before = out.len();
+        self.fill(bytes, out)?;
+        if ((out.len() - before) as u64) < bytes { Err(io::ErrorKind::UnexpectedEof.into()) } else { Ok(()) }
     }
 
     /// Reads a compressed stream to its end, where its checksum is verified. Returns how many decompressed bytes it had left; always 0 for samples

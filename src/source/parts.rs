@@ -76,24 +76,12 @@ impl Live for WholeFrames {
         }
     }
 
-    fn can_wait(&self) -> bool {
-        self.source.can_wait()
-    }
-
-    fn is_recording(&self) -> bool {
-        self.source.is_recording()
-    }
-
-    fn compounding(&self) -> Option<CompoundingOptions> {
-        self.source.compounding()
-    }
-
-    fn left_out(&self) -> u64 {
-        self.source.left_out()
-    }
-
-    fn disconnected(&self) -> Option<String> {
-        self.source.disconnected()
+    passed_on! { self to self.source;
+        can_wait() -> bool;
+        is_recording() -> bool;
+        compounding() -> Option<CompoundingOptions>;
+        left_out() -> u64;
+        disconnected() -> Option<String>;
     }
 }
 

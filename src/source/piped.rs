@@ -28,12 +28,11 @@ use super::freehand::CompoundingOptions;
 use super::live::{Event, Live};
 use super::piped_record::{self, OVERHEAD, Stamps};
 use super::samples::{self, Replaced};
-use crate::Frame;
-use crate::SampleType;
 use crate::files::InputError;
 use crate::probe::{Geometry, Grid, ProbeFile, Volumes};
 use crate::sync::locked;
 use crate::tree::{FromNode, Node};
+use crate::{Frame, SampleType};
 use glam::DAffine3;
 use std::collections::VecDeque;
 use std::io::{self, BufRead, BufReader, Read};
@@ -172,7 +171,7 @@ pub(super) struct Parts<'a> {
 }
 
 fn fault<T>(key: &str, fault: impl AsRef<str>) -> Result<T, InputError> {
-    Err(InputError::new(Path::new(NAME), key, fault))
+    Err(stream_error(key, fault))
 }
 
 impl StreamHeader {
@@ -182,8 +181,7 @@ impl StreamHeader {
     /// The line is not a header, or its frames are too large, without a geometry, or without a range of values. Nothing is allocated for them.
     pub fn parse(line: &[u8], probe: Option<ProbeFile>) -> Result<StreamHeader, InputError> {
         let mut node = Node::parse_json(line).map_err(|e| {
-            let fault = format!("is no line of JSON ({e}); a stream begins as that of tools/pipe_frames.py");
-            InputError::new(Path::new(NAME), "header", fault)
+            stream_error("header", format!("is no line of JSON ({e}); a stream begins as that of tools/pipe_frames.py"))
         })?;
         // Checked before the keys: another version may have other keys.
         match node.at("echolume").map(|version| version.as_u64()) {
@@ -191,7 +189,7 @@ impl StreamHeader {
             Some(_) => return fault("echolume", "must be 1, 2 or 3, the versions that this program reads"),
             None => return fault("header", "has no key \"echolume\": this is no stream of frames"),
         }
-        let keys = Keys::from_node(node).map_err(|e| InputError::new(Path::new(NAME), "header", e.to_string()))?;
+        let keys = Keys::from_node(node).map_err(|e| stream_error("header", e.to_string()))?;
         if keys.posed && keys.version < 2 {
             return fault("posed", "needs version 2: \"echolume\": 2");
         }
@@ -328,8 +326,6 @@ fn geometries(
 
 /// Longest first line, bytes.
 const MAX_HEADER_BYTES: u64 = 64 << 10;
-/// Memory grows with the data, in steps of so many bytes, until one complete part of a frame has arrived.
-const STEP: usize = 1 << 20;
 
 /// Reports the end of the stream when the thread ends, also after a panic.
 struct EndOnExit(Arc<Queue>);
@@ -414,32 +410,30 @@ impl<'a, R: Read> Reader<'a, R> {
         let mut index = 0;
         let mut goes_on = Ok(self.queue.push(begin));
         while let Ok(true) = goes_on {
-            if stream.checked {
-                goes_on = self.checked_frame(&stream, &mut index);
-                continue;
-            }
-            goes_on = self.frame(&stream, index);
-            index += 1;
+            goes_on = match stream.checked {
+                true => self.checked_frame(&stream, &mut index),
+                false => self.frame(&stream, &mut index),
+            };
         }
         let Replaced { not_finite, denormal } = self.replaced;
         if self.replaced != Replaced::default() {
             let what = format!("{NAME}: {not_finite} samples were not finite, {denormal} denormal; they read as 0");
             self.queue.push(Event::Fault(what));
         }
-        goes_on.map(|_| ())
+        goes_on.map(drop)
     }
 
-    /// Reads the next frame, as a whole or in parts. False: there is none, or the receiver was dropped.
-    fn frame(&mut self, stream: &StreamHeader, index: u64) -> Result<bool, InputError> {
-        let (before, mut came, mut head) = (stream.before(), 0, Vec::new());
+    /// Reads the next frame, as a whole or in parts. `next`: the number of frames before it, which increases by 1. False: there is none, or the receiver was dropped.
+    fn frame(&mut self, stream: &StreamHeader, next: &mut u64) -> Result<bool, InputError> {
+        let (index, before, mut came, mut head) = (*next, stream.before(), 0, Vec::new());
+        *next += 1;
         if let Err(error) = self.fill(before, &mut head, &mut came, false) {
             return cut(stream, index, &error, came);
         }
         let Parts { time, pose, .. } = stream.parts(&head, &mut self.stamps)?;
         let pose = self.pose(pose, stream, index);
         let line = (stream.record_bytes() - before) / stream.lines;
-        let mut first = 0;
-        while first < stream.lines {
+        for first in (0..stream.lines).step_by(stream.lines_at_once) {
             let lines = stream.lines_at_once.min(stream.lines - first);
             let mut frame = Frame { pose, ..stream.frame(index, time) };
             if let Err(error) = self.fill(lines * line, &mut frame.bytes, &mut came, true) {
@@ -453,7 +447,6 @@ impl<'a, R: Read> Reader<'a, R> {
             if !self.queue.push(event) {
                 return Ok(false);
             }
-            first += lines;
         }
         Ok(true)
     }
@@ -536,17 +529,12 @@ impl<'a, R: Read> Reader<'a, R> {
         if self.proven {
             bytes.reserve_exact(count);
         }
-        let mut left = count;
-        while left > 0 {
-            let step = left.min(STEP);
-            let before = bytes.len();
-            let read = Read::take(&mut self.input, step as u64).read_to_end(bytes);
-            *came += bytes.len() - before;
-            read?;
-            if bytes.len() - before < step {
-                return Err(io::ErrorKind::UnexpectedEof.into());
-            }
-            left -= step;
+        let before = bytes.len();
+        // Before anything is proven, memory grows with the data that arrive: `count` may come from a false header.
+        let read = Read::take(&mut self.input, count as u64).read_to_end(bytes);
+        *came += bytes.len() - before;
+        if read? < count {
+            return Err(io::ErrorKind::UnexpectedEof.into());
         }
         self.proven |= are_samples;
         Ok(())

@@ -5,11 +5,10 @@ use super::frame::{Header, POSE_BYTES, Source, check_volume, read_pose};
 use super::piped::{StreamHeader, first_line};
 use super::piped_record::{self, BEFORE, Stamps};
 use super::samples;
-use crate::Frame;
 use crate::files::InputError;
 use crate::files::progress::CountedFile;
 use crate::probe::{Geometry, ProbeFile, World};
-use crate::{SampleType, StoredType};
+use crate::{Frame, SampleType, StoredType};
 use glam::DAffine3;
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
@@ -33,11 +32,6 @@ pub(super) struct PipedFile {
 }
 
 impl PipedFile {
-    /// True if a file that begins with these bytes may be a saved stream of frames: the first one is `{`.
-    pub fn is_one(start: &[u8]) -> bool {
-        start.starts_with(b"{")
-    }
-
     /// Opens a file and reads its first line. `probe`: path of the probe file to use instead of the probe in the stream.
     ///
     /// # Errors
@@ -51,16 +45,15 @@ impl PipedFile {
         let start = line.len() as u64 + 1;
         let stream = StreamHeader::parse(&line, probe.map(ProbeFile::read).transpose()?)?;
         let samples = length.saturating_sub(start);
-        let whole = stream.volumes.frames as u64 * frame_bytes(&stream);
+        let whole = (stream.volumes.frames * stream.record_bytes()) as u64;
         if samples < whole {
             let fault = format!("cut short, {samples} of the {whole} bytes of a volume are there");
             return Err(InputError::new(path, "samples", fault));
         }
         let volumes = usize::try_from(samples / whole).unwrap_or(usize::MAX);
-        let probe_file = probe.map(Path::to_path_buf);
         Ok(PipedFile {
             path: path.into(),
-            probe_file,
+            probe_file: probe.map(Path::to_path_buf),
             stream,
             input,
             start,
@@ -91,7 +84,7 @@ impl PipedFile {
     /// Where the first frame of these volumes that has a pose places the lattice.
     fn world_within(&self, volumes: Range<usize>) -> Option<World> {
         let Geometry::Cartesian(grid) = &self.stream.header.forward else { return None };
-        self.first_pose(volumes).and_then(|pose| World::posed(&pose, grid))
+        World::posed(&self.first_pose(volumes)?, grid)
     }
 
     /// The first pose of the frames of these volumes, read without moving the position.
@@ -102,7 +95,7 @@ impl PipedFile {
         let mut file = File::open(&self.path).ok().filter(|_| self.stream.header.posed)?;
         for n in first..end {
             let mut pose = [0; POSE_BYTES];
-            file.seek(SeekFrom::Start(self.start + n * frame_bytes(&self.stream) + before)).ok()?;
+            file.seek(SeekFrom::Start(self.start + n * self.stream.record_bytes() as u64 + before)).ok()?;
             file.read_exact(&mut pose).ok()?;
             if let Some(pose) = read_pose(&pose) {
                 return Some(pose);
@@ -115,15 +108,6 @@ impl PipedFile {
     fn frames(&self) -> u64 {
         self.stream.volumes.frames as u64
     }
-
-    fn read(&mut self, bytes: &mut [u8]) -> Result<(), InputError> {
-        self.input.read_exact(bytes).map_err(|e| InputError::unreadable(&self.path, &e))
-    }
-}
-
-/// Size of a frame with its time stamp and pose, bytes.
-fn frame_bytes(stream: &StreamHeader) -> u64 {
-    stream.record_bytes() as u64
 }
 
 impl Source for PipedFile {
@@ -156,9 +140,8 @@ impl Source for PipedFile {
         check_volume(&self.path, volume, self.volumes)?;
         self.next = volume as u64 * self.frames();
         self.stamps = Stamps::default();
-        let at = self.start + self.next * frame_bytes(&self.stream);
-        self.input.seek(SeekFrom::Start(at)).map_err(|e| InputError::unreadable(&self.path, &e))?;
-        Ok(())
+        let at = self.start + self.next * self.stream.record_bytes() as u64;
+        self.input.seek(SeekFrom::Start(at)).map(drop).map_err(|e| InputError::unreadable(&self.path, &e))
     }
 
     fn next_frame(&mut self) -> Result<Option<Frame>, InputError> {
@@ -167,14 +150,12 @@ impl Source for PipedFile {
         }
         // The file has so many bytes.
         let mut bytes = vec![0; self.stream.record_bytes()];
-        self.read(&mut bytes)?;
-        let content = match self.stream.checked {
-            true => {
-                piped_record::content(&bytes).filter(|(number, _)| *number == self.next).map(|(_, content)| content)
-            }
-            false => Some(&bytes[..]),
+        self.input.read_exact(&mut bytes).map_err(|e| InputError::unreadable(&self.path, &e))?;
+        let found = match self.stream.checked {
+            true => piped_record::content(&bytes),
+            false => Some((self.next, &bytes[..])),
         };
-        let Some(content) = content else {
+        let Some((_, content)) = found.filter(|(number, _)| *number == self.next) else {
             let fault = format!(
                 "frame {} (from 0) is damaged or missing; `echolume stream --source - --record FILE.frames` takes what is intact",
                 self.next

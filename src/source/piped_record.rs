@@ -15,7 +15,8 @@ const MOST_AHEAD: f64 = 86_400.0;
 /// Largest time stamp, s: the year 2286.
 const LATEST: f64 = 1e10;
 
-static CRC: Crc<u32, Table<16>> = Crc::<u32, Table<16>>::new(&CRC_32_ISO_HDLC);
+/// The checksum of frames (ISO-HDLC, zlib's).
+pub(super) static CRC: Crc<u32, Table<16>> = Crc::<u32, Table<16>>::new(&CRC_32_ISO_HDLC);
 
 /// Checks the bytes of one frame. Returns its number, and the bytes of time stamp, pose and samples. None if the marker or the checksum is
 /// wrong.

@@ -1,8 +1,8 @@
 //! Pixels of files: number types, channels and scales, and the conversion to stored samples.
 
-use super::samples::{Replaced, store};
+use super::samples::{Replaced, put, store};
+use crate::SampleType;
 use crate::tree::Name;
-use crate::{SampleType, StoredType};
 
 /// A number type in which files and messages have samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Name)]
@@ -119,8 +119,8 @@ impl PixelFormat {
             let replaced = store(sample, self.big_endian, &mut bytes);
             return (bytes, replaced);
         }
-        let mut stored = Vec::with_capacity(bytes.len() / self.bytes() * sample.bytes());
-        for pixel in bytes.chunks_exact(self.bytes()) {
+        let mut stored = vec![0; bytes.len() / self.bytes() * sample.bytes()];
+        for (pixel, place) in bytes.chunks_exact(self.bytes()).zip(stored.chunks_exact_mut(sample.bytes())) {
             let value = |number: &[u8]| self.number.value(number, self.big_endian);
             let each = pixel.chunks_exact(self.number.bytes());
             let grey = match self.channels {
@@ -128,17 +128,9 @@ impl PixelFormat {
                 _ => each.zip(LUMINANCE).map(|(colour, share)| share * value(colour)).sum(),
             };
             let scaled = self.scale.map_or(grey, |[slope, intercept]| slope * grey + intercept);
-            match sample {
-                SampleType::U8 => stored.push(scaled.round() as u8),
-                SampleType::U16 => stored.extend((scaled.round() as u16).to_le_bytes()),
-                SampleType::I16 => stored.extend((scaled.round() as i16).to_le_bytes()),
-                SampleType::F32 => stored.extend((scaled as f32).to_le_bytes()),
-            }
+            put(sample, scaled, place);
         }
-        let replaced = match sample.stored() {
-            StoredType::U8 => Replaced::default(),
-            _ => store(sample, false, &mut stored),
-        };
+        let replaced = store(sample, false, &mut stored);
         (stored, replaced)
     }
 }

@@ -3,15 +3,12 @@
 
 use super::describe::number;
 use super::keys::{Aspect, Key, Use};
-use super::layout::{Cartesian, LineOrder, StoredGeometry, warned};
+use super::layout::{Cartesian, LineOrder, Remarks, StoredGeometry, warned};
 use super::transforms::{Poses, TransformName, matrix};
 use crate::files::{InputError, quoted};
 use crate::probe::{AxisOrder, World};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
-
-/// Pairs of title and text.
-type Remarks = Vec<(String, String)>;
 
 /// The keys of the frames of a PLUS sequence, in MetaImage and in NRRD, and how they are treated.
 pub(super) static FRAME_KEYS: [Key; 8] = [
@@ -103,12 +100,6 @@ impl PlusFrames {
         poses
     }
 
-    /// Time stamp of each frame of the file, s, by index. `slices`: number of slices of a volume, which all have the time of their volume;
-    /// `frames`: number of frames.
-    pub(super) fn times(&self, slices: usize, frames: usize) -> BTreeMap<usize, f64> {
-        spread(&self.times, slices, frames)
-    }
-
     /// The pixel size that frames state, mm, which takes precedence over `stated`, that of the header, because PLUS allows the depth of a
     /// transducer to change while it records. None if frames state none. Differences are added to `remarks`.
     pub(super) fn spacing(&self, path: &Path, stated: [f64; 3], remarks: &mut Remarks) -> Option<[f64; 3]> {
@@ -144,7 +135,7 @@ fn spacing(text: &str) -> Option<[f64; 3]> {
     }
 }
 
-/// Gives all slices of a volume the time of the volume: times by volume in, times by frame out.
+/// Gives all slices of a volume the time of the volume: times by volume in, times by frame out. `frames`: number of frames of the file.
 pub(super) fn spread(times: &BTreeMap<usize, f64>, slices: usize, frames: usize) -> BTreeMap<usize, f64> {
     let volumes = frames / slices.max(1);
     times.range(..volumes).flat_map(|(volume, time)| (0..slices).map(move |n| (volume * slices + n, *time))).collect()

@@ -108,24 +108,19 @@ impl Posed {
             Event::Begin(header) => {
                 self.emit(true, &mut events);
                 *self = Posed { volumes: self.volumes, lost: self.lost(), ..Posed::new(self.options.clone()) };
-                match is_posed(&header) {
-                    true => {
-                        let sweep = Sweep::new(self.options.clone(), Schedule::default(), header.stored);
-                        self.sweep = Some((*header, sweep));
-                    }
-                    false => events.push(Event::Begin(header)),
+                if !is_posed(&header) {
+                    events.push(Event::Begin(header));
+                    return events;
                 }
+                let sweep = Sweep::new(self.options.clone(), Schedule::default(), header.stored);
+                self.sweep = Some((*header, sweep));
             }
             Event::Frame(frame) if self.sweep.is_some() => {
                 self.picture(frame);
                 self.emit(false, &mut events);
             }
-            Event::End(why) => {
-                self.emit(true, &mut events);
-                events.push(Event::End(why));
-            }
             other => {
-                self.emit(false, &mut events);
+                self.emit(matches!(other, Event::End(_)), &mut events);
                 events.push(other);
             }
         }

@@ -21,14 +21,13 @@ pub use super::frame::Header;
 
 use super::describe::{Rows, number};
 use super::frame::{POSE_BYTES, Source, read_pose, stored_pose};
-use crate::Frame;
+use super::piped_record::CRC;
 use crate::files::progress::CountedFile;
 use crate::files::{InputError, private, progress};
 use crate::frame::check_volume;
 use crate::probe::{Geometry, World};
 use crate::tree;
-use crate::{SampleType, StoredType};
-use crc::{CRC_32_ISO_HDLC, Crc, Table};
+use crate::{Frame, SampleType, StoredType};
 use glam::{DAffine3, DQuat};
 use std::collections::BTreeSet;
 use std::fs::{File, OpenOptions};
@@ -51,8 +50,6 @@ const STAMPED: u32 = 1 << 1;
 const SYNTHETIC: u32 = 1 << 2;
 /// Longest header, bytes. It may have tables of lines and slices.
 const MAX_HEADER_BYTES: u32 = 16 << 20;
-
-static CRC: Crc<u32, Table<16>> = Crc::<u32, Table<16>>::new(&CRC_32_ISO_HDLC);
 
 /// Writes a `.frames` file. Without [`Writer::finish`] the file has no index, but can still be read.
 pub struct Writer {
@@ -91,13 +88,11 @@ impl Writer {
         start.extend(CRC.checksum(&start).to_le_bytes());
         let mut writer =
             Writer { path: path.into(), file, header, index: Vec::new(), at: 0, frame: start, torn: false };
-        match writer.append() {
-            Ok(()) => Ok(writer),
-            Err(e) => {
-                writer.discard();
-                Err(e)
-            }
+        if let Err(e) = writer.append() {
+            writer.discard();
+            return Err(e);
         }
+        Ok(writer)
     }
 
     /// Appends a frame that arrived at `arrived` s on the recorder's clock. When this returns, the operating system has the frame, and earlier
@@ -112,8 +107,8 @@ impl Writer {
         if frame.bytes.len() as u64 != expected {
             return fault("frame", format!("has {} bytes, {expected} are expected", frame.bytes.len()));
         }
-        if frame.slice >= self.header.forward.slices() {
-            let slices = self.header.forward.slices();
+        let slices = self.header.forward.slices();
+        if frame.slice >= slices {
             return fault("slice", format!("is {}, there are {slices}, numbered from 0", frame.slice));
         }
         if self.index.last().is_some_and(|(_, volume)| frame.volume < *volume) {
@@ -142,10 +137,8 @@ impl Writer {
         let begins = self.index.last().is_some_and(|(_, volume)| *volume != frame.volume);
         self.index.push((offset, frame.volume));
         // Synchronised once a volume: a written frame survives the end of this process, and a power cut costs one volume at most.
-        match begins {
-            true => self.file.sync_data().map_err(|e| InputError::unwritable(&self.path, &e)),
-            false => Ok(()),
-        }
+        let synchronised = if begins { self.file.sync_data() } else { Ok(()) };
+        synchronised.map_err(|e| InputError::unwritable(&self.path, &e))
     }
 
     /// Deletes the file.
@@ -276,12 +269,8 @@ impl Reader {
             Some(index) => replay.index = index,
             None => replay.rebuild(first, length).map_err(unreadable)?,
         }
-        let mut before = None;
-        for (n, (_, volume)) in replay.index.iter().enumerate() {
-            if before.replace(*volume) != Some(*volume) {
-                replay.volumes.push(n);
-            }
-        }
+        let volume = |n: usize| replay.index[n].1;
+        replay.volumes = (0..replay.index.len()).filter(|n| *n == 0 || volume(*n) != volume(*n - 1)).collect();
         // All frames say the same of this.
         replay.header.synthetic = !replay.index.is_empty() && replay.flags(0) & SYNTHETIC != 0;
         Ok(replay)
@@ -340,11 +329,8 @@ impl Reader {
         if index.len() as u64 != 8 + ENTRY * u64::from(count) {
             return None;
         }
-        let entry = |e: &[u8; ENTRY as usize]| {
-            let [a, b, c, d, e, f, g, h, i, j, k, l] = *e;
-            (u64::from_le_bytes([a, b, c, d, e, f, g, h]), u32::from_le_bytes([i, j, k, l]))
-        };
-        let entries: Vec<_> = index[8..].as_chunks::<{ ENTRY as usize }>().0.iter().map(entry).collect();
+        let entry = |e: &[u8]| Some((u64::from_le_bytes(*e.first_chunk()?), u32::from_le_bytes(*e.last_chunk()?)));
+        let entries = index[8..].chunks_exact(ENTRY as usize).map(entry).collect::<Option<Vec<_>>>()?;
         let record = self.record_bytes();
         let fits = entries.iter().all(|(offset, _)| *offset >= first && offset.saturating_add(record) <= at);
         let rises = entries.windows(2).all(|w| w[0].0 < w[1].0 && w[0].1 <= w[1].1);
@@ -427,7 +413,7 @@ fn parsed(record: &[u8], posed: bool) -> Option<(Frame, f64)> {
 impl Source for Reader {
     fn geometry(&self, volume: usize) -> Geometry {
         // The direction is that of the first frame, read without moving the position.
-        let backward = self.volumes.get(volume).is_some_and(|n| self.backward(*n));
+        let backward = self.volumes.get(volume).is_some_and(|n| self.flags(*n) & BACKWARD != 0);
         if backward { self.header.backward.clone() } else { self.header.forward.clone() }
     }
 
@@ -505,11 +491,6 @@ impl Source for Reader {
 }
 
 impl Reader {
-    /// True if a frame was swept backwards; false if it cannot be read.
-    fn backward(&self, n: usize) -> bool {
-        self.flags(n) & BACKWARD != 0
-    }
-
     /// The flags of a frame, read without moving the position; none if it cannot be read.
     fn flags(&self, n: usize) -> u32 {
         let mut flags = [0; 4];
@@ -523,7 +504,7 @@ impl Reader {
     /// Where the first of these frames that has a pose places the lattice.
     fn world_within(&self, frames: Range<usize>) -> Option<World> {
         let Geometry::Cartesian(grid) = &self.header.forward else { return None };
-        self.first_pose(frames).and_then(|pose| World::posed(&pose, grid))
+        World::posed(&self.first_pose(frames)?, grid)
     }
 
     /// The first pose of these frames, read without moving the position.
@@ -547,9 +528,7 @@ impl Reader {
         }
         None
     }
-}
 
-impl Reader {
     /// A description of the file for users: pairs of title and value. Reads all frames once to check them.
     ///
     /// # Errors

@@ -14,8 +14,7 @@ use super::value_range::ValueRange;
 use crate::files::{InputError, progress};
 use crate::probe::file::geometry_error;
 use crate::probe::{Geometry, Probe, ProbeFile, Volumes, World};
-use crate::{Frame, Source};
-use crate::{SampleType, StoredType};
+use crate::{Frame, SampleType, Source, StoredType};
 use std::collections::BTreeMap;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -227,10 +226,6 @@ impl Recording {
         &self.layout.unused
     }
 
-    fn frames_to_read(&self) -> usize {
-        self.volumes.count * self.volumes.frames
-    }
-
     /// Reads all frames once for the smallest and largest value that is no outlier.
     fn measure(&mut self) -> Result<(), InputError> {
         let mut values = ValueRange::new(self.stored_type());
@@ -256,12 +251,7 @@ impl Recording {
             None => self.layout.pixels.open(index as u64 * size).map_err(|e| self.broken(&e, 0))?,
         };
         let mut bytes = Vec::with_capacity(if self.proven { size as usize } else { 0 });
-        let outcome = stream.fill(size, &mut bytes);
-        let outcome = outcome.and_then(|()| match bytes.len() as u64 == size {
-            true => Ok(()),
-            false => Err(io::ErrorKind::UnexpectedEof.into()),
-        });
-        outcome.map_err(|e| self.broken(&e, bytes.len()))?;
+        stream.fill_whole(size, &mut bytes).map_err(|e| self.broken(&e, bytes.len()))?;
         self.proven = true;
         // The checksum at the end of a compressed stream shows whether all of it is intact.
         if index + 1 == self.layout.frames {
@@ -405,7 +395,7 @@ impl Source for Recording {
             return self.next_turned();
         }
         let index = self.next;
-        if index >= self.frames_to_read() {
+        if index >= self.volumes.count * self.volumes.frames {
             return Ok(None);
         }
         let bytes = self.read_frame()?;

@@ -51,22 +51,33 @@ pub(super) fn store(sample: SampleType, big_endian: bool, bytes: &mut [u8]) -> R
     replaced
 }
 
+/// Writes a value in the type of a file, little-endian and rounded to nearest. `place`: the bytes of the sample.
+pub(super) fn put(sample: SampleType, value: f64, place: &mut [u8]) {
+    match sample {
+        SampleType::U8 => place.copy_from_slice(&[value.round() as u8]),
+        SampleType::U16 => place.copy_from_slice(&(value.round() as u16).to_le_bytes()),
+        SampleType::I16 => place.copy_from_slice(&(value.round() as i16).to_le_bytes()),
+        SampleType::F32 => place.copy_from_slice(&(value as f32).to_le_bytes()),
+    }
+}
+
 /// Extends `range` (smallest, largest) so that it contains all stored samples in `bytes`.
 pub(super) fn widen(range: &mut [f64; 2], stored: StoredType, bytes: &[u8]) {
-    fn span<const N: usize, T: PartialOrd + Copy>(
+    fn span<const N: usize, T: PartialOrd + Copy + Into<f64>>(
         bytes: &[u8],
-        zero: T,
         read: impl Fn([u8; N]) -> T,
-    ) -> Option<(T, T)> {
+    ) -> Option<[f64; 2]> {
         let values = bytes.as_chunks::<N>().0;
-        let first = values.first().map_or(zero, |v| read(*v));
-        let of = |(low, high): (T, T), v: T| (if v < low { v } else { low }, if v > high { v } else { high });
-        (!values.is_empty()).then(|| values.iter().fold((first, first), |span, v| of(span, read(*v))))
+        let first = read(*values.first()?);
+        // A tuple stays in two registers, so that the loop is vectorised.
+        let wider = |(low, high): (T, T), v: T| (if v < low { v } else { low }, if v > high { v } else { high });
+        let (low, high) = values.iter().fold((first, first), |span, v| wider(span, read(*v)));
+        Some([low.into(), high.into()])
     }
     let found = match stored {
-        StoredType::U8 => span(bytes, 0, |b: [u8; 1]| b[0]).map(|(l, h)| [f64::from(l), f64::from(h)]),
-        StoredType::U16 => span(bytes, 0, u16::from_le_bytes).map(|(l, h)| [f64::from(l), f64::from(h)]),
-        StoredType::F32 => span(bytes, 0.0, f32::from_le_bytes).map(|(l, h)| [f64::from(l), f64::from(h)]),
+        StoredType::U8 => span(bytes, u8::from_le_bytes),
+        StoredType::U16 => span(bytes, u16::from_le_bytes),
+        StoredType::F32 => span(bytes, f32::from_le_bytes),
     };
     if let Some([low, high]) = found {
         *range = [range[0].min(low), range[1].max(high)];

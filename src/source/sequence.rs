@@ -1,10 +1,8 @@
 //! Polar frames as a PLUS sequence (.mha), with their geometry in a probe file (NAME.probe.toml).
 
-use super::frame::DEMO_DATA;
-use super::frame::{Source, VolumeFrames};
+use super::frame::{DEMO_DATA, Source, VolumeFrames};
 use crate::files::{InputError, Unfinished};
-use crate::probe::SampleType;
-use crate::probe::{Geometry, ProbeFile, Volumes};
+use crate::probe::{Geometry, ProbeFile, SampleType, Volumes};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 

@@ -9,7 +9,7 @@ use crate::{SampleType, StoredType};
 use glam::DAffine3;
 use std::io::{IsTerminal, Read};
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, MutexGuard};
+use std::sync::Mutex;
 
 /// Its name for users.
 const NAME: &str = "standard input";
@@ -19,10 +19,6 @@ const MAX_BYTES: u64 = 64 << 30;
 /// What was read. A recording may be opened more than once, and standard input is read once.
 static KEPT: Mutex<Option<Spool>> = Mutex::new(None);
 
-fn kept() -> MutexGuard<'static, Option<Spool>> {
-    locked(&KEPT)
-}
-
 /// True if a path stands for standard input: `-`.
 pub(super) fn is_meant(path: &Path) -> bool {
     path.as_os_str() == "-"
@@ -30,7 +26,7 @@ pub(super) fn is_meant(path: &Path) -> bool {
 
 /// Deletes the temporary file with the content of standard input. Sources that still read it may fail afterwards.
 pub fn forget() {
-    kept().take();
+    locked(&KEPT).take();
 }
 
 /// Path of a temporary file with the content of standard input. The first call reads it to its end, provided that it begins as a recording does.
@@ -38,7 +34,7 @@ pub fn forget() {
 /// # Errors
 /// Standard input is a terminal, cannot be read, does not begin as a recording, or does not fit on the disk.
 pub(super) fn file() -> Result<PathBuf, InputError> {
-    let mut kept = kept();
+    let mut kept = locked(&KEPT);
     if let Some(spool) = &*kept {
         return Ok(spool.path().into());
     }
@@ -71,36 +67,25 @@ pub(super) fn renamed(error: InputError) -> InputError {
 pub(super) struct FromInput(pub Box<dyn Source>);
 
 impl Source for FromInput {
-    fn geometry(&self, volume: usize) -> Geometry {
-        self.0.geometry(volume)
-    }
-
-    fn stored_type(&self) -> StoredType {
-        self.0.stored_type()
-    }
-
-    fn sample_type(&self) -> SampleType {
-        self.0.sample_type()
-    }
-
-    fn range(&self) -> [f64; 2] {
-        self.0.range()
-    }
-
-    fn volumes(&self) -> usize {
-        self.0.volumes()
-    }
-
-    fn frames_per_volume(&self) -> usize {
-        self.0.frames_per_volume()
+    passed_on! { self to self.0;
+        geometry(volume: usize) -> Geometry;
+        stored_type() -> StoredType;
+        sample_type() -> SampleType;
+        range() -> [f64; 2];
+        volumes() -> usize;
+        frames_per_volume() -> usize;
+        number_of(volume: usize) -> Option<u32>;
+        header() -> Header;
+        is_synthetic() -> bool;
+        world() -> Option<World>;
+        world_of(volume: usize) -> Option<World>;
+        pose() -> Option<DAffine3>;
+        probe_file() -> Option<&Path>;
+        arrival() -> Option<f64>;
     }
 
     fn skip_to_volume(&mut self, volume: usize) -> Result<(), InputError> {
         self.0.skip_to_volume(volume).map_err(renamed)
-    }
-
-    fn number_of(&self, volume: usize) -> Option<u32> {
-        self.0.number_of(volume)
     }
 
     fn next_frame(&mut self) -> Result<Option<Frame>, InputError> {
@@ -111,36 +96,8 @@ impl Source for FromInput {
         self.0.prepare().map_err(renamed)
     }
 
-    fn header(&self) -> Header {
-        self.0.header()
-    }
-
-    fn is_synthetic(&self) -> bool {
-        self.0.is_synthetic()
-    }
-
     fn files(&self) -> Vec<PathBuf> {
         // No output can replace what was read.
         self.0.probe_file().map(Path::to_path_buf).into_iter().collect()
-    }
-
-    fn world(&self) -> Option<World> {
-        self.0.world()
-    }
-
-    fn world_of(&self, volume: usize) -> Option<World> {
-        self.0.world_of(volume)
-    }
-
-    fn pose(&self) -> Option<DAffine3> {
-        self.0.pose()
-    }
-
-    fn probe_file(&self) -> Option<&Path> {
-        self.0.probe_file()
-    }
-
-    fn arrival(&self) -> Option<f64> {
-        self.0.arrival()
     }
 }

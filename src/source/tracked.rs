@@ -58,10 +58,9 @@ impl TrackedVolume {
         }
         let config = options.plus_config.map(PlusConfig::read).transpose()?.unwrap_or_default();
         // What a user says comes before the file.
-        let mut fixed: Vec<Calibration> = options.calibration.to_vec();
-        let is_new = |of_file: &Calibration| fixed.iter().all(|given| given.name != of_file.name);
-        let more: Vec<Calibration> = config.fixed.into_iter().filter(is_new).collect();
-        fixed.extend(more);
+        let is_new = |of_file: &Calibration| options.calibration.iter().all(|given| given.name != of_file.name);
+        let of_file = config.fixed.into_iter().filter(is_new);
+        let fixed: Vec<Calibration> = options.calibration.iter().cloned().chain(of_file).collect();
         let image = config.image.as_deref().unwrap_or(IMAGE);
         let asked = options.reference.or(config.reference.as_deref());
         let candidates = asked.map_or(REFERENCES.to_vec(), |asked| vec![asked]);

@@ -65,13 +65,11 @@ impl FromStr for Calibration {
 pub(super) fn matrix(text: &str) -> Result<DMat4, String> {
     let words: Vec<&str> =
         text.split(|c: char| c.is_whitespace() || c == ',').filter(|word| !word.is_empty()).collect();
-    let mut numbers = Vec::with_capacity(16);
-    for word in &words {
-        match word.parse::<f64>() {
-            Ok(number) if number.is_finite() => numbers.push(number),
-            _ => return Err(format!("{} is not a finite number", quoted(word))),
-        }
-    }
+    let number = |word: &&str| match word.parse::<f64>() {
+        Ok(number) if number.is_finite() => Ok(number),
+        _ => Err(format!("{} is not a finite number", quoted(word))),
+    };
+    let mut numbers = words.iter().map(number).collect::<Result<Vec<_>, _>>()?;
     if numbers.len() == 12 {
         numbers.extend([0.0, 0.0, 0.0, 1.0]);
     }

@@ -6,7 +6,7 @@
 //!
 //! Complex data and amplitudes become decibels of their envelope, 0 at the largest of the file. Data of both signs are RF and are refused.
 
-use super::describe::{self, Rows};
+use super::describe::{self, Remarks, Rows};
 use super::keys::{Aspect, Key, Unused, Use, not_used};
 use crate::StoredType;
 use crate::files::{InputError, progress, quoted};
@@ -64,7 +64,7 @@ pub(super) struct Beamformed {
     scale: Scale,
     volumes: usize,
     next: usize,
-    remarks: Vec<(String, String)>,
+    remarks: Remarks,
     unused: Unused,
 }
 
@@ -465,7 +465,7 @@ impl File<'_> {
     }
 
     /// The members of the data and of their scan that are not read.
-    fn unused(&self, data: &Group, scan: &Group, remarks: &mut Vec<(String, String)>) -> Result<Unused, InputError> {
+    fn unused(&self, data: &Group, scan: &Group, remarks: &mut Remarks) -> Result<Unused, InputError> {
         let mut unused = Unused::default();
         for (group, within) in [(data, ""), (scan, "scan/")] {
             let (groups, sets) = group.member_names().map_err(|e| self.broken("file", &e))?;
@@ -478,7 +478,7 @@ impl File<'_> {
                 unused.note_as_it_is(&whole);
                 if let Some(key) = known {
                     let value = self.numbers_in(group, &name)?;
-                    not_used(self.path, key, &value, remarks).or_else(|(name, fault)| self.fault(name, fault))?;
+                    not_used(self.path, key, &value, remarks)?;
                 }
             }
         }

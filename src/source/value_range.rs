@@ -94,9 +94,8 @@ impl ValueRange {
         let body = body(&bins);
         let beyond = of - count(body);
         let is_outlier = beyond > 0 && beyond as f64 <= MOST * of as f64;
-        let range = match (is_outlier, body) {
-            (true, [first, .., last]) => [f64::from(first.low), f64::from(last.high)],
-            (true, [only]) => [f64::from(only.low), f64::from(only.high)],
+        let range = match (body.first(), body.last()) {
+            (Some(first), Some(last)) if is_outlier => [f64::from(first.low), f64::from(last.high)],
             _ => full,
         };
         let beyond = if is_outlier { beyond } else { 0 };

@@ -2,8 +2,7 @@
 
 use super::dicom::{DicomWriter, MOST_BYTES};
 use crate::files::{InputError, Unfinished};
-use crate::probe::SampleType;
-use crate::probe::World;
+use crate::probe::{SampleType, World};
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use glam::{DMat3, DQuat, DVec3};
@@ -69,14 +68,10 @@ impl VolumeFile {
     pub(super) fn check(self, size: [usize; 3], sample: SampleType) -> Result<(), String> {
         let VolumeFile::Dicom { capture } = self else { return Ok(()) };
         let bytes = size.iter().fold(sample.bytes() as u64, |all, n| all.saturating_mul(*n as u64));
-        match sample {
-            SampleType::U8 => {}
-            SampleType::U16 if !capture => {}
-            _ => {
-                return Err(format!(
-                    "DICOM volumes hold u8 and u16, these are {sample}: write .nrrd, or 8 bits with --secondary-capture"
-                ));
-            }
+        if sample != SampleType::U8 && (capture || sample != SampleType::U16) {
+            return Err(format!(
+                "DICOM volumes hold u8 and u16, these are {sample}: write .nrrd, or 8 bits with --secondary-capture"
+            ));
         }
         if bytes > MOST_BYTES {
             return Err(format!("would have {bytes} bytes of samples, DICOM holds {MOST_BYTES}"));
@@ -96,25 +91,20 @@ impl VolumeFile {
         sample: SampleType,
     ) -> io::Result<Box<dyn VolumeWriter>> {
         let file = Unfinished::create(path)?;
-        if let VolumeFile::Dicom { capture } = self {
-            return Ok(Box::new(DicomWriter::create(file, size, world, capture, sample.bytes())?));
-        }
+        let header = match self {
+            VolumeFile::MetaImage => metaimage(size, world, sample).into_bytes(),
+            VolumeFile::Nrrd => (nrrd_start(size, world, sample, None) + "encoding: raw\n\n").into_bytes(),
+            VolumeFile::Nifti { .. } => nifti(size, world, sample),
+            VolumeFile::Dicom { capture } => {
+                return Ok(Box::new(DicomWriter::create(file, size, world, capture, sample.bytes())?));
+            }
+        };
         let mut writer: Box<dyn VolumeWriter> = match self {
             VolumeFile::Nifti { packed: true } => Box::new(GzEncoder::new(file, Compression::default())),
             _ => Box::new(file),
         };
-        writer.write_all(&self.header(size, world, sample))?;
+        writer.write_all(&header)?;
         Ok(writer)
-    }
-
-    fn header(self, size: [usize; 3], world: &World, sample: SampleType) -> Vec<u8> {
-        match self {
-            VolumeFile::MetaImage => metaimage(size, world, sample).into_bytes(),
-            VolumeFile::Nrrd => nrrd(size, world, sample).into_bytes(),
-            VolumeFile::Nifti { .. } => nifti(size, world, sample),
-            // Its writer makes it.
-            VolumeFile::Dicom { .. } => Vec::new(),
-        }
     }
 }
 
@@ -144,10 +134,6 @@ fn metaimage([x, y, z]: [usize; 3], world: &World, sample: SampleType) -> String
          TransformMatrix = {matrix}\nOffset = {origin}\nElementSpacing = {spacing}\n\
          DimSize = {x} {y} {z}\nElementType = {kind}\nElementDataFile = LOCAL\n"
     )
-}
-
-fn nrrd(size: [usize; 3], world: &World, sample: SampleType) -> String {
-    format!("{}encoding: raw\n\n", nrrd_start(size, world, sample, None))
 }
 
 /// The beginning of an NRRD header, up to its encoding. `volumes`: number of volumes of a sequence, which are the slowest axis; None for a

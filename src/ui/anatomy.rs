@@ -2,7 +2,7 @@
 
 use crate::picking::Picker;
 use crate::probe::{Geometry, Motion, Probe};
-use crate::scene::planes::{Tile, Tiling};
+use crate::scene::planes::Tiling;
 use crate::scene::{Scene, insonified_box};
 use glam::DVec3;
 
@@ -26,18 +26,14 @@ impl<'a> Anatomy<'a> {
 
     /// True if the plane or the ray at this position (pixels of the picture) meets recorded data. Cuts and thresholds are ignored.
     pub(super) fn is_at(&self, at: [f64; 2]) -> bool {
-        let is_in = |tile: &&Tile| {
-            (0..2).all(|a| (0.0..f64::from(tile.size[a])).contains(&(at[a] - f64::from(tile.corner[a]))))
-        };
-        if let Some((tiling, tile)) =
-            self.tiling.as_ref().and_then(|tiling| Some((tiling, tiling.tiles.iter().find(is_in)?)))
-        {
+        let on = self.tiling.as_ref().and_then(|tiling| Some((tiling, tiling.tiles.iter().find(|tile| tile.has(at))?)));
+        if let Some((tiling, tile)) = on {
             // A thick plane shows what is before and behind it too.
             let place = tiling.point(tile, at);
             let aside = tile.plane.normal * self.scene.settings.planes.thickness / 2.0;
             let places = [place - aside, place, place + aside];
             // Beside a rendering, planes reach out of the region.
-            let is_shown = |place: &DVec3| self.scene.has_sections() || self.is_in_region(*place);
+            let is_shown = |place: &DVec3| self.scene.has_sections() || is_within(*place, self.bounds);
             return places.into_iter().filter(is_shown).any(|place| self.is_recorded(place));
         }
         !self.scene.is_flat() && self.is_on_ray(at)
@@ -55,19 +51,18 @@ impl<'a> Anatomy<'a> {
         to > from && (0..=STEPS).any(|n| self.is_recorded(origin + direction * (from + step * f64::from(n))))
     }
 
-    fn is_in_region(&self, place: DVec3) -> bool {
-        place.cmpge(self.bounds.0 - 1e-9).all() && place.cmple(self.bounds.1 + 1e-9).all()
-    }
-
     fn is_recorded(&self, place: DVec3) -> bool {
-        let (low, high) = insonified_box(&self.scene.geometry);
-        let is_in_box = place.cmpge(low - 1e-9).all() && place.cmple(high + 1e-9).all();
-        is_in_box
+        is_within(place, insonified_box(&self.scene.geometry))
             && match &self.scene.geometry {
                 Geometry::Sweep(probe) => is_in_sector(probe, place),
                 Geometry::Cartesian(_) => true,
             }
     }
+}
+
+/// True if a place is in a box between two corners, or at its edge.
+fn is_within(place: DVec3, (low, high): (DVec3, DVec3)) -> bool {
+    place.cmpge(low - 1e-9).all() && place.cmple(high + 1e-9).all()
 }
 
 fn is_in_sector(probe: &Probe, place: DVec3) -> bool {

@@ -17,8 +17,8 @@ const INTERVALS: RangeInclusive<f64> = 1e-3..=5.0;
 /// Decides which volume of the cine loop is shown next while it is played, and when.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct CinePlayer {
-    /// When the next volume is due; none while the loop does not play.
-    next: Option<Instant>,
+    /// When the next volume is due; None while the loop does not play.
+    pub(super) next: Option<Instant>,
     is_backwards: bool,
 }
 
@@ -103,11 +103,6 @@ impl CinePlayer {
         self.next.is_some()
     }
 
-    /// Time at which the next volume is to be shown; None while the loop is not played.
-    pub(super) fn due(&self) -> Option<Instant> {
-        self.next
-    }
-
     pub(super) fn stop(&mut self) {
         self.next = None;
     }
@@ -133,12 +128,8 @@ impl CinePlayer {
             self.is_backwards = false;
             return self.show(of, low, (due, now));
         };
-        self.is_backwards = match of.cine.back_and_forth {
-            true if at == low => false,
-            true if at == high => true,
-            true => self.is_backwards,
-            false => false,
-        };
+        // Back and forth, it turns at each end; otherwise it always goes forwards.
+        self.is_backwards = of.cine.back_and_forth && at != low && (at == high || self.is_backwards);
         let next = match self.is_backwards {
             true => at - 1,
             false if at == high => low,
@@ -226,7 +217,7 @@ mod tests {
         player.toggle(of, now);
         let mut seen = Vec::new();
         for _ in 0..steps {
-            let Some(due) = player.due() else { break };
+            let Some(due) = player.next else { break };
             now = now.max(due);
             let Some(index) = player.advance(of, shown, now) else { break };
             shown = Some(index);

@@ -13,6 +13,7 @@ use crate::source::live::{Event, Live};
 use crate::source::recorder::Header;
 use crate::source::{self, Source};
 use crate::texts;
+use crate::tree::All;
 use glam::{DAffine3, DVec3};
 use std::collections::VecDeque;
 use std::path::Path;
@@ -33,7 +34,7 @@ pub enum CompareView {
 }
 
 /// What the compared volumes have in common with the shown one. They always have its mode and layout.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, All)]
 pub enum Link {
     /// Camera and region.
     View,
@@ -43,10 +44,6 @@ pub enum Link {
     Look,
     /// The volume in time: a compared recording shows the volume whose index is the position of the shown one in the cine loop.
     Volume,
-}
-
-impl Link {
-    pub(super) const ALL: [Link; 4] = [Link::View, Link::Planes, Link::Look, Link::Volume];
 }
 
 /// Time for the stream in one update, so that inputs are handled between.
@@ -109,7 +106,8 @@ impl Shown {
 pub(super) struct Comparison {
     wake: Wake,
     compared: Vec<Compared>,
-    shown: Shown,
+    /// What the window shows of it.
+    pub(super) shown: Shown,
     /// The settings that they have where a link is cut.
     own: Settings,
 }
@@ -143,11 +141,8 @@ enum Read {
     Fault(String),
 }
 
-/// What an update of the comparison found out.
-pub(super) enum News {
-    Aligned(Registered),
-    Fault(String),
-}
+/// What an update of the comparison found out: that a volume is aligned, or a fault.
+pub(super) type News = Result<Registered, String>;
 
 /// The source of compared volumes, on its thread.
 enum Held {
@@ -216,16 +211,6 @@ impl Comparison {
         self.compared.push(Compared::new(context, held, &self.own, &self.wake)?);
         self.shown.others.push(Other { name, ..Other::default() });
         Ok(())
-    }
-
-    /// What the window shows of it.
-    pub(super) fn shown(&self) -> &Shown {
-        &self.shown
-    }
-
-    /// Sets the name of the shown volume.
-    pub(super) fn name_first(&mut self, name: String) {
-        self.shown.first = name;
     }
 
     pub(super) fn set_view(&mut self, view: CompareView) {
@@ -315,7 +300,7 @@ impl Comparison {
                     let frames = Frames { header: Some(header), frames };
                     match Feed::observed(Box::new(frames), None, Some(self.wake.clone()), None) {
                         Ok(feed) => compared.stream.replace_source(feed),
-                        Err(fault) => news = Some(News::Fault(fault.to_string())),
+                        Err(fault) => news = Some(Err(fault.to_string())),
                     }
                 }
                 // It was moved meanwhile.
@@ -324,13 +309,13 @@ impl Comparison {
                     let motion = found.motion;
                     (compared.motion, other.moved) = (motion.map(), Some([motion.shift.length(), motion.angle()]));
                     (other.is_aligned, other.is_aligning, is_other) = (true, false, true);
-                    news = Some(News::Aligned(found));
+                    news = Some(Ok(found));
                 }
                 Ok(Read::Fault(fault)) => {
                     (other.is_aligning, is_other) = (false, true);
-                    news = Some(News::Fault(fault));
+                    news = Some(Err(fault));
                 }
-                Err(TryRecvError::Disconnected) => news = Some(News::Fault(other.name.clone())),
+                Err(TryRecvError::Disconnected) => news = Some(Err(other.name.clone())),
                 Err(TryRecvError::Empty) => {}
             }
             if let Some(picture) = compared.step(linked)? {
@@ -355,11 +340,6 @@ impl Comparison {
         let second = self.shown.others[0].picture.as_ref();
         let made = second.and_then(|second| compare::difference(first, second).ok());
         self.shown.difference = made.map(|Difference { picture, .. }| Arc::new(picture));
-    }
-
-    /// Notes that the picture of the shown volume is another one.
-    pub(super) fn picture_changed(&mut self) {
-        self.shown.difference = None;
     }
 
     /// When it is to be updated again without an event.

@@ -8,6 +8,7 @@ use super::recovery::{self, Lost, Output, Recovery, RecoveryStep};
 use super::window::MakeConsole;
 use crate::gpu::window::{PresentMode, Screen, Target, fixed_size};
 use crate::gpu::{Context, ContextOptions, GpuError};
+use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -72,18 +73,11 @@ struct DirectLoop<'a> {
     ends: Option<Instant>,
 }
 
-/// When the loop updates again.
-enum NextUpdate {
-    Exit,
-    /// Wait for an event, or until this time.
-    Wait(Option<Instant>),
-}
-
 impl DirectLoop<'_> {
     fn run(&mut self) -> Result<(), GpuError> {
         loop {
             let now = Instant::now();
-            let NextUpdate::Wait(until) = self.update(now)? else { return Ok(()) };
+            let ControlFlow::Continue(until) = self.update(now)? else { return Ok(()) };
             if self.ends.is_some_and(|end| now >= end) {
                 return Ok(());
             }
@@ -102,14 +96,15 @@ impl DirectLoop<'_> {
         }
     }
 
-    fn update(&mut self, now: Instant) -> Result<NextUpdate, GpuError> {
+    /// Updates the console. Breaks when that ends; otherwise continues at the next event, or at this time.
+    fn update(&mut self, now: Instant) -> Result<ControlFlow<(), Option<Instant>>, GpuError> {
         let restored = match self.recovery.poll(now) {
             RecoveryStep::Idle => Ok(()),
-            RecoveryStep::WaitUntil(at) => return Ok(NextUpdate::Wait(Some(at))),
+            RecoveryStep::WaitUntil(at) => return Ok(ControlFlow::Continue(Some(at))),
             RecoveryStep::Restore(lost) => self.restore(lost),
         };
         match restored.and_then(|()| self.console.update(now).map_err(recovery::lost_by)) {
-            Ok(next) if next.exit => Ok(NextUpdate::Exit),
+            Ok(next) if next.exit => Ok(ControlFlow::Break(())),
             Ok(next) => {
                 if next.restart {
                     let console = (self.make)(&self.context, self.size, 1.0, self.devices.wake());
@@ -117,7 +112,7 @@ impl DirectLoop<'_> {
                     self.console.set_screen(before.into_screen());
                 }
                 self.after_update();
-                Ok(NextUpdate::Wait(next.wake_at))
+                Ok(ControlFlow::Continue(next.wake_at))
             }
             // Drivers list monitors that they cannot use.
             Err((Lost::Screen, fault)) if !self.has_presented => match self.output.target {
@@ -126,7 +121,7 @@ impl DirectLoop<'_> {
             },
             Err((lost, fault)) => {
                 tracing::warn!("{fault}; trying again");
-                if self.recovery.lost(lost, now) { Ok(NextUpdate::Wait(Some(now))) } else { Err(fault) }
+                if self.recovery.lost(lost, now) { Ok(ControlFlow::Continue(Some(now))) } else { Err(fault) }
             }
         }
     }

@@ -44,7 +44,7 @@ pub(super) struct Saved {
 
 /// Saves files on threads of its own.
 pub(super) struct Exporter {
-    folder: PathBuf,
+    pub(super) folder: PathBuf,
     sender: Sender<Saved>,
     receiver: Receiver<Saved>,
     pending: usize,
@@ -54,8 +54,8 @@ pub(super) struct Exporter {
     threads: Vec<JoinHandle<()>>,
     /// The last export: its name, state and thread.
     export: Option<(&'static str, Arc<Export>, JoinHandle<()>)>,
-    /// Progress of the export when it was last polled.
-    progress: Option<Progress>,
+    /// Progress of the running export when it was last checked; None if it has reported none.
+    pub(super) progress: Option<Progress>,
 }
 
 impl Exporter {
@@ -137,11 +137,6 @@ impl Exporter {
         self.written("toml", holds, write)
     }
 
-    /// Path of the folder of saved files.
-    pub(super) fn folder(&self) -> &Path {
-        &self.folder
-    }
-
     /// Starts an export. Only one runs at a time.
     ///
     /// # Errors
@@ -173,11 +168,6 @@ impl Exporter {
         let export = self.export.as_ref().filter(|_| self.exporting().is_some());
         let progress = export.and_then(|(_, export, _)| export.progress());
         std::mem::replace(&mut self.progress, progress) != progress
-    }
-
-    /// Progress of the running export when it was last checked; None if it has reported none.
-    pub(super) fn progress(&self) -> Option<Progress> {
-        self.progress
     }
 
     /// Cancels the running export, if there is one.

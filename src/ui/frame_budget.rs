@@ -94,7 +94,7 @@ impl Pace {
     }
 
     pub(super) fn budget(&self) -> Option<Duration> {
-        self.rays.budget()
+        self.rays.budget
     }
 
     /// Notes that the user moved something whose picture needs this kind of work.
@@ -208,7 +208,8 @@ pub(super) fn lowered(rungs: &[Rung], scene: &Scene) -> Vec<Settings> {
 }
 
 /// Chooses the rung of the quality ladder for a moving view from the times of pictures. Rung 0 is full quality; each one after it is faster.
-#[derive(Clone, Debug)]
+/// The default has no rungs: `new` makes one that can be used.
+#[derive(Clone, Debug, Default)]
 pub(super) struct FrameBudget {
     budget: Option<Duration>,
     /// By rung: the expected time of a picture as a fraction of that on rung 0.
@@ -231,19 +232,7 @@ impl FrameBudget {
     /// quality.
     pub(super) fn new(budget: Option<Duration>, time_shares: &[f64]) -> FrameBudget {
         let expected = if time_shares.is_empty() { vec![1.0] } else { time_shares.to_vec() };
-        let measured = expected.clone();
-        let (rung, is_guessed) = (0, false);
-        FrameBudget {
-            budget,
-            expected,
-            measured,
-            rung,
-            is_guessed,
-            mean: 0.0,
-            pictures: 0,
-            previous: None,
-            moved: None,
-        }
+        FrameBudget { budget, measured: expected.clone(), expected, ..FrameBudget::default() }
     }
 
     /// On this rung, or the last one, until the first picture was timed.
@@ -251,10 +240,6 @@ impl FrameBudget {
         self.rung = rung.min(self.expected.len() - 1);
         self.is_guessed = self.rung > 0;
         self
-    }
-
-    pub(super) fn budget(&self) -> Option<Duration> {
-        self.budget
     }
 
     /// Records that the view moved.

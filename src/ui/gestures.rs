@@ -39,7 +39,8 @@ const MIN_PINCH: f64 = 24.0;
 /// Recognises gestures of mouse and fingers on the picture.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Gestures {
-    pointer: Option<[f64; 2]>,
+    /// The last position of the pointer, pixels of the window; None if it is not known.
+    pub(super) pointer: Option<[f64; 2]>,
     mouse: Option<(Button, Press)>,
     /// The fingers in the order in which they touched the picture. The first two form a pair.
     fingers: Vec<Finger>,
@@ -47,7 +48,8 @@ pub(super) struct Gestures {
     finger_press: Option<Press>,
     /// Whether several fingers touched since all were up: lifting the last one is then no tap.
     had_several: bool,
-    last_click: Option<Click>,
+    /// Position and time of the last click.
+    last_click: Option<([f64; 2], Duration)>,
     /// The command that returns from a tile shown alone.
     back: Option<Command>,
 }
@@ -57,12 +59,6 @@ struct Finger {
     id: u64,
     at: [f64; 2],
     pane: Pane,
-}
-
-#[derive(Clone, Copy, Debug)]
-struct Click {
-    at: [f64; 2],
-    time: Duration,
 }
 
 impl Gestures {
@@ -95,11 +91,6 @@ impl Gestures {
             }
             _ => Vec::new(),
         }
-    }
-
-    /// The last position of the pointer, pixels of the window; None if it is not known.
-    pub(super) fn pointer(&self) -> Option<[f64; 2]> {
-        self.pointer
     }
 
     fn presses(&self) -> impl Iterator<Item = &Press> {
@@ -177,15 +168,12 @@ impl Gestures {
         let known = self.fingers.iter().position(|finger| finger.id == id);
         match (phase, known) {
             (Phase::Down, None) => {
-                if let (Some(pane), false) =
-                    (viewport.pane_at(at), viewport.is_covered || self.fingers.len() >= MAX_FINGERS)
-                {
-                    self.fingers.push(Finger { id, at, pane });
-                    let press = self.finger_press.take();
-                    self.restart_press(viewport, tool);
-                    return press.as_ref().and_then(given_up).into_iter().collect();
-                }
-                Vec::new()
+                let is_ignored = viewport.is_covered || self.fingers.len() >= MAX_FINGERS;
+                let Some(pane) = viewport.pane_at(at).filter(|_| !is_ignored) else { return Vec::new() };
+                self.fingers.push(Finger { id, at, pane });
+                let press = self.finger_press.take();
+                self.restart_press(viewport, tool);
+                press.as_ref().and_then(given_up).into_iter().collect()
             }
             (Phase::Moved | Phase::Down, Some(n)) => self.finger_moved(n, at, viewport),
             (Phase::Up | Phase::Cancelled, Some(n)) => {
@@ -232,11 +220,12 @@ impl Gestures {
     fn release(&mut self, press: &Press, viewport: &Viewport, tool: Tool, slop: f64) -> Vec<Command> {
         let Some((at, pane)) = press.click() else { return press.end(viewport) };
         if let Drag::BodyMark { index, .. } = press.drag {
-            return probe_to(viewport, index, at).into_iter().collect();
+            let pixel = viewport.pixel_at(at).map(|(_, pixel)| pixel);
+            let moved = pixel.and_then(|pixel| mark_moved(viewport, index, MarkPart::Probe, pixel));
+            return moved.into_iter().collect();
         }
-        let is_second = self.last_click.take().is_some_and(|first| {
-            (at[0] - first.at[0]).hypot(at[1] - first.at[1]) < 2.0 * slop
-                && viewport.now.saturating_sub(first.time) <= DOUBLE_CLICK
+        let is_second = self.last_click.take().is_some_and(|([x, y], time)| {
+            (at[0] - x).hypot(at[1] - y) < 2.0 * slop && viewport.now.saturating_sub(time) <= DOUBLE_CLICK
         });
         // A brush goes over the same place again.
         if is_second && (pane, tool) != (Pane::Rendering, Tool::Brush) && tool != Tool::Labels {
@@ -256,7 +245,7 @@ impl Gestures {
             }
             return self.double_click(pane, viewport);
         }
-        self.last_click = Some(Click { at, time: viewport.now });
+        self.last_click = Some((at, viewport.now));
         if matches!(press.drag, Drag::Labels { .. }) {
             return press.end(viewport);
         }
@@ -302,12 +291,14 @@ enum Drag {
     Rotate,
     Light,
     Clip,
-    /// A face of the region.
-    Face(Face),
-    /// A face of the region, dragged by its line on a tile of planes.
-    FaceOnPlane {
-        tile: usize,
+    /// A face of the region, dragged by its line on a tile of planes; on the rendering `tile` is None. Along its axis, mm: `grabbed` is the coordinate
+    /// where it was grabbed, `travel` how far it can move from there, `moved` how far it has moved.
+    Face {
         face: Face,
+        tile: Option<usize>,
+        travel: [f64; 2],
+        grabbed: Option<f64>,
+        moved: f64,
     },
     /// The region, dragged on a tile: where it was grabbed, how far it can move, and how far it has moved, mm.
     Region {
@@ -384,10 +375,6 @@ struct Press {
     /// Distance in pixels of the window after which the press becomes a drag.
     slop: f64,
     is_drag: bool,
-    /// For a face: where along its axis it was grabbed, its range of motion from there, and how far it has moved, mm.
-    grabbed: Option<f64>,
-    travel: [f64; 2],
-    moved_mm: f64,
 }
 
 impl Press {
@@ -410,6 +397,10 @@ impl Press {
         pixel[0] += columns_to_surface;
         // Only a plain press can be a click: any other one drags at once.
         let is_plain = button == Button::Left && !held.shift && (!held.control || tool == Tool::Labels);
+        let of_face = |face, tile| {
+            let travel = view::face_travel(scene, face);
+            Drag::Face { face, tile, travel, grabbed: None, moved: 0.0 }
+        };
         let drag = match (pane, tool) {
             _ if mark.is_some() => mark?,
             (Pane::Rendering, _) if button != Button::Left || held.shift => Drag::Pan,
@@ -422,7 +413,9 @@ impl Press {
             (Pane::Rendering, Tool::Light) => Drag::Light,
             (Pane::Rendering, Tool::Clip) => Drag::Clip,
             (Pane::Rendering, Tool::Cut | Tool::Brush) => Drag::Cut,
-            (Pane::Rendering, Tool::Region) => view::nearest_face(scene, pixel).map_or(Drag::Nothing, Drag::Face),
+            (Pane::Rendering, Tool::Region) => {
+                view::nearest_face(scene, pixel).map_or(Drag::Nothing, |face| of_face(face, None))
+            }
             (Pane::Rendering, Tool::Plane) => {
                 if scene.cuts_planes() {
                     Drag::RotatePlanes
@@ -436,33 +429,28 @@ impl Press {
             (Pane::Plane(_), _) if !is_plain => Drag::Nothing,
             (Pane::Plane(tile), Tool::Region) => {
                 let reach = [GRAB_LINE, GRAB].map(|reach| reach * viewport.scale());
-                let handle = start_at(scene, pane, at, viewport).and_then(|part| match part {
-                    StartPart::Handle(index) => Some((index, *viewport.start_line.get(index)?)),
-                    StartPart::Line(_) => None,
-                });
-                match region_box::part_at(scene, tile, pixel, reach) {
-                    _ if handle.is_some() => {
-                        let (index, [lateral, depth]) = handle?;
+                let start = start_at(scene, pane, at, viewport);
+                match (start, region_box::part_at(scene, tile, pixel, reach)) {
+                    (Some(StartPart::Handle(index)), _) => {
+                        let [lateral, depth] = *viewport.start_line.get(index)?;
                         let [x, y, _] = point_on(viewport, tile, at)?;
                         Drag::StartHandle { tile, index, way: [lateral - x, depth - y] }
                     }
-                    Some(Part::Face(face)) => Drag::FaceOnPlane { tile, face },
-                    Some(Part::Inside) => {
+                    (_, Some(Part::Face(face))) => of_face(face, Some(tile)),
+                    (_, Some(Part::Inside)) => {
                         let from = viewport.point_on_plane(tile, at)?;
                         Drag::Region { tile, from, travel: view::region_travel(scene), moved: DVec3::ZERO }
                     }
-                    None => Drag::Nothing,
+                    (_, None) => Drag::Nothing,
                 }
             }
             (Pane::Plane(tile), Tool::Measure(kind)) => match (viewport.measure_point_at(tile, at, GRAB), kind) {
                 (Some((index, point)), _) => Drag::Point { tile, index, point },
-                (None, kind) if viewport.is_curved(tile) && !is_caliper(kind) && kind != MeasureKind::Text => {
-                    Drag::OnCurve(tile)
-                }
-                (None, MeasureKind::Trace | MeasureKind::Volume) => Drag::Trace(tile),
                 (None, MeasureKind::Distance | MeasureKind::Arrow) => {
                     Drag::Caliper { tile, has_first: viewport.has_work }
                 }
+                (None, kind) if viewport.is_curved(tile) && kind != MeasureKind::Text => Drag::OnCurve(tile),
+                (None, MeasureKind::Trace | MeasureKind::Volume) => Drag::Trace(tile),
                 (None, _) => Drag::Nothing,
             },
             (Pane::Plane(tile), Tool::Curve) => match viewport.curve_point_at(tile, at, GRAB) {
@@ -479,23 +467,8 @@ impl Press {
             }
             (Pane::Plane(_), _) => Drag::Nothing,
         };
-        let travel = match drag {
-            Drag::Face(face) | Drag::FaceOnPlane { face, .. } => view::face_travel(scene, face),
-            _ => [0.0; 2],
-        };
         let slop = if is_plain { slop } else { 0.0 };
-        Some(Press {
-            drag,
-            pane,
-            start: at,
-            last: at,
-            columns_to_surface,
-            slop,
-            is_drag: !is_plain,
-            grabbed: None,
-            travel,
-            moved_mm: 0.0,
-        })
+        Some(Press { drag, pane, start: at, last: at, columns_to_surface, slop, is_drag: !is_plain })
     }
 
     /// Position and pane of the press, if it did not become a drag.
@@ -513,26 +486,22 @@ impl Press {
             // The drag starts where the slop ends, so that nothing jumps.
             self.is_drag = true;
             self.last = [self.start[0] + x / distance * self.slop, self.start[1] + y / distance * self.slop];
-            match self.drag {
-                Drag::Caliper { has_first: true, .. } => {}
-                Drag::Caliper { tile, .. } | Drag::Trace(tile) | Drag::OnCurve(tile) => {
-                    self.last = self.start;
-                    return measured_at(viewport, tile, self.start);
+            let first = match self.drag {
+                Drag::Caliper { tile, has_first: false } | Drag::Trace(tile) | Drag::OnCurve(tile) => {
+                    Some(measured_at(viewport, tile, self.start))
                 }
-                Drag::Line { is_next: true, .. } => {}
-                Drag::Line { tile, .. } => {
-                    self.last = self.start;
-                    return line_point(viewport, tile, self.start);
-                }
-                Drag::Labels { .. } => {
-                    self.last = self.start;
-                    return self.brushed(self.start, viewport);
-                }
+                Drag::Line { tile, is_next: false } => Some(line_point(viewport, tile, self.start)),
+                Drag::Labels { .. } => Some(self.brushed(self.start, viewport)),
                 Drag::Cut => {
-                    self.last = self.start;
-                    return viewport.pixel_at(self.start).map(|(_, pixel)| Command::BeginCut(self.to_surface(pixel)));
+                    let pixel = viewport.pixel_at(self.start).map(|(_, pixel)| self.to_surface(pixel));
+                    Some(pixel.map(Command::BeginCut))
                 }
-                _ => {}
+                _ => None,
+            };
+            // What is drawn begins where the press was.
+            if let Some(first) = first {
+                self.last = self.start;
+                return first;
             }
         }
         if let Drag::Trace(_) | Drag::Cut | Drag::Labels { .. } = self.drag
@@ -549,12 +518,8 @@ impl Press {
         match self.drag {
             Drag::Caliper { tile, .. } => measured_at(viewport, tile, self.last).into_iter().collect(),
             Drag::Line { tile, is_next } => {
-                let ends = (!is_next).then_some(Command::EndCurve);
-                line_point(viewport, tile, self.last)
-                    .into_iter()
-                    .flat_map(|point| [Some(point), ends])
-                    .flatten()
-                    .collect()
+                let Some(point) = line_point(viewport, tile, self.last) else { return Vec::new() };
+                [point].into_iter().chain((!is_next).then_some(Command::EndCurve)).collect()
             }
             Drag::Trace(_) => vec![Command::EndMeasure],
             Drag::Cut => vec![Command::EndCut],
@@ -573,14 +538,6 @@ impl Press {
         Some(Command::Labels(LabelCommand::Stroke(pixel, tile, erases)))
     }
 
-    /// How far a face moves that is dragged to a position along its axis, mm; none if it stays. It moves from where it was grabbed: beyond its range
-    /// it waits for the pointer to come back.
-    fn face_moved(&mut self, position: f64) -> Option<f64> {
-        let moved = (position - self.grabbed?).clamp(self.travel[0], self.travel[1]);
-        let by = moved - std::mem::replace(&mut self.moved_mm, moved);
-        (by != 0.0).then_some(by)
-    }
-
     /// A pixel of the picture on the half of a pair that shows the surface.
     fn to_surface(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         [x + self.columns_to_surface, y]
@@ -588,14 +545,8 @@ impl Press {
 
     fn dragged(&mut self, from: [f64; 2], to: [f64; 2], viewport: &Viewport) -> Option<Command> {
         if let Drag::BodyMark { index, part, way } = self.drag {
-            let (scene, [x, y]) = viewport.pixel_at(to)?;
-            let (mark, size) = (viewport.body_marks.get(index)?, scene.picture_size().map(f64::from));
-            let place = [x + way[0], y + way[1]];
-            let moved = match part {
-                MarkPart::Probe => body_marks::with_probe_at(mark, size, place),
-                MarkPart::Body => body_marks::moved_to(mark, size, place),
-            };
-            return Some(Command::ChangeBodyMark(index, moved));
+            let (_, [x, y]) = viewport.pixel_at(to)?;
+            return mark_moved(viewport, index, part, [x + way[0], y + way[1]]);
         }
         let (scene, pixel) = viewport.pixel_at(to).map(|(scene, pixel)| (scene, self.to_surface(pixel)))?;
         let [x, y] = [to[0] - from[0], to[1] - from[1]];
@@ -634,13 +585,6 @@ impl Press {
                 Command::MoveCrossing(view::below_face(scene, to).to_array())
             }
             Drag::Point { tile, index, point } => Command::MovePoint(index, point, point_on(viewport, tile, to)?),
-            Drag::FaceOnPlane { tile, face } => {
-                let position = |at| Some(region_box::along(face, viewport.point_on_plane(tile, at)?));
-                if self.grabbed.is_none() {
-                    self.grabbed = position(from);
-                }
-                Command::MoveFace(face, self.face_moved(position(to)?)?)
-            }
             Drag::Region { tile, from, travel: [least, most], ref mut moved } => {
                 let wanted = (viewport.point_on_plane(tile, to)? - from).clamp(least, most);
                 let by = wanted - *moved;
@@ -659,15 +603,26 @@ impl Press {
             Drag::Cut => Command::CutAlong(pixel),
             Drag::Labels { .. } => return self.brushed(to, viewport),
             Drag::Trace(tile) => Command::Point(point_on(viewport, tile, to)?, false),
-            Drag::Face(face) => {
-                let picker = Picker::of(scene);
-                let line = view::face_axis(scene, face);
+            Drag::Face { face, tile, travel: [least, most], ref mut grabbed, ref mut moved } => {
+                let (middle, out) = view::face_axis(scene, face);
                 // Positions count along the axis from the origin, which does not move with the face.
-                let position = |pixel| closest_along((line.0 - line.1 * line.0.dot(line.1), line.1), picker.ray(pixel));
-                if self.grabbed.is_none() {
-                    self.grabbed = position(self.to_surface(viewport.pixel_at(from)?.1));
+                let axis = (middle - out * middle.dot(out), out);
+                let columns = self.columns_to_surface;
+                let position = |at| match tile {
+                    Some(tile) => Some(viewport.point_on_plane(tile, at)?.dot(out)),
+                    None => {
+                        let (_, [x, y]) = viewport.pixel_at(at)?;
+                        closest_along(axis, Picker::of(scene).ray([x + columns, y]))
+                    }
+                };
+                *grabbed = grabbed.or_else(|| position(from));
+                // It moves from where it was grabbed: beyond its range it waits for the pointer to come back.
+                let wanted = (position(to)? - (*grabbed)?).clamp(least, most);
+                let by = wanted - std::mem::replace(moved, wanted);
+                if by == 0.0 {
+                    return None;
                 }
-                Command::MoveFace(face, self.face_moved(position(pixel)?)?)
+                Command::MoveFace(face, by)
             }
         };
         Some(command)
@@ -686,12 +641,14 @@ fn point_on(viewport: &Viewport, tile: usize, at: [f64; 2]) -> Option<[f64; 3]> 
     Some(view::below_face(viewport.scene?, viewport.point_on_plane(tile, at)?).to_array())
 }
 
-/// The command that puts the probe of a body mark at a position in the window.
-fn probe_to(viewport: &Viewport, index: usize, at: [f64; 2]) -> Option<Command> {
-    let (scene, pixel) = viewport.pixel_at(at)?;
-    let mark = viewport.body_marks.get(index)?;
-    let size = scene.picture_size().map(f64::from);
-    Some(Command::ChangeBodyMark(index, body_marks::with_probe_at(mark, size, pixel)))
+/// The command that puts a part of a body mark at a place on the picture, pixels.
+fn mark_moved(viewport: &Viewport, index: usize, part: MarkPart, place: [f64; 2]) -> Option<Command> {
+    let (mark, size) = (viewport.body_marks.get(index)?, viewport.scene?.picture_size().map(f64::from));
+    let moved = match part {
+        MarkPart::Probe => body_marks::with_probe_at(mark, size, place),
+        MarkPart::Body => body_marks::moved_to(mark, size, place),
+    };
+    Some(Command::ChangeBodyMark(index, moved))
 }
 
 /// The command that sets the position of a text that the user starts by typing: at the pointer (pixels of the window), or else in the middle of
@@ -720,11 +677,6 @@ fn measured_at(viewport: &Viewport, tile: usize, at: [f64; 2]) -> Option<Command
 /// The command that sets a point of a line at a position on a tile; none on tiles that show none of the three planes.
 fn line_point(viewport: &Viewport, tile: usize, at: [f64; 2]) -> Option<Command> {
     viewport.coordinates(tile, at).map(|(plane, point)| Command::CurvePoint(plane, point))
-}
-
-/// True for what a drag draws from its start to its end.
-fn is_caliper(kind: MeasureKind) -> bool {
-    matches!(kind, MeasureKind::Distance | MeasureKind::Arrow)
 }
 
 /// What a press leaves behind that ends without a release: the contour that it drew, the line or the caliper that it began.

@@ -27,7 +27,7 @@ pub(super) struct PointerMark {
 
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct KeyboardPointer {
-    is_on: bool,
+    pub(super) is_on: bool,
     /// Position, pixels of the window.
     at: Option<[f64; 2]>,
     /// Whether a key holds the left button.
@@ -38,10 +38,6 @@ pub(super) struct KeyboardPointer {
 }
 
 impl KeyboardPointer {
-    pub(super) fn is_on(&self) -> bool {
-        self.is_on
-    }
-
     /// True while a key holds the pointer's button down, so that a drag may pause between two keys.
     pub(super) fn is_held(&self) -> bool {
         self.is_on && self.is_held
@@ -73,7 +69,7 @@ impl KeyboardPointer {
 
     /// The mouse inputs that a pressed key stands for; None if the key does not move the pointer. `held`: the keys that were held before.
     pub(super) fn key(&mut self, key: Key, held: &HeldKeys, picture: PictureArea) -> Option<Vec<Pointed>> {
-        let modifiers = held.modifiers();
+        let modifiers = held.modifiers;
         if !self.is_on || modifiers.alt {
             return None;
         }
@@ -97,7 +93,7 @@ impl KeyboardPointer {
         let sum = all.fold([0.0; 2], |sum, (_, way)| [sum[0] + way[0], sum[1] + way[1]]);
         let [x, y] = if sum == [0.0; 2] { *alone } else { sum };
         let edge = f64::from(size[0].min(size[1]));
-        let step = if held.modifiers().shift { 1.0 } else { (STEP * edge).round().max(1.0) };
+        let step = if held.modifiers.shift { 1.0 } else { (STEP * edge).round().max(1.0) };
         let from = self.place((corner, size));
         self.at = Some([from[0] + x * step, from[1] + y * step]);
         self.at = Some(self.place((corner, size)));

@@ -22,15 +22,11 @@ fn command(key: Key, modifiers: Modifiers) -> Option<Command> {
 /// The keys that are held down, so that a command that toggles something is not repeated.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct HeldKeys {
-    modifiers: Modifiers,
+    pub(crate) modifiers: Modifiers,
     held: Vec<Key>,
 }
 
 impl HeldKeys {
-    pub(crate) fn modifiers(&self) -> Modifiers {
-        self.modifiers
-    }
-
     pub(crate) fn is_held(&self, key: Key) -> bool {
         self.held.contains(&key)
     }

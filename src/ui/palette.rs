@@ -33,7 +33,7 @@ pub(crate) fn entries() -> impl Iterator<Item = Entry> {
         key: String::new(),
         command,
     };
-    let others = WITHOUT_KEY.into_iter().map(move |(name, about, command)| entry(name, about, command));
+    let others = WITHOUT_KEY.into_iter().map(move |([name, about], command)| entry(name, about, command));
     let looks = EXAMS.iter().enumerate();
     let looks = looks.map(move |(n, exam)| entry(&texts::look(exam.title), exam.hint, Command::Preset(n)));
     let formats = FORMATS.iter().enumerate();

@@ -15,6 +15,12 @@ pub(super) fn closest_along(line: (DVec3, DVec3), ray: (DVec3, DVec3)) -> Option
     (across > 1e-6 && at.is_finite()).then_some(at)
 }
 
+/// The nearest of things with their distances, if it is within `reach`.
+pub(super) fn nearest<T>(things: impl Iterator<Item = (f64, T)>, reach: f64) -> Option<T> {
+    let near = things.filter(|(away, _)| *away <= reach);
+    near.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, thing)| thing)
+}
+
 /// Where the picture is in the window at the time of an input, and what it shows.
 #[derive(Clone, Copy)]
 pub(super) struct Viewport<'a> {
@@ -49,17 +55,12 @@ pub(super) enum Pane {
 }
 
 impl<'a> Viewport<'a> {
-    /// Converts a position in the window to pixels of the picture.
-    fn pixel_of(&self, scene: &Scene, at: [f64; 2]) -> Option<[f64; 2]> {
-        let size = scene.picture_size().map(f64::from);
-        let pixel: [f64; 2] = std::array::from_fn(|a| (at[a] - self.corner[a]) / self.size[a] * size[a]);
-        pixel.iter().all(|v| v.is_finite()).then_some(pixel)
-    }
-
     /// The scene, and the pixel of the picture at a position in the window; it may be outside of the picture. None without a scene.
     pub(super) fn pixel_at(&self, at: [f64; 2]) -> Option<(&'a Scene, [f64; 2])> {
         let scene = self.scene?;
-        Some((scene, self.pixel_of(scene, at)?))
+        let size = scene.picture_size().map(f64::from);
+        let pixel: [f64; 2] = std::array::from_fn(|a| (at[a] - self.corner[a]) / self.size[a] * size[a]);
+        pixel.iter().all(|v| v.is_finite()).then_some((scene, pixel))
     }
 
     /// For a position (pixels of the window) on the volume of a pair, the distance to the surface on the same rays, columns of the picture;
@@ -76,19 +77,13 @@ impl<'a> Viewport<'a> {
     /// The pane at a position (pixels of the window); None outside of the picture and in empty tiles.
     pub(super) fn pane_at(&self, at: [f64; 2]) -> Option<Pane> {
         let (scene, pixel) = self.pixel_at(at)?;
-        let is_in = |corner: [u32; 2], size: [u32; 2]| {
-            (0..2).all(|a| pixel[a] >= f64::from(corner[a]) && pixel[a] < f64::from(corner[a] + size[a]))
-        };
-        if !is_in([0, 0], scene.picture_size()) {
+        let size = scene.picture_size().map(f64::from);
+        if !(0..2).all(|a| (0.0..size[a]).contains(&pixel[a])) {
             return None;
         }
-        if scene.cuts_planes() {
-            let tile = scene.tiling().tiles.iter().position(|tile| is_in(tile.corner, tile.size));
-            if let Some(n) = tile {
-                return Some(Pane::Plane(n));
-            }
-        }
-        (!scene.is_flat()).then_some(Pane::Rendering)
+        let tiles = if scene.cuts_planes() { scene.tiling().tiles } else { Vec::new() };
+        let tile = tiles.iter().position(|tile| tile.has(pixel)).map(Pane::Plane);
+        tile.or((!scene.is_flat()).then_some(Pane::Rendering))
     }
 
     /// The point in space, mm, that a tile of planes shows at a position (pixels of the window).
@@ -111,14 +106,14 @@ impl<'a> Viewport<'a> {
         let (scene, pixel) = self.pixel_at(at)?;
         let tiling = scene.tiling();
         let corner = tiling.tiles.get(tile)?.corner.map(f64::from);
-        let reach = reach * self.scale();
         let on_tile = overlay::drawn(scene, self.volume, self.measures).into_iter();
         let on_tile = on_tile.filter(|drawn| drawn.tile[0] == corner && !drawn.is_of_other);
         // The points of a way make one line.
         let on_tile = on_tile.filter(|drawn| self.measures[drawn.index].kind != MeasureKind::Surface);
-        let near = on_tile.flat_map(|drawn| drawn.points.into_iter().map(move |(point, at)| (drawn.index, point, at)));
-        let near = near.map(|(index, point, [x, y])| (index, point, (x - pixel[0]).hypot(y - pixel[1])));
-        near.filter(|near| near.2 <= reach).min_by(|a, b| a.2.total_cmp(&b.2)).map(|near| (near.0, near.1))
+        let points =
+            on_tile.flat_map(|drawn| drawn.points.into_iter().map(move |(point, at)| (drawn.index, point, at)));
+        let away = points.map(|(index, point, [x, y])| ((x - pixel[0]).hypot(y - pixel[1]), (index, point)));
+        nearest(away, reach * self.scale())
     }
 
     /// What of the lines along which three planes cross is near a position on one of their tiles (pixels of the window). Returns the vector from
@@ -208,8 +203,7 @@ impl<'a> Viewport<'a> {
     pub(super) fn curve_point_at(&self, tile: usize, at: [f64; 2], reach: f64) -> Option<usize> {
         let (scene, pixel) = self.pixel_at(at)?;
         let line = scene.curve_line(&scene.tiling()).filter(|line| line.tile == tile)?;
-        let away = line.points.iter().map(|[x, y]| (x - pixel[0]).hypot(y - pixel[1])).enumerate();
-        let near = away.filter(|(_, away)| *away <= reach * self.scale());
-        near.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(index, _)| index)
+        let away = line.points.iter().map(|[x, y]| (x - pixel[0]).hypot(y - pixel[1]));
+        nearest(away.zip(0..), reach * self.scale())
     }
 }

@@ -139,16 +139,11 @@ impl Recordings {
             let folder = entry.path.parent().and_then(Path::file_name);
             folder.map_or(String::new(), |name| name.to_string_lossy().into_owned())
         };
-        let long: Vec<String> =
-            (0..short.len())
-                .map(|n| {
-                    if is_twice(&short, n) {
-                        format!("{}/{}", folder(&self.all[n]), short[n])
-                    } else {
-                        short[n].clone()
-                    }
-                })
-                .collect();
+        let long = (0..short.len()).map(|n| match is_twice(&short, n) {
+            true => format!("{}/{}", folder(&self.all[n]), short[n]),
+            false => short[n].clone(),
+        });
+        let long: Vec<String> = long.collect();
         let number = |n: usize| long[..n].iter().filter(|name| **name == long[n]).count() + 1;
         let names = (0..long.len()).map(|n| match is_twice(&long, n) {
             true => format!("{} ({})", long[n], number(n)),

@@ -2,8 +2,8 @@
 //! rendering.
 
 use super::command::Face;
-use super::picking::Picker;
-use super::view::{FACES, below_face, face_axis, outwards, start_depth};
+use super::picking::{Picker, nearest};
+use super::view::{FACES, below_face, drawn_axis, face_axis, start_depth};
 use crate::scene::Scene;
 use crate::scene::planes::{Plane, Tile, Tiling};
 use crate::scene::start_curve::StartCurve;
@@ -138,16 +138,12 @@ pub(super) fn start_at(
     let start = start_line(scene, &scene.tiling(), tile, points)?;
     let [of_line, of_handle] = reach;
     let away = |[x, y]: &[f64; 2]| (x - at[0]).hypot(y - at[1]);
-    let handles = start.handles.iter().map(away).enumerate().filter(|(_, away)| *away <= of_handle);
-    if let Some((index, _)) = handles.min_by(|a, b| a.1.total_cmp(&b.1)) {
-        return Some(StartPart::Handle(index));
-    }
+    let handle = nearest(start.handles.iter().map(away).zip(0..), of_handle);
     let pieces = start.line.windows(2).zip(start.lateral.windows(2)).map(|(ends, lateral)| {
         let ends = [ends[0], ends[1]];
         (distance(at, ends), lateral[0] + (lateral[1] - lateral[0]) * share(at, ends))
     });
-    let nearest = pieces.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    (nearest.0 <= of_line).then_some(StartPart::Line(nearest.1))
+    handle.map(StartPart::Handle).or_else(|| nearest(pieces, of_line).map(StartPart::Line))
 }
 
 /// The middle of the part of a line that is on a tile, if that is long enough.
@@ -181,18 +177,13 @@ pub(super) fn part_at(scene: &Scene, tile: usize, at: [f64; 2], reach: [f64; 2])
     let sides = section(scene, &tiling, tiling.tiles.get(tile)?);
     let [of_side, of_handle] = reach;
     let to_handle = |side: &Side| side.handle.map(|[x, y]| (x - at[0]).hypot(y - at[1]));
-    let handles = sides.iter().filter_map(|side| Some((to_handle(side)?, side.face)));
-    let handle = handles.filter(|(away, _)| *away <= of_handle).min_by(|a, b| a.0.total_cmp(&b.0));
-    let lines = sides.iter().map(|side| (distance(at, side.ends), side.face));
-    let line = lines.filter(|(away, _)| *away <= of_side).min_by(|a, b| a.0.total_cmp(&b.0));
+    let handle = nearest(sides.iter().filter_map(|side| Some((to_handle(side)?, side.face))), of_handle);
+    let line = || nearest(sides.iter().map(|side| (distance(at, side.ends), side.face)), of_side);
     let is_inside = || {
         let place = tiling.point(&tiling.tiles[tile], at);
         place.cmpge(scene.low).all() && place.cmple(scene.high).all()
     };
-    match handle.or(line) {
-        Some((_, face)) => Some(Part::Face(face)),
-        None => is_inside().then_some(Part::Inside),
-    }
+    handle.or_else(line).map(Part::Face).or_else(|| is_inside().then_some(Part::Inside))
 }
 
 /// Distance of a point from a line between two ends.
@@ -246,11 +237,5 @@ pub(super) fn rendered_handles(scene: &Scene) -> Vec<[f64; 2]> {
         return Vec::new();
     }
     let picker = Picker::of(scene);
-    let handles = FACES.into_iter().filter(|face| super::view::can_be_dragged(scene, &picker, *face));
-    handles.filter_map(|face| picker.project(face_axis(scene, face).0)).collect()
-}
-
-/// How far a face moves outwards, mm, if its line on a plane is dragged by the vector `way` in space, mm.
-pub(super) fn along(face: Face, way: DVec3) -> f64 {
-    way.dot(outwards(face))
+    FACES.into_iter().filter_map(|face| Some(drawn_axis(scene, &picker, face)?.0)).collect()
 }

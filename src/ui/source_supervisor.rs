@@ -39,36 +39,28 @@ impl SourceState {
         has_shown: bool,
     ) -> Option<SourceNotice> {
         use SourceKind::{Demo, Pipe, Probe, Recording};
-        let waiting = match kind {
-            Demo => texts::COMPUTING_DEMO_DATA,
-            Recording => texts::READING_RECORDING,
-            Pipe => texts::WAITING_FOR_STANDARD_INPUT,
-            Probe => texts::CONNECTING_TO_PROBE,
+        let silent_pipe = (texts::NO_FRAMES_ON_STANDARD_INPUT, texts::NO_FRAMES_ON_STANDARD_INPUT_ABOUT);
+        let silent_probe = (texts::NO_FRAMES_FROM_THE_PROBE, texts::NO_FRAMES_FROM_THE_PROBE_ABOUT);
+        // Files and the phantom are read by this program: if they take long, it is busy.
+        let (waiting, again, silent) = match kind {
+            Demo => (texts::COMPUTING_DEMO_DATA, texts::NO_DEMO_DATA, None),
+            Recording => (texts::READING_RECORDING, texts::RECORDING_NOT_OPENED, None),
+            Pipe => (texts::WAITING_FOR_STANDARD_INPUT, texts::STANDARD_INPUT_NOT_READ, Some(silent_pipe)),
+            Probe => (texts::CONNECTING_TO_PROBE, texts::NO_PROBE, Some(silent_probe)),
         };
-        let again = match kind {
-            Demo => texts::NO_DEMO_DATA,
-            Recording => texts::RECORDING_NOT_OPENED,
-            Pipe => texts::STANDARD_INPUT_NOT_READ,
-            Probe => texts::NO_PROBE,
-        };
-        match (self, disconnected) {
-            (SourceState::Opening, _) => Some((waiting, String::new(), false)),
-            (SourceState::Retrying(why), _) => Some((again, why.clone(), true)),
-            (SourceState::Cancelled, _) => {
-                Some((texts::READING_CANCELLED, texts::READING_CANCELLED_ABOUT.into(), false))
-            }
-            (SourceState::Ended(why), _) => Some((texts::SOURCE_ENDED, why.clone()?, true)),
-            (SourceState::Open, Some(why)) => Some((texts::NOT_CONNECTED, why.into(), true)),
-            // Files and the phantom are read by this program: if they take long, it is busy.
-            (SourceState::Open, None) if is_silent && matches!(kind, Pipe | Probe) => match kind {
-                Pipe => {
-                    Some((texts::NO_FRAMES_ON_STANDARD_INPUT, texts::NO_FRAMES_ON_STANDARD_INPUT_ABOUT.into(), true))
-                }
-                _ => Some((texts::NO_FRAMES_FROM_THE_PROBE, texts::NO_FRAMES_FROM_THE_PROBE_ABOUT.into(), true)),
+        let (title, text, is_fault) = match self {
+            SourceState::Opening => (waiting, "", false),
+            SourceState::Retrying(why) => (again, why.as_str(), true),
+            SourceState::Cancelled => (texts::READING_CANCELLED, texts::READING_CANCELLED_ABOUT, false),
+            SourceState::Ended(why) => (texts::SOURCE_ENDED, why.as_deref()?, true),
+            SourceState::Open => match (disconnected, silent.filter(|_| is_silent)) {
+                (Some(why), _) => (texts::NOT_CONNECTED, why, true),
+                (None, Some((title, about))) => (title, about, true),
+                (None, None) if !has_shown => (waiting, "", false),
+                (None, None) => return None,
             },
-            (SourceState::Open, None) if !has_shown => Some((waiting, String::new(), false)),
-            (SourceState::Open, None) => None,
-        }
+        };
+        Some((title, text.into(), is_fault))
     }
 }
 
@@ -79,11 +71,12 @@ pub(super) struct SourceSupervisor {
     retry: Option<Duration>,
     record: Option<PathBuf>,
     wake: Wake,
-    state: SourceState,
+    pub(super) state: SourceState,
     opening: Option<Receiver<Result<Box<dyn Live>, String>>>,
-    next_attempt: Option<Instant>,
+    /// When [`SourceSupervisor::poll`] has to be called even without an event; None if an event comes first.
+    pub(super) next_attempt: Option<Instant>,
     /// How often the source could not be opened.
-    not_opened: u64,
+    pub(super) not_opened: u64,
     /// The reason that was logged last; each is logged once.
     logged: Option<String>,
 }
@@ -110,20 +103,6 @@ impl SourceSupervisor {
         }
     }
 
-    /// Number of times that the source could not be opened.
-    pub(super) fn not_opened(&self) -> u64 {
-        self.not_opened
-    }
-
-    pub(super) fn state(&self) -> &SourceState {
-        &self.state
-    }
-
-    /// Time at which [`SourceSupervisor::poll`] has to be called even without an event; None if an event comes first.
-    pub(super) fn wakes_at(&self) -> Option<Instant> {
-        self.next_attempt
-    }
-
     /// The source, if it was opened since the last call; otherwise None.
     pub(super) fn poll(&mut self, now: Instant) -> Option<Feed> {
         if self.next_attempt.is_some_and(|at| now >= at) {
@@ -142,19 +121,12 @@ impl SourceSupervisor {
             let feed = Feed::observed(source, record.as_deref(), Some(self.wake.clone()), None);
             feed.map_err(texts::why_no_thread_for_source)
         });
-        match feed {
-            Ok(feed) => {
-                self.state = SourceState::Open;
-                if self.logged.take().is_some() {
-                    tracing::info!("source: it is open now");
-                }
-                Some(feed)
-            }
-            Err(why) => {
-                self.cannot_open(why, now);
-                None
-            }
+        let feed = feed.map_err(|why| self.cannot_open(why, now)).ok()?;
+        self.state = SourceState::Open;
+        if self.logged.take().is_some() {
+            tracing::info!("source: it is open now");
         }
+        Some(feed)
     }
 
     /// Cancels the opening of the source. Returns false if it is not being opened.
@@ -258,17 +230,17 @@ mod tests {
         });
         let mut supervisor = SourceSupervisor::new(open, Some(Duration::from_secs(5)), None, Arc::new(|| ()));
         assert!(!poll(&mut supervisor, Duration::ZERO));
-        assert_eq!(supervisor.state(), &SourceState::Retrying("no probe".into()));
+        assert_eq!(supervisor.state, SourceState::Retrying("no probe".into()));
         // Not before the interval has passed.
         assert!(!poll(&mut supervisor, Duration::ZERO));
-        assert_eq!((tries.load(Ordering::Relaxed), supervisor.not_opened()), (1, 1));
+        assert_eq!((tries.load(Ordering::Relaxed), supervisor.not_opened), (1, 1));
         assert!(!poll(&mut supervisor, Duration::from_secs(6)));
         assert!(poll(&mut supervisor, Duration::from_secs(12)));
-        assert_eq!(supervisor.state(), &SourceState::Open);
+        assert_eq!(supervisor.state, SourceState::Open);
         supervisor.ended(None, Instant::now());
-        assert_eq!(supervisor.state(), &SourceState::Retrying("the source ended".into()));
+        assert_eq!(supervisor.state, SourceState::Retrying("the source ended".into()));
         assert!(poll(&mut supervisor, Duration::from_secs(6)));
-        assert_eq!(supervisor.not_opened(), 2);
+        assert_eq!(supervisor.not_opened, 2);
     }
 
     #[test]
@@ -298,8 +270,8 @@ mod tests {
         let mut supervisor = SourceSupervisor::new(Arc::new(|| Ok(Box::new(Silent))), None, None, Arc::new(|| ()));
         assert!(poll(&mut supervisor, Duration::ZERO));
         supervisor.ended(Some("cut".into()), Instant::now());
-        assert_eq!(supervisor.state(), &SourceState::Ended(Some("cut".into())));
-        assert!(!poll(&mut supervisor, Duration::from_secs(100)) && supervisor.wakes_at().is_none());
+        assert_eq!(supervisor.state, SourceState::Ended(Some("cut".into())));
+        assert!(!poll(&mut supervisor, Duration::from_secs(100)) && supervisor.next_attempt.is_none());
     }
 
     #[test]
@@ -314,8 +286,8 @@ mod tests {
         assert!(!supervisor.cancel(), "nothing has begun");
         assert!(supervisor.poll(Instant::now()).is_none() && supervisor.cancel());
         drop(open);
-        assert!(!poll(&mut supervisor, Duration::from_secs(100)) && supervisor.state() == &SourceState::Cancelled);
-        let notice = supervisor.state().notice(SourceKind::Recording, None, false, false);
+        assert!(!poll(&mut supervisor, Duration::from_secs(100)) && supervisor.state == SourceState::Cancelled);
+        let notice = supervisor.state.notice(SourceKind::Recording, None, false, false);
         assert_eq!(notice, Some(("Reading was cancelled", "Ctrl+O opens a recording.".into(), false)));
     }
 
@@ -324,6 +296,6 @@ mod tests {
         let mut supervisor =
             SourceSupervisor::new(Arc::new(|| panic!("injected")), Some(Duration::from_secs(1)), None, Arc::new(|| ()));
         assert!(!poll(&mut supervisor, Duration::ZERO));
-        assert!(matches!(supervisor.state(), SourceState::Retrying(_)));
+        assert!(matches!(supervisor.state, SourceState::Retrying(_)));
     }
 }

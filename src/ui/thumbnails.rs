@@ -5,7 +5,7 @@ use crate::gpu::{Context, Renderer, RendererOptions, Wake};
 use crate::picture::Picture;
 use crate::probe::Geometry;
 use crate::scene::{
-    Bilateral, Conditioning, Distance, Input, Layout, LightVolume, Marks, Post, Ray, Scene, Settings, Slices,
+    Bilateral, Conditioning, Distance, Drawings, Input, Layout, LightVolume, Post, Ray, Scene, Settings, Slices,
 };
 use crate::source::coarse::coarse;
 use crate::source::{Frame, StoredType};
@@ -33,6 +33,8 @@ pub(super) struct Job {
     pub(super) input: Input,
     /// For each thumbnail what it shows; None for one that is not drawn.
     pub(super) pictures: Vec<Option<Wanted>>,
+    /// Called by the drawing thread after each thumbnail, drawn or failed.
+    pub(super) wake: Wake,
 }
 
 /// The volume that a thumbnail shows, and its settings.
@@ -43,9 +45,10 @@ pub(super) struct Wanted {
 }
 
 /// A list of thumbnails, and the thread that draws them.
+#[derive(Default)]
 pub(super) struct Thumbnails {
-    wake: Wake,
-    pictures: Vec<Option<Arc<Picture>>>,
+    /// The thumbnails drawn so far; None for one that is not. Those of an earlier job stay until they are replaced.
+    pub(super) pictures: Vec<Option<Arc<Picture>>>,
     work: Option<Work>,
     /// Threads that were told to stop.
     ending: Vec<JoinHandle<()>>,
@@ -66,15 +69,6 @@ struct Orders {
 }
 
 impl Thumbnails {
-    pub(super) fn new(wake: Wake) -> Thumbnails {
-        Thumbnails { wake, pictures: Vec::new(), work: None, ending: Vec::new() }
-    }
-
-    /// The thumbnails drawn so far; None for one that is not. Those of an earlier job stay until they are replaced.
-    pub(super) fn pictures(&self) -> &[Option<Arc<Picture>>] {
-        &self.pictures
-    }
-
     pub(super) fn is_working(&self) -> bool {
         self.work.is_some()
     }
@@ -87,19 +81,12 @@ impl Thumbnails {
         nothing.for_each(|(_, picture)| *picture = None);
         let (sender, made) = channel();
         let orders = Arc::new(Orders::default());
-        let (heard, wake) = (orders.clone(), self.wake.clone());
-        let work = move || job.draw(&heard, &sender, &wake);
+        let heard = orders.clone();
+        let work = move || job.draw(&heard, &sender);
         match std::thread::Builder::new().name("thumbnails".into()).spawn(work) {
             Ok(thread) => self.work = Some(Work { made, orders, thread }),
             Err(e) => tracing::debug!("no thumbnails are made: {e}"),
         }
-    }
-
-    /// Starts to draw the thumbnails of a job, in place of those that are being drawn. The list is `kept` until its entries are replaced; one that
-    /// the job does not draw stays.
-    pub(super) fn begin_with(&mut self, job: Job, kept: Vec<Option<Arc<Picture>>>) {
-        self.begin(job);
-        self.pictures = kept;
     }
 
     /// Collects thumbnails that are finished. `may_draw`: the view is at rest, so that the thread may use the device. Returns true if there is a
@@ -139,12 +126,6 @@ impl Thumbnails {
             self.ending.push(work.thread);
         }
     }
-
-    /// Stops drawing, and discards all thumbnails.
-    pub(super) fn clear(&mut self) {
-        self.stop();
-        self.pictures.clear();
-    }
 }
 
 impl Drop for Thumbnails {
@@ -156,17 +137,15 @@ impl Drop for Thumbnails {
 }
 
 impl Job {
-    fn draw(self, orders: &Orders, made: &Sender<(usize, Option<Picture>)>, wake: &Wake) {
+    fn draw(self, orders: &Orders, made: &Sender<(usize, Option<Picture>)>) {
+        let must_stop = || orders.must_stop.load(Ordering::Relaxed);
         let (mut renderer, mut copy) = (None, None);
         for (n, wanted) in self.pictures.iter().enumerate() {
             let since = Instant::now();
-            while !orders.may_draw.load(Ordering::Relaxed) && since.elapsed() < PATIENCE {
-                if orders.must_stop.load(Ordering::Relaxed) {
-                    return;
-                }
+            while !must_stop() && !orders.may_draw.load(Ordering::Relaxed) && since.elapsed() < PATIENCE {
                 std::thread::sleep(POLL);
             }
-            if orders.must_stop.load(Ordering::Relaxed) {
+            if must_stop() {
                 return;
             }
             let Some(wanted) = wanted else { continue };
@@ -178,7 +157,7 @@ impl Job {
             if made.send((n, picture)).is_err() {
                 return;
             }
-            wake();
+            (self.wake)();
         }
     }
 }
@@ -258,9 +237,7 @@ fn thumbnail(settings: &Settings) -> Settings {
         light: crate::scene::Light { volume, ..of.light },
         planes: crate::scene::Planes { lines: false, reference: false, smooth: None, ..of.planes },
         post: Post { sigma: None, enhanced_sigma: None, perona_malik: None, ..of.post },
-        marks: Marks::default(),
-        measure: Vec::new(),
-        body_marks: Vec::new(),
+        drawn: Drawings::default(),
         ..of
     }
 }

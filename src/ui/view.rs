@@ -1,7 +1,7 @@
 //! How commands change the camera, the light, the viewer's clip plane, the planes and the region. Every function takes any finite numbers and returns
 //! numbers that [`Scene::new`] accepts.
 
-use super::picking::Picker;
+use super::picking::{Picker, nearest};
 use crate::probe::{Geometry, Motion};
 use crate::scene::{Camera, Clip, MAX_CLIPS, PlaneName, Scene, Settings, insonified_box};
 use glam::{DVec2, DVec3};
@@ -209,7 +209,7 @@ pub(super) const FACES: [Face; 6] = [
 ];
 
 /// The outward unit normal of a face of the region.
-pub(super) fn outwards(face: Face) -> DVec3 {
+fn outwards(face: Face) -> DVec3 {
     DVec3::AXES[face.axis] * if face.high { 1.0 } else { -1.0 }
 }
 
@@ -239,12 +239,8 @@ pub(super) fn move_face(scene: &Scene, face: Face, by: f64) -> Settings {
     let (low, high) = (below_face(scene, scene.low)[face.axis], below_face(scene, scene.high)[face.axis]);
     let mut settings = scene.settings.clone();
     let region = &mut settings.region;
-    let side = match face.axis {
-        0 => &mut region.lateral,
-        1 => &mut region.depth,
-        _ => &mut region.elevation,
-    };
-    *side = Some(if face.high { [low, high + by] } else { [low - by, high] });
+    let sides = [&mut region.lateral, &mut region.depth, &mut region.elevation];
+    *sides[face.axis] = Some(if face.high { [low, high + by] } else { [low - by, high] });
     settings
 }
 
@@ -275,13 +271,13 @@ pub(super) fn move_region(scene: &Scene, by: DVec3) -> Settings {
 /// A face cannot be dragged if its axis appears shorter than this fraction of its length: small drags would move it too far.
 const MIN_FORESHORTENING: f64 = 0.25;
 
-/// True if the normal of a face is long enough in the picture for the face to be dragged.
-pub(super) fn can_be_dragged(scene: &Scene, picker: &Picker, face: Face) -> bool {
+/// The centre of a face in the picture, and the way from there along its normal, outwards, for a millimetre, both in pixels. None if the normal is too
+/// short in the picture for the face to be dragged.
+pub(super) fn drawn_axis(scene: &Scene, picker: &Picker, face: Face) -> Option<([f64; 2], [f64; 2])> {
     let (middle, out) = face_axis(scene, face);
-    let ends = picker.project(middle).zip(picker.project(middle + out));
-    ends.is_some_and(|(from, to)| {
-        (to[0] - from[0]).hypot(to[1] - from[1]) * picker.mm_per_pixel() >= MIN_FORESHORTENING
-    })
+    let (from, to) = (picker.project(middle)?, picker.project(middle + out)?);
+    let way = [to[0] - from[0], to[1] - from[1]];
+    (way[0].hypot(way[1]) * picker.mm_per_pixel() >= MIN_FORESHORTENING).then_some((from, way))
 }
 
 /// The face of the region whose normal, drawn from its centre outwards, is nearest to a position (pixels of the picture). None if no face can be
@@ -289,18 +285,12 @@ pub(super) fn can_be_dragged(scene: &Scene, picker: &Picker, face: Face) -> bool
 pub(super) fn nearest_face(scene: &Scene, at: [f64; 2]) -> Option<Face> {
     let picker = Picker::of(scene);
     let distance = |face: &Face| {
-        let (middle, out) = face_axis(scene, *face);
-        if !can_be_dragged(scene, &picker, *face) {
-            return None;
-        }
-        let (from, to) = (picker.project(middle)?, picker.project(middle + out)?);
-        let projected = [to[0] - from[0], to[1] - from[1]];
+        let (from, projected) = drawn_axis(scene, &picker, *face)?;
         let length = projected[0].hypot(projected[1]);
         let grab = [at[0] - from[0], at[1] - from[1]];
         let along = (grab[0] * projected[0] + grab[1] * projected[1]) / length;
         let across = (grab[0] * projected[1] - grab[1] * projected[0]) / length;
         Some(across.hypot(along.min(0.0)))
     };
-    let candidates = FACES.iter().filter_map(|face| Some((*face, distance(face)?)));
-    candidates.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(face, _)| face)
+    nearest(FACES.iter().filter_map(|face| Some((distance(face)?, *face))), f64::INFINITY)
 }

@@ -139,24 +139,20 @@ impl Export {
     fn process(&self, command: &mut Command, must_stop: &dyn Fn() -> bool) -> Result<(), String> {
         command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
         command.env(progress_lines::ASKED_BY.0, progress_lines::ASKED_BY.1);
-        let child = command.spawn().map_err(texts::why_export_not_started);
-        let mut child = child?;
+        let mut child = command.spawn().map_err(texts::why_export_not_started)?;
         let messages = child.stderr.take();
         let progress = self.progress.clone();
         // Not waited for where the work is cancelled: what the process left running may hold the pipe.
         let said = thread::spawn(move || messages.map_or_else(String::new, |messages| listen(messages, &progress)));
         let status = self.wait(&mut child, must_stop)?;
         let said = said.join().unwrap_or_default();
-        match status.success() {
-            true => Ok(()),
-            false => {
-                let last =
-                    said.lines().map(str::trim).rfind(|line| !line.is_empty()).unwrap_or(texts::WHY_EXPORT_ENDED);
-                // The view says itself that this program did not save.
-                let last = last.strip_prefix("echolume: ").unwrap_or(last);
-                Err(printable(last.trim_start_matches("error: ")))
-            }
+        if status.success() {
+            return Ok(());
         }
+        let last = said.lines().map(str::trim).rfind(|line| !line.is_empty()).unwrap_or(texts::WHY_EXPORT_ENDED);
+        // The view says itself that this program did not save.
+        let last = last.strip_prefix("echolume: ").unwrap_or(last);
+        Err(printable(last.trim_start_matches("error: ")))
     }
 
     /// Waits for the process, and ends it where it has to stop.
@@ -274,7 +270,7 @@ impl Job {
         let file = recording.with_file_name("scene.toml");
         // The recording holds what is between the marks.
         let mut settings = self.settings.clone();
-        (settings.cine.first, settings.cine.last) = (None, None);
+        (settings.drawn.cine.first, settings.drawn.cine.last) = (None, None);
         let origin = self.origin.clone().unwrap_or_else(|| Origin::of(Some(RECORDING.into())));
         let text = workspace::text(&settings, &origin)?;
         std::fs::write(&file, text).map_err(|e| format!("{}: {e}", file.display()))?;

@@ -234,11 +234,13 @@ pub fn compare_picture(findings: &mut Findings, input: &str, expected: &Picture,
     findings.figures.push(Figure::informative("largest difference", apart.largest.into(), Unit::Levels));
 }
 
-/// Adds a fault unless two pictures are identical byte for byte. Returns true if they are. `what`: name of the comparison.
+/// Adds a fault unless two pictures are identical byte for byte, and counts the comparison. Returns true if they are. `what`: name of the comparison.
 pub fn expect_same_picture(findings: &mut Findings, what: &str, expected: &Picture, got: &Picture) -> bool {
+    findings.compared += 1;
     if expected == got {
         return true;
     }
+    findings.differ += 1;
     let size = |p: &Picture| format!("{}x{}", p.width, p.height);
     if size(expected) != size(got) {
         findings.expect(false, || format!("{what}: expected {}, got {}", size(expected), size(got)));
@@ -248,16 +250,15 @@ pub fn expect_same_picture(findings: &mut Findings, what: &str, expected: &Pictu
     let other = expected.rgba.iter().zip(&got.rgba).filter(|(a, b)| a != b).count();
     let values = expected.rgba.len();
     let said = format!("{what}: {other} of {values} values differ, by {} levels at most", apart.largest);
-    let fault = Some(findings.faults.len());
-    findings.pictures.push(PictureComparison { fault, ..picture_comparison(what, expected, got) });
-    findings.faults.push(Fault { worst: Some(Worst { beyond: other, ..apart.worst }), ..Fault::new(said) });
+    let fault = Fault { worst: Some(Worst { beyond: other, ..apart.worst }), ..Fault::new(said) };
+    findings.add_shown(fault, picture_comparison(what, expected, got));
     false
 }
 
-/// Records as figures how many pictures were compared, and how many of them differ; any that differs is above the limit.
-pub(crate) fn add_picture_counts(findings: &mut Findings, compared: usize, differ: usize) {
-    findings.figures.push(count_figure("pictures compared", compared));
-    findings.figures.push(Figure::error("pictures that differ", differ as f64, 0.0, Unit::Count));
+/// Records as figures how many pictures were compared so far, and how many of them differ; any that differs is above the limit.
+pub(crate) fn add_picture_counts(findings: &mut Findings) {
+    findings.figures.push(count_figure("pictures compared", findings.compared));
+    findings.figures.push(Figure::error("pictures that differ", findings.differ as f64, 0.0, Unit::Count));
 }
 
 /// A comparison picture of one slice of two arrays, with the same grey scale: values of 0..1 as they are, others from the smallest to the largest

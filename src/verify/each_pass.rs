@@ -234,19 +234,13 @@ impl PassSummary {
             Some(worst) => format!("{} of {} values beyond tolerance", worst.beyond, worst.texels),
             None => format!("errors go one way: their mean is {:.2} of what is allowed of each", of.bias),
         };
+        let input = format!("'{name}', iteration {iteration}, {kind}");
+        let (pass, worst) = (Some(pass.name.into()), of.worst.clone());
+        self.findings.faults.push(Fault { pass, input, worst, ..Fault::new(what) });
         if let Some(worst) = &of.worst {
             let (e, g) = (result.expected.get(&worst.output), result.got.get(&worst.output));
-            let mut picture = texel_comparison(&format!("{} of '{name}'", worst.output), e, g, worst.at[2]);
-            picture.fault = Some(self.findings.faults.len());
-            self.findings.pictures.push(picture);
+            self.findings.show(texel_comparison(&format!("{} of '{name}'", worst.output), e, g, worst.at[2]));
         }
-        self.findings.faults.push(Fault {
-            what,
-            pass: Some(pass.name.into()),
-            input: format!("'{name}', iteration {iteration}, {kind}"),
-            worst: of.worst.clone(),
-            files: Vec::new(),
-        });
     }
 
     pub(super) fn into_findings(self, pass: &Pass) -> Findings {

@@ -9,7 +9,7 @@ use crate::passes::Texels;
 use crate::picture::Picture;
 use crate::plan::Plan;
 use crate::probe::Geometry;
-use crate::report::{Fault, Figure, Level, PictureComparison, Unit};
+use crate::report::{Fault, Figure, Level, Unit};
 use crate::scene::{Sampling, Scene};
 use std::sync::Arc;
 
@@ -94,11 +94,10 @@ impl LargestDifference {
         if is[0] <= allowed[0] && is[1] <= allowed[1] {
             return;
         }
-        let fault = Some(findings.faults.len());
-        findings.pictures.push(PictureComparison { fault, ..picture_comparison(what, expected, got) });
         let [mean, most] = is;
         let said = format!("{what}: {mean:.2} levels off on average, 99 % of values by {most} at most");
-        findings.faults.push(Fault { worst: Some(picture_difference(expected, got).worst), ..Fault::new(said) });
+        let fault = Fault { worst: Some(picture_difference(expected, got).worst), ..Fault::new(said) };
+        findings.add_shown(fault, picture_comparison(what, expected, got));
     }
 
     fn add_figures(&self, findings: &mut Findings, [mean, most]: [f64; 2]) {

@@ -55,8 +55,8 @@ fn matches(pattern: &[u8], text: &[u8]) -> bool {
     pattern[p..].iter().all(|c| *c == b'*')
 }
 
-/// Letters and digits of a title, with `_` for everything else: names of suites and cases have no spaces and no dots.
-fn identifier(title: &str) -> String {
+/// Letters and digits of a title, with one `_` for everything else between them: names of suites and cases have no spaces and no dots.
+pub fn identifier(title: &str) -> String {
     let mut name = String::new();
     for c in title.chars() {
         match c {

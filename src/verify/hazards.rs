@@ -9,12 +9,12 @@ use crate::passes::{Slot, Texels};
 use crate::picture::Picture;
 use crate::probe::Geometry;
 use crate::queues::MAX_QUEUES;
-use crate::report::{Fault, Level, PictureComparison};
+use crate::report::{Fault, Level};
 use crate::scene::Scene;
 use std::sync::Arc;
 
-/// A scenario on a number of queues; returns how many pictures were compared and how many differ.
-type Scenario = fn(&mut Findings, &IsolatedContext, usize, Level) -> Result<[usize; 2], GpuError>;
+/// A scenario on a number of queues. Each of its pictures is compared; the findings count them.
+type Scenario = fn(&mut Findings, &IsolatedContext, usize, Level) -> Result<(), GpuError>;
 
 pub fn checks(_: Level) -> Vec<Check> {
     let of = |name: &str, scenario: Scenario| {
@@ -62,14 +62,13 @@ pub(crate) fn validation_notices_a_dropped_barrier(dut: &DeviceUnderTest) -> Res
 
 /// Runs a scenario on one, two and three queues.
 fn on_queues(dut: &mut DeviceUnderTest, scenario: Scenario) -> Result<Findings, GpuError> {
-    let (mut findings, mut totals) = (Findings::default(), [0, 0]);
+    let mut findings = Findings::default();
     for queues in 1..=MAX_QUEUES {
         let isolated = IsolatedContext::of_queues(dut, queues)?;
-        let [compared, wrong] = scenario(&mut findings, &isolated, queues, dut.level)?;
-        totals = [totals[0] + compared, totals[1] + wrong];
+        scenario(&mut findings, &isolated, queues, dut.level)?;
         isolated.report_validation(&mut findings);
     }
-    add_picture_counts(&mut findings, totals[0], totals[1]);
+    add_picture_counts(&mut findings);
     let there = dut.context.queue_count();
     if there < MAX_QUEUES {
         findings.notes.push(format!("queues for different work: {there} of {MAX_QUEUES}; one does what several would"));
@@ -122,8 +121,7 @@ fn volume_waited_for(
 
 /// Renders `rounds` pictures on `queues` queues from two volume images in turn: round n, counted from 0, renders image n % 2. During each round the
 /// next volume is sent into the image `into(n)`. If this is the image that is not being rendered, all pictures are right; otherwise some show the
-/// wrong volume. Each wrong picture is added to `findings` as a fault.
-/// Returns the number of pictures that were compared, and of those that differ.
+/// wrong volume. Each picture is counted in `findings`, and each wrong one is a fault there.
 ///
 /// # Errors
 /// The device fails.
@@ -133,7 +131,7 @@ pub fn alternating_images(
     queues: usize,
     rounds: usize,
     into: impl Fn(usize) -> u32,
-) -> Result<[usize; 2], GpuError> {
+) -> Result<(), GpuError> {
     let scene = made(SMOOTH)?;
     let volumes: Vec<_> = (0..3).map(|number| stored(&scene, number)).collect();
     let expected: Result<Vec<_>, _> = volumes.iter().map(|frames| waited_for(context, &scene, frames)).collect();
@@ -141,7 +139,6 @@ pub fn alternating_images(
     let options = RendererOptions { volume_images: 2, queues: Some(queues), ..RendererOptions::default() };
     let mut renderer = Renderer::new(context, scene, &options)?;
     send(&mut renderer, &volumes[0], 0)?;
-    let mut wrong = 0;
     for round in 0..rounds {
         let slow = if round % 2 == 0 { "raycast_surface" } else { "scan_convert" };
         context.faults.slow_down(slow, 12);
@@ -150,19 +147,14 @@ pub fn alternating_images(
         // More frames than the upload ring has lanes, while the picture is being rendered.
         send(&mut renderer, &volumes[(round + 1) % 3], into(round))?;
         let what = format!("volume {round}, {queues} queues, '{slow}' slowed down");
-        wrong += usize::from(!expect_same_picture(findings, &what, &expected[round % 3], &renderer.end_picture()?));
+        expect_same_picture(findings, &what, &expected[round % 3], &renderer.end_picture()?);
     }
     context.faults.slow_down("", 1);
-    Ok([rounds, wrong])
+    Ok(())
 }
 
 /// Slices of the only volume image are replaced while it is rendered: they wait for the picture, and the next picture shows them.
-fn replaced(
-    findings: &mut Findings,
-    isolated: &IsolatedContext,
-    queues: usize,
-    level: Level,
-) -> Result<[usize; 2], GpuError> {
+fn replaced(findings: &mut Findings, isolated: &IsolatedContext, queues: usize, level: Level) -> Result<(), GpuError> {
     let context = &isolated.context;
     let (scene, mut noise) = (made(PLAIN)?, Noise(5));
     let volumes: Vec<_> = (0..3).map(|number| stored(&scene, number)).collect();
@@ -170,8 +162,7 @@ fn replaced(
     let mut renderer = Renderer::new(context, scene.clone(), &options)?;
     let mut there = volumes[0].clone();
     send(&mut renderer, &there, 0)?;
-    let (rounds, mut wrong) = (if level == Level::Quick { 4 } else { 40 }, 0);
-    for round in 0..rounds {
+    for round in 0..if level == Level::Quick { 4 } else { 40 } {
         let expected = waited_for(context, &scene, &there)?;
         context.faults.slow_down("raycast_volume", 12);
         renderer.show(0)?;
@@ -182,25 +173,19 @@ fn replaced(
             renderer.frame(slice as u32, &there[slice], 0)?;
         }
         let what = format!("round {round}, {queues} queues");
-        wrong += usize::from(!expect_same_picture(findings, &what, &expected, &renderer.end_picture()?));
+        expect_same_picture(findings, &what, &expected, &renderer.end_picture()?);
         context.faults.slow_down("", 1);
     }
     renderer.show(0)?;
     let what = format!("after all rounds, {queues} queues");
-    wrong +=
-        usize::from(!expect_same_picture(findings, &what, &waited_for(context, &scene, &there)?, &renderer.picture()?));
-    Ok([rounds + 1, wrong])
+    expect_same_picture(findings, &what, &waited_for(context, &scene, &there)?, &renderer.picture()?);
+    Ok(())
 }
 
 /// Frames of two volumes in random order, some of them after others for the same slice, into two volume images, while pictures
 /// are begun and ended in between.
-fn any_order(
-    findings: &mut Findings,
-    isolated: &IsolatedContext,
-    queues: usize,
-    level: Level,
-) -> Result<[usize; 2], GpuError> {
-    let (context, mut noise, mut totals) = (&isolated.context, Noise(17), [0, 0]);
+fn any_order(findings: &mut Findings, isolated: &IsolatedContext, queues: usize, level: Level) -> Result<(), GpuError> {
+    let (context, mut noise) = (&isolated.context, Noise(17));
     for toml in [PLAIN, SMOOTH] {
         let scene = made(toml)?;
         let options = RendererOptions { volume_images: 2, queues: Some(queues), ..RendererOptions::default() };
@@ -230,35 +215,26 @@ fn any_order(
                 let (expected, volume) = volume_waited_for(context, &scene, frames)?;
                 renderer.show(image as u32)?;
                 let what = format!("image {image} of round {round}, {queues} queues, {:?}", scene.settings.mode);
-                let is_same = expect_same_picture(findings, &what, &expected, &renderer.picture()?);
+                expect_same_picture(findings, &what, &expected, &renderer.picture()?);
                 let there = renderer.read(Slot::Volume)?;
                 if there != volume {
-                    let fault = Some(findings.faults.len());
+                    findings.faults.push(Fault::new(format!("{what}: the volume differs")));
                     if let (Some(volume), Some(there)) = (&volume, &there) {
                         let plane = volume.size[0] * volume.size[1] * volume.channels;
                         let other = volume.values.iter().zip(&there.values).position(|(e, g)| e != g);
                         let slice = other.map_or(0, |i| i / plane.max(1));
-                        findings
-                            .pictures
-                            .push(PictureComparison { fault, ..texel_comparison("volume", volume, there, slice) });
+                        findings.show(texel_comparison("volume", volume, there, slice));
                     }
-                    findings.faults.push(Fault::new(format!("{what}: the volume differs")));
                 }
-                totals = [totals[0] + 1, totals[1] + usize::from(!is_same)];
             }
         }
         context.faults.slow_down("", 1);
     }
-    Ok(totals)
+    Ok(())
 }
 
 /// The scene changes while a picture and frames are in flight: another view, other frame filters, another size.
-fn changes(
-    findings: &mut Findings,
-    isolated: &IsolatedContext,
-    queues: usize,
-    level: Level,
-) -> Result<[usize; 2], GpuError> {
+fn changes(findings: &mut Findings, isolated: &IsolatedContext, queues: usize, level: Level) -> Result<(), GpuError> {
     let context = &isolated.context;
     let scenes = [
         made(PLAIN)?,
@@ -274,8 +250,8 @@ fn changes(
     }
     let options = RendererOptions { volume_images: 2, queues: Some(queues), ..RendererOptions::default() };
     let mut renderer = Renderer::new(context, scenes[0].clone(), &options)?;
-    let (rounds, mut wrong, mut noise) = (if level == Level::Quick { 8 } else { 80 }, 0, Noise(23));
-    for round in 0..rounds {
+    let mut noise = Noise(23);
+    for round in 0..if level == Level::Quick { 8 } else { 80 } {
         let at = if round < scenes.len() { round } else { (noise.next() * scenes.len() as f64) as usize };
         context.faults.slow_down("tone", 8);
         // Frames and a picture of the previous scene are still in flight.
@@ -289,8 +265,8 @@ fn changes(
         let late = frames[round % 2][3].encode(Slot::Frames.format(&scenes[at]));
         renderer.frame(3, &late, round as u32 % 2)?;
         let what = format!("round {round}, scene {at}, {queues} queues");
-        wrong += usize::from(!expect_same_picture(findings, &what, &expected[at][round % 2], &renderer.end_picture()?));
+        expect_same_picture(findings, &what, &expected[at][round % 2], &renderer.end_picture()?);
     }
     context.faults.slow_down("", 1);
-    Ok([rounds, wrong])
+    Ok(())
 }

@@ -11,7 +11,7 @@ use crate::passes::slots::Format;
 use crate::passes::{Arrays, DispatchArgs, MISS, Slot, Texels, is_hit};
 use crate::picture::Picture;
 use crate::probe::{Axis, Geometry, Grid, Probe};
-use crate::report::{Fault, Figure, Level, PictureComparison, Unit, Worst};
+use crate::report::{Fault, Figure, Level, Unit, Worst};
 use crate::scene::Scene;
 use glam::DVec3;
 
@@ -59,8 +59,7 @@ fn show(
     let got = Texels::from_fn(got.size, 1, |at, _| got.get(at)[channel]);
     let mut expected = got.clone();
     known.into_iter().for_each(|(at, value)| expected.set(at, &[value]));
-    let fault = findings.faults.len().checked_sub(1);
-    findings.pictures.push(PictureComparison { fault, ..texel_comparison(what, &expected, &got, 0) });
+    findings.show(texel_comparison(what, &expected, &got, 0));
 }
 
 /// Opacity over a path of constant medium is 1 - (1 - a)^(voxels), whatever the step (Beer and Lambert).
@@ -253,10 +252,9 @@ fn levels(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
                 let at = [i % 16, i / 16, 0];
                 let input = if floats { "a picture of floats, then of 8 bits" } else { "a picture straight of 8 bits" };
                 let both = [i as f64, f64::from(texel[0])];
-                findings.faults.push(fault(input.into(), "another level", "screen", at, both));
                 let expected = Picture { rgba: (0..=255).flat_map(|v| [v, v, v, 255]).collect(), ..picture.clone() };
-                let fault = findings.faults.len().checked_sub(1);
-                findings.pictures.push(PictureComparison { fault, ..picture_comparison(input, &expected, &picture) });
+                let fault = fault(input.into(), "another level", "screen", at, both);
+                findings.add_shown(fault, picture_comparison(input, &expected, &picture));
             }
         }
     }
@@ -305,13 +303,10 @@ fn volume_images(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
         let picture = renderer.picture()?;
         let (got, expected) = (picture.rgba[0], levels[image]);
         if got != expected {
-            let at = [f64::from(expected), f64::from(got)];
-            findings.faults.push(fault(format!("image {image}"), "another volume is shown", "screen", [0; 3], at));
+            let (input, both) = (format!("image {image}"), [f64::from(expected), f64::from(got)]);
             let flat = [expected, expected, expected, 255].repeat(picture.rgba.len() / 4);
-            let (fault, flat) = (findings.faults.len().checked_sub(1), Picture { rgba: flat, ..picture.clone() });
-            findings
-                .pictures
-                .push(PictureComparison { fault, ..picture_comparison(&format!("image {image}"), &flat, &picture) });
+            let pictures = picture_comparison(&input, &Picture { rgba: flat, ..picture.clone() }, &picture);
+            findings.add_shown(fault(input, "another volume is shown", "screen", [0; 3], both), pictures);
         }
     }
     Ok(findings)
@@ -506,12 +501,8 @@ fn shadow_of_a_hill(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     let edge = expected.get("shadow").values.iter().filter(|v| (0.02..0.98).contains(*v)).count();
     findings.expect(edge > 150, || format!("only {edge} texels are an edge of the shadow"));
     if let Some(worst) = compared.worst {
-        let fault = Some(findings.faults.len());
-        findings.pictures.push(PictureComparison {
-            fault,
-            ..texel_comparison("shadow", expected.get("shadow"), got.get("shadow"), 0)
-        });
-        findings.faults.push(Fault { worst: Some(worst), ..Fault::new("the edge of a shadow is another") });
+        let fault = Fault { worst: Some(worst), ..Fault::new("the edge of a shadow is another") };
+        findings.add_shown(fault, texel_comparison("shadow", expected.get("shadow"), got.get("shadow"), 0));
     }
     let allowed = SHADOW.tolerance.outliers;
     findings.figures.push(Figure::error("texels beyond tolerance", compared.outliers, allowed, Unit::Share));

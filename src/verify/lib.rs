@@ -127,12 +127,33 @@ pub struct Findings {
     pub left_out: Option<String>,
     /// The signal that ended the check before it was complete. None if it ran to its end.
     pub interrupted: Option<&'static str>,
+    /// Number of pictures that [`expect_same_picture`] compared.
+    pub compared: usize,
+    /// Number of those that differ.
+    pub differ: usize,
 }
 
 impl Findings {
     /// The findings of a check that was skipped. `why`: what this device or system lacks.
     pub fn left_out(why: impl Into<String>) -> Findings {
         Findings { left_out: Some(why.into()), ..Findings::default() }
+    }
+
+    /// Adds a fault and the pictures that show it.
+    pub(crate) fn add_shown(&mut self, fault: Fault, pictures: PictureComparison) {
+        self.faults.push(fault);
+        self.show(pictures);
+    }
+
+    /// Adds pictures that show the last fault, if there is one.
+    pub(crate) fn show(&mut self, pictures: PictureComparison) {
+        let fault = self.faults.len().checked_sub(1);
+        self.pictures.push(PictureComparison { fault, ..pictures });
+    }
+
+    /// Adds a fault for each message of the validation layer.
+    fn add_messages(&mut self, messages: &[String]) {
+        self.faults.extend(messages.iter().map(|message| Fault::new(format!("validation: {message}"))));
     }
 
     /// Adds a fault with the text `what` unless the condition holds.
@@ -176,19 +197,17 @@ impl Check {
 
     /// Runs the check once, while the host waits for each submission before it makes the next one.
     pub(crate) fn run_waiting(&self, dut: &mut DeviceUnderTest) -> Outcome {
-        let renew = |dut: &mut DeviceUnderTest, waits| {
-            dut.waits = waits;
-            dut.renew().unwrap_or_else(|error| tracing::warn!("the old device goes on: {error}"));
-        };
-        renew(dut, true);
+        dut.waits = true;
+        dut.try_to_renew();
         let outcome = self.run_once(dut);
-        renew(dut, false);
+        dut.waits = false;
+        dut.try_to_renew();
         outcome
     }
 
     fn run_once(&self, dut: &mut DeviceUnderTest) -> Outcome {
         let begun = Instant::now();
-        let mut findings = self.findings(dut).unwrap_or_else(|error| {
+        let mut findings = (self.work)(dut).unwrap_or_else(|error| {
             let mut findings = Findings::default();
             findings.faults.push(Fault::new(error.to_string()));
             if error.is_device_lost() {
@@ -196,8 +215,7 @@ impl Check {
             }
             findings
         });
-        let complaints = dut.complaints();
-        findings.faults.extend(complaints.iter().map(|message| Fault::new(format!("validation: {message}"))));
+        findings.add_messages(&dut.complaints());
         let verdict = match (findings.faults.is_empty(), &findings.left_out, findings.interrupted) {
             (false, _, _) => Verdict::Failed,
             (true, _, Some(_)) => Verdict::Interrupted,
@@ -211,22 +229,13 @@ impl Check {
         Outcome { seconds, figures, faults, notes, pictures, ..Outcome::new(self.title(), verdict) }
     }
 
-    /// Runs the check and returns errors of the device unchanged.
-    ///
-    /// # Errors
-    /// The device fails.
-    fn findings(&self, dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
-        (self.work)(dut)
-    }
-
     /// Runs the check. `group`: the group of the check that was run before, None for the first; it is set to this check's group. With validation, the
     /// first check of another group gets a new context.
     pub fn run_after(&self, group: &mut Option<&'static str>, dut: &mut DeviceUnderTest) -> Outcome {
         // State that the validation layer keeps of one group must not affect the next: see `IsolatedContext`.
         let is_other = group.replace(self.group).is_some_and(|before| before != self.group);
         if dut.options.validation && is_other {
-            let renewed = dut.renew();
-            renewed.unwrap_or_else(|error| tracing::warn!("the old device goes on: {error}"));
+            dut.try_to_renew();
         }
         self.run(dut)
     }
@@ -338,9 +347,7 @@ impl DeviceUnderTest {
         if let Some(modes) = &self.modes {
             return Ok(modes.clone());
         }
-        let modes = Rc::new(render::modes(&self.context)?);
-        self.modes = Some(modes.clone());
-        Ok(modes)
+        Ok(self.modes.insert(Rc::new(render::modes(&self.context)?)).clone())
     }
 
     /// The runner of single passes on this device.
@@ -397,6 +404,10 @@ impl DeviceUnderTest {
         self.context = self.another()?;
         (self.pass_runner, self.messages_read) = (PassRunner::new(&self.context)?, 0);
         Ok(())
+    }
+
+    fn try_to_renew(&mut self) {
+        self.renew().unwrap_or_else(|error| tracing::warn!("the old device goes on: {error}"));
     }
 
     /// Validation messages since the last call.
@@ -461,8 +472,7 @@ impl IsolatedContext {
 
     /// Adds the validation messages that can be believed as faults.
     pub(crate) fn report_validation(&self, findings: &mut Findings) {
-        let messages = self.credible_messages();
-        findings.faults.extend(messages.iter().map(|message| Fault::new(format!("validation: {message}"))));
+        findings.add_messages(&self.credible_messages());
     }
 
     /// All validation messages so far, without known false positives.

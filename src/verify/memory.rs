@@ -9,8 +9,9 @@ use crate::passes::slots::{Initializer, Shape};
 use crate::passes::{Slot, Texels};
 use crate::picture::Picture;
 use crate::plan::Plan;
-use crate::report::{Fault, Figure, Level, PictureComparison, Unit, Worst};
+use crate::report::{Fault, Figure, Level, Unit, Worst};
 use crate::scene::Scene;
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -90,81 +91,54 @@ fn slot_difference(slot: Slot, zeros: &Texels, poisoned: [&Texels; 2], scene: &S
     apart
 }
 
-/// Totals over all scenes.
-#[derive(Default)]
-struct Totals {
-    scenes: usize,
-    wrong: usize,
-    slots: usize,
-    left: usize,
-}
-
-fn check_scene(
-    findings: &mut Findings,
-    totals: &mut Totals,
-    context: &Arc<Context>,
-    (name, scene, frames): (&str, &Scene, &[Texels]),
-) -> Result<(), GpuError> {
-    let zeros = render_on(context, scene, frames, None)?;
-    let poisoned = [
-        render_on(context, scene, frames, Some(Poison::BOTH[0]))?,
-        render_on(context, scene, frames, Some(Poison::BOTH[1]))?,
-    ];
-    totals.scenes += 1;
-    for (n, held) in poisoned.iter().enumerate() {
-        let what = format!("{name}, poison {}", n + 1);
-        totals.wrong += usize::from(!expect_same_picture(findings, &what, &zeros.picture, &held.picture));
-    }
-    for (i, (slot, texels)) in zeros.slots.iter().enumerate() {
-        let apart = slot_difference(*slot, texels, [&poisoned[0].slots[i].1, &poisoned[1].slots[i].1], scene);
-        totals.slots += 1;
-        totals.left += apart.left;
-        if let Some(worst) = apart.worst {
-            let what = format!("'{}' depends on what memory held before", slot.name());
-            let (fault, slice) = (Some(findings.faults.len()), worst.at[2]);
-            let pictures = texel_comparison(slot.name(), texels, &poisoned[0].slots[i].1, slice);
-            findings.pictures.push(PictureComparison { fault, ..pictures });
-            let worst = Some(Worst { beyond: apart.depend, ..worst });
-            findings.faults.push(Fault { input: name.into(), worst, ..Fault::new(what) });
+/// Draws scenes, each with its name and frames, on both kinds of poisoned memory and on zeroed memory.
+fn check_scenes<'a>(
+    dut: &mut DeviceUnderTest,
+    scenes: impl Iterator<Item = (&'a str, &'a Scene, Cow<'a, [Texels]>)>,
+) -> Result<Findings, GpuError> {
+    let (mut findings, mut slots, mut left) = (Findings::default(), 0, 0);
+    let isolated = IsolatedContext::of_changes(dut)?;
+    for (name, scene, frames) in scenes {
+        let draw = |poison| render_on(&isolated.context, scene, &frames, poison);
+        let (zeros, poisoned) = (draw(None)?, [draw(Some(Poison::BOTH[0]))?, draw(Some(Poison::BOTH[1]))?]);
+        for (n, held) in poisoned.iter().enumerate() {
+            expect_same_picture(&mut findings, &format!("{name}, poison {}", n + 1), &zeros.picture, &held.picture);
         }
-        findings.expect(apart.left == 0, || {
-            format!("{name}: {} of {} values of '{}' are never written", apart.left, texels.values.len(), slot.name())
-        });
+        slots += zeros.slots.len();
+        for (i, (slot, texels)) in zeros.slots.iter().enumerate() {
+            let apart = slot_difference(*slot, texels, [&poisoned[0].slots[i].1, &poisoned[1].slots[i].1], scene);
+            left += apart.left;
+            if let Some(worst) = apart.worst {
+                let what = format!("'{}' depends on what memory held before", slot.name());
+                let pictures = texel_comparison(slot.name(), texels, &poisoned[0].slots[i].1, worst.at[2]);
+                let worst = Some(Worst { beyond: apart.depend, ..worst });
+                findings.add_shown(Fault { input: name.into(), worst, ..Fault::new(what) }, pictures);
+            }
+            findings.expect(apart.left == 0, || {
+                let (left, all, slot) = (apart.left, texels.values.len(), slot.name());
+                format!("{name}: {left} of {all} values of '{slot}' are never written")
+            });
+        }
     }
-    Ok(())
-}
-
-fn add_totals(findings: &mut Findings, totals: &Totals) {
-    add_picture_counts(findings, 2 * totals.scenes, totals.wrong);
-    findings.figures.push(count_figure("slots compared", totals.slots));
-    findings.figures.push(Figure::error("values never written", totals.left as f64, 0.0, Unit::Count));
+    isolated.report_validation(&mut findings);
+    add_picture_counts(&mut findings);
+    findings.figures.push(count_figure("slots compared", slots));
+    findings.figures.push(Figure::error("values never written", left as f64, 0.0, Unit::Count));
+    Ok(findings)
 }
 
 fn modes(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
-    let (mut findings, mut totals, modes) = (Findings::default(), Totals::default(), dut.modes()?);
-    let isolated = IsolatedContext::of_changes(dut)?;
-    for of in modes.iter() {
-        check_scene(&mut findings, &mut totals, &isolated.context, (&of.name, &of.scene, &of.frames))?;
-    }
-    isolated.report_validation(&mut findings);
-    add_totals(&mut findings, &totals);
-    Ok(findings)
+    let modes = dut.modes()?;
+    check_scenes(dut, modes.iter().map(|of| (&*of.name, &of.scene, Cow::from(&of.frames[..]))))
 }
 
 /// A part of the built-in scenes; the group "passes" poisons the outputs of single passes in all of them.
 fn variants(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
-    let (mut findings, mut totals, scenes) = (Findings::default(), Totals::default(), dut.scenes());
-    let isolated = IsolatedContext::of_changes(dut)?;
-    let step = if dut.level == Level::Quick { 40 } else { 4 };
+    let (scenes, step) = (dut.scenes(), if dut.level == Level::Quick { 40 } else { 4 });
     // Without the wide scenes, which are the last, and without rays at edges alone, which leave most of a picture unwritten.
     let scenes = scenes.iter().take_while(|(name, _)| !name.starts_with("Cartesian of ["));
-    for (name, scene) in scenes.filter(|(_, scene)| !scene.settings.ray.adaptive).step_by(step) {
-        let frames = super::built_in::wall(scene, 0);
-        check_scene(&mut findings, &mut totals, &isolated.context, (name, scene, &frames))?;
-    }
-    isolated.report_validation(&mut findings);
-    add_totals(&mut findings, &totals);
-    Ok(findings)
+    let scenes = scenes.filter(|(_, scene)| !scene.settings.ray.adaptive).step_by(step);
+    check_scenes(dut, scenes.map(|(name, scene)| (&**name, scene, Cow::from(super::built_in::wall(scene, 0)))))
 }
 
 /// Slots that are read before a pass has written all of them hold zeros in a new renderer.

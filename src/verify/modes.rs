@@ -191,10 +191,8 @@ fn every_scene(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
         (mean, far) = (mean.max(apart.mean), far.max(apart.far));
         if (apart.mean > MAX_MEAN_ANY_SCENE || apart.far > MAX_FAR_SHARE) && findings.faults.len() < 8 {
             let what = format!("mean difference {:.3} levels, {:.2} % far off", apart.mean, 100.0 * apart.far);
-            let mut picture = picture_comparison(name, &expected, &got);
-            picture.fault = Some(findings.faults.len());
-            findings.pictures.push(picture);
-            findings.faults.push(Fault { input: name.clone(), worst: Some(apart.worst), ..Fault::new(what) });
+            let fault = Fault { input: name.clone(), worst: Some(apart.worst), ..Fault::new(what) };
+            findings.add_shown(fault, picture_comparison(name, &expected, &got));
         }
     }
     isolated.report_validation(&mut findings);

@@ -2,16 +2,11 @@
 
 use super::gtest;
 use super::report::{self, CheckName, Outcome, Verdict};
-use crate::terminal::{self, say};
+use crate::terminal::say;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::Write;
 use std::sync::Arc;
 use std::time::Duration;
-
-/// The progress bar of a run. It draws nothing unless standard error is a terminal.
-pub fn bar() -> ProgressBar {
-    terminal::progress_bar(0)
-}
 
 /// A function that prints a line of another process on standard error, above the bar.
 pub fn echo(bar: &ProgressBar) -> Arc<dyn Fn(&str) + Send + Sync> {
@@ -39,7 +34,7 @@ pub enum Style {
 }
 
 impl Progress {
-    /// `checks`: the checks that will run. `bar`: the result of [`bar`].
+    /// `checks`: the checks that will run. `bar`: a [`progress_bar`](crate::terminal::progress_bar), whose length is set here.
     pub fn new(style: Style, checks: &[CheckName], bar: ProgressBar) -> Progress {
         if style == Style::GoogleTest {
             bar.set_draw_target(ProgressDrawTarget::hidden());

@@ -11,7 +11,7 @@ use crate::gpu::{GpuError, formats};
 use crate::passes::device_limits::{POSITIONS, sample_position};
 use crate::passes::slots::Format;
 use crate::passes::{Arrays, DispatchArgs, Slot, Texels};
-use crate::report::{Fault, Figure, Level, PictureComparison, Unit, Worst};
+use crate::report::{Fault, Figure, Level, Unit, Worst};
 
 /// Volume formats by the words of the settings.
 const FORMATS: [&str; 4] = ["r8", "r16", "r16f", "r32f"];
@@ -213,16 +213,12 @@ fn check(dut: &mut DeviceUnderTest, format: &str) -> Result<Findings, GpuError> 
             let share = sample_position([x, y], [width, height]);
             volume.trilinear(std::array::from_fn(|axis| share[axis] * volume.size[axis] as f64 - 0.5))
         });
-        let fault = Some(findings.faults.len());
-        findings.pictures.push(PictureComparison { fault, ..texel_comparison("samples", &exact, got, 0) });
         let position = sample_position([x, y], [width, height]).map(|share| format!("{share:.6}")).join(", ");
-        findings.faults.push(Fault {
-            what: format!("{beyond} of {texels} samples are not what {} bits of position allow", precision.bits),
-            pass: Some(POSITIONS.name.into()),
-            input: format!("a volume of {size:?} texels in {format}, at ({position}) of its size"),
-            worst: Some(worst),
-            files: Vec::new(),
-        });
+        let what = format!("{beyond} of {texels} samples are not what {} bits of position allow", precision.bits);
+        let input = format!("a volume of {size:?} texels in {format}, at ({position}) of its size");
+        let (pass, worst) = (Some(POSITIONS.name.into()), Some(worst));
+        let fault = Fault { pass, input, worst, ..Fault::new(what) };
+        findings.add_shown(fault, texel_comparison("samples", &exact, got, 0));
     }
     findings.figures.push(count_figure("samples", samples));
     findings.figures.push(Figure::error("samples outside of what is allowed", outside as f64, 0.0, Unit::Count));

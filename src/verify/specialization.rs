@@ -47,7 +47,6 @@ fn check(dut: &mut DeviceUnderTest, stage: Stage) -> Result<Findings, GpuError> 
         }
     }
     findings.notes.push(format!("{pipelines} pipelines whose constants the driver applied"));
-    let messages = super::credible_messages(&context, context.messages(), true);
-    findings.faults.extend(messages.iter().map(|m| super::Fault::new(format!("validation: {m}"))));
+    findings.add_messages(&super::credible_messages(&context, context.messages(), true));
     Ok(findings)
 }

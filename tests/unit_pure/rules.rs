@@ -506,6 +506,24 @@ fn pass_names_are_unique_and_stages_in_order() {
     assert_eq!(names.len(), PASSES.len());
 }
 
+/// A type that knows more than that is a wall in the wrong place.
+#[test]
+fn no_type_of_the_program_has_more_than_25_fields() {
+    struct Fields(Vec<(String, usize)>);
+    impl<'ast> syn::visit::Visit<'ast> for Fields {
+        fn visit_item_struct(&mut self, item: &'ast syn::ItemStruct) {
+            self.0.push((item.ident.to_string(), item.fields.len()));
+        }
+    }
+    let mut all = Fields(Vec::new());
+    for (path, text) in sources("src").into_iter().filter(|(path, _)| !path.contains("/tests/")) {
+        let file = syn::parse_file(&text).unwrap_or_else(|e| panic!("{path}: {e}"));
+        syn::visit::Visit::visit_file(&mut all, &file);
+    }
+    assert!(all.0.len() > 500, "{} structs", all.0.len());
+    assert_eq!(all.0.iter().filter(|(_, fields)| *fields > 25).collect::<Vec<_>>(), Vec::<&(String, usize)>::new());
+}
+
 /// Identifiers in a text.
 fn identifiers(text: &str) -> impl Iterator<Item = &str> {
     text.split(|c: char| !c.is_alphanumeric() && c != '_').filter(|word| !word.is_empty())

@@ -22,11 +22,11 @@ fn viewed(settings: &[&str], measured: Measurement) -> View {
     let grid = Grid { size: [41, 31, 21], spacing: [1.0; 3], origin: [-20.0, 0.0, -10.0] };
     let input = Input { stored: StoredType::U8, range: [0.0, 255.0] };
     let mut scene = Scene::new(Geometry::Cartesian(grid), input, layers.finish().expect("settings")).expect("a scene");
-    scene.settings.measure = vec![measured];
+    scene.settings.drawn.measure = vec![measured];
     let block = Block::new(&scene, 0, 4, None).expect("a view");
     let picture = Picture { width: 1, height: 1, rgba: vec![0; 4] };
     let scene = block.scene().clone();
-    let drawn = overlay::drawn(&scene, Some(4), &scene.settings.measure);
+    let drawn = overlay::drawn(&scene, Some(4), &scene.settings.drawn.measure);
     let is_within = |drawn: &overlay::Drawn| {
         let [corner, size] = drawn.tile;
         drawn.points.iter().all(|(_, at)| (0..2).all(|a| at[a] >= corner[a] && at[a] <= corner[a] + size[a]))

@@ -23,7 +23,7 @@ fn what_is_saved_is_read_again_exactly() {
         layers.set("clip=[{ at = [0.1, 1e-9, 3], normal = [0, 1, 0] }]").expect("clip");
         let mut settings = layers.finish().expect("settings");
         settings.set_mode(Mode::Plane);
-        settings.measure = vec![
+        settings.drawn.measure = vec![
             Measurement { points: vec![[0.1, 1.0 / 3.0, -2e-7], [1.0, 2.0, 3.0]], ..Measurement::default() },
             Measurement {
                 kind: MeasureKind::Volume,
@@ -54,7 +54,7 @@ fn what_is_saved_is_read_again_exactly() {
         let (folder, file) = kept("workspace-exact", &text(&settings, &origin).expect("text"));
         let read = Workspace::read(&file).expect("a workspace");
         // Older workspaces do not say of which volume a measurement is: of the one that was shown.
-        settings.measure[0].made = Some(Made { volume: 3, ..Made::default() });
+        settings.drawn.measure[0].made = Some(Made { volume: 3, ..Made::default() });
         assert_eq!(read.layers.clone().finish().expect("settings"), settings, "{preset}");
         assert_eq!(read.recording(&file).expect("a recording"), PathBuf::from(folder.path("sweep.mha")));
         assert!(read.origin.volume == 3 && is_workspace(&file));

@@ -210,10 +210,10 @@ fn what_is_drawn_by_the_mouse_is_measured_kept_and_copied() {
     let input = Input { stored: recording.stored_type(), range: recording.range() };
     let pixel = Scene::new(recording.geometry(0), input, settings.clone()).expect("a scene").tiling().pixel;
     let measured: Vec<(MeasureKind, f64)> =
-        settings.measure.iter().map(|m| (m.kind, outcome::quantities(m).expect("results")[0].value)).collect();
+        settings.drawn.measure.iter().map(|m| (m.kind, outcome::quantities(m).expect("results")[0].value)).collect();
     let cm2 = pixel * pixel / 100.0;
     // A notch is 1 mm. winit 0.30 takes press and release of a wheel without smooth scrolling, as this server has one, for a notch each.
-    let contours = &settings.measure[2].contours;
+    let contours = &settings.drawn.measure[2].contours;
     let apart = (DVec3::from(contours[1][0]) - DVec3::from(contours[0][0])).z.abs();
     assert!([1.0, 2.0].iter().any(|mm| (apart - mm).abs() < 1e-6), "the wheel moved the plane by {apart} mm");
     let truth = [
@@ -229,7 +229,7 @@ fn what_is_drawn_by_the_mouse_is_measured_kept_and_copied() {
     desk.control('c');
     let table = clipboard(&desk);
     let name = Path::new(SWEEP).file_name().expect("a name").to_string_lossy();
-    assert_eq!(table, outcome::csv(&settings.measure, &name));
+    assert_eq!(table, outcome::csv(&settings.drawn.measure, &name));
     for (n, (_, found)) in measured.iter().enumerate() {
         let line = table.lines().find(|line| line.starts_with(&format!("{},", n + 1))).expect("a line");
         let value: f64 = line.split(',').nth(4).and_then(|value| value.parse().ok()).expect("a number");

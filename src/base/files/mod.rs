@@ -11,6 +11,7 @@ mod spool;
 pub use lock::Lock;
 pub use spool::Spool;
 
+use crate::text::push_visible;
 use signals::Writing;
 use std::fs::{File, OpenOptions, metadata};
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
@@ -131,13 +132,10 @@ fn replace_file(file: &Path, bytes: &[u8], readers: Readers) -> Result<(), Strin
 /// One line: the folder does not exist or cannot be written, or the name is a folder.
 pub fn check_target(file: &Path) -> Result<(), String> {
     check_place(file)?;
-    match is_special(file) {
-        true => Ok(()),
-        false => match Unfinished::create(file) {
-            Ok(_) => Ok(()),
-            Err(e) => Err(format!("{}: cannot be written: {e}", file.display())),
-        },
+    if is_special(file) {
+        return Ok(());
     }
+    Unfinished::create(file).map(drop).map_err(|e| format!("{}: cannot be written: {e}", file.display()))
 }
 
 fn check_place(file: &Path) -> Result<(), String> {
@@ -352,10 +350,7 @@ pub fn escaped(text: &str, longest: usize) -> String {
             line.push_str("...");
             break;
         }
-        match c {
-            '\'' | '"' | '\\' => line.push(c),
-            _ => line.extend(c.escape_debug()),
-        }
+        push_visible(&mut line, c);
     }
     line
 }

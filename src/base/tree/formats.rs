@@ -1,7 +1,7 @@
 //! Values of TOML from `toml`, of JSON from `serde_json`, and both to text.
 
 use super::{Content, FromNode, Node, NodeError, ToNode};
-use serde::ser::{Error as _, SerializeMap, SerializeSeq};
+use serde::ser::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use std::collections::HashSet;
 use std::fmt;
@@ -114,16 +114,8 @@ impl Serialize for Node {
             Content::Text(text) => serializer.serialize_str(text),
             Content::Date => Err(S::Error::custom("a date cannot be written")),
             Content::Fault(message) => Err(S::Error::custom(message)),
-            Content::List(list) => {
-                let mut written = serializer.serialize_seq(Some(list.len()))?;
-                list.iter().try_for_each(|value| written.serialize_element(value))?;
-                written.end()
-            }
-            Content::Table(table) => {
-                let mut written = serializer.serialize_map(Some(table.len()))?;
-                table.iter().try_for_each(|(key, value)| written.serialize_entry(key, value))?;
-                written.end()
-            }
+            Content::List(list) => serializer.collect_seq(list),
+            Content::Table(table) => serializer.collect_map(table.iter().map(|(key, value)| (key, value))),
         }
     }
 }

@@ -454,18 +454,44 @@ impl<T> Slot for ReadBy<'_, T> {
     }
 }
 
+/// A part of a type whose keys stand in the table of the whole, by `#[tree(flatten)]`.
+pub trait Part {
+    /// Each key with its place.
+    fn slots(&mut self) -> Vec<(&'static str, &mut dyn Slot)>;
+
+    /// Each key with its value.
+    fn entries(&self) -> Vec<(&'static str, Option<&dyn ToNode>)>;
+}
+
 /// Reads the values of a table into the places of their keys. Places of keys that the table lacks stay as they are.
 ///
 /// # Errors
 /// `node` is no table, a value does not fit its place, or there is an unknown key and `denies_unknown` is true.
-pub fn read_table(node: Node, denies_unknown: bool, slots: &mut [(&str, &mut dyn Slot)]) -> Result<(), NodeError> {
+pub fn read_table<'a>(
+    node: Node,
+    denies_unknown: bool,
+    slots: &mut [(&'a str, &'a mut dyn Slot)],
+) -> Result<(), NodeError> {
+    read_table_and(node, denies_unknown, slots, &mut [])
+}
+
+/// The same for a table that has the keys of a [`Part`], too.
+///
+/// # Errors
+/// As above.
+pub fn read_table_and<'a>(
+    node: Node,
+    denies_unknown: bool,
+    slots: &mut [(&'a str, &'a mut dyn Slot)],
+    part: &mut [(&'a str, &'a mut dyn Slot)],
+) -> Result<(), NodeError> {
     let Content::Table(table) = node.content else { return Err(node.invalid("a table")) };
     for (name, value) in table {
         let Content::Text(key) = &name.content else { return Err(name.invalid("a key")) };
-        if let Some((_, slot)) = slots.iter_mut().find(|(known, _)| known == key) {
+        if let Some((_, slot)) = slots.iter_mut().chain(part.iter_mut()).find(|(known, _)| known == key) {
             slot.fill(value).map_err(|e| e.within(key))?;
         } else if denies_unknown {
-            let known = one_of(slots.iter().map(|(name, _)| *name));
+            let known = one_of(slots.iter().chain(&*part).map(|(name, _)| *name));
             let message = format!("unknown field `{key}`, {known}");
             return Err(NodeError { fault: Fault::UnknownKey, ..name.fault(message) });
         }
@@ -475,7 +501,12 @@ pub fn read_table(node: Node, denies_unknown: bool, slots: &mut [(&str, &mut dyn
 
 /// A table of these entries, without those that have no value.
 pub fn write_table(entries: &[(&str, Option<&dyn ToNode>)]) -> Node {
-    let written = entries.iter().filter_map(|(key, value)| Some((key.to_node(), (*value)?.to_node())));
+    write_table_and(entries, &[])
+}
+
+/// The same of a type with a [`Part`], whose entries follow.
+pub fn write_table_and(entries: &[(&str, Option<&dyn ToNode>)], part: &[(&str, Option<&dyn ToNode>)]) -> Node {
+    let written = entries.iter().chain(part).filter_map(|(key, value)| Some((key.to_node(), (*value)?.to_node())));
     Node::of(Content::Table(written.collect()))
 }
 

@@ -83,14 +83,11 @@ impl Line<'_> {
         let before = sorted(found.clone(), ends);
         for pair in before.windows(2) {
             let (middle, half) = ((pair[0] + pair[1]) / 2.0, (pair[1] - pair[0]) / 2.0);
-            let at = |x: f64| {
-                let (x, y, position) = probe.inverse_sweep_map(self.place(middle + half * x));
-                (position, probe.plane_indices(x, y).1 / probe.lines.len() as f64)
-            };
             let turned = |k: usize| {
                 let advance = probe.advance_at(k as f64);
                 Polynomial::through(8, |x| {
-                    let (position, share) = at(x);
+                    let (x, y, position) = probe.inverse_sweep_map(self.place(middle + half * x));
+                    let share = probe.plane_indices(x, y).1 / probe.lines.len() as f64;
                     (position - probe.slices.at(k as f64) - advance * share) / probe.slices.pitch().abs().max(1e-12)
                 })
             };
@@ -126,19 +123,18 @@ pub(super) fn crossings_of_a_line(start: f64, rate: f64, values: impl Iterator<I
     }
 }
 
-/// Appends the real roots of a s^2 + b s + c without cancellation. A double root that rounding lifts off zero counts.
-pub(super) fn quadratic(a: f64, b: f64, c: f64, found: &mut Vec<f64>) {
-    if a == 0.0 {
-        found.extend((b != 0.0).then(|| -c / b));
-        return;
-    }
+/// The real roots of a s^2 + b s + c without cancellation. A double root that rounding lifts off zero counts.
+pub(super) fn quadratic(a: f64, b: f64, c: f64) -> impl Iterator<Item = f64> {
     let inner = b * b - 4.0 * a * c;
-    if inner < -1e-12 * b * b {
-        return;
-    }
     let q = -0.5 * (b + inner.max(0.0).sqrt().copysign(b));
-    found.push(q / a);
-    found.extend((q != 0.0).then(|| c / q));
+    let roots = if a == 0.0 {
+        [None, (b != 0.0).then(|| -c / b)]
+    } else if inner < -1e-12 * b * b {
+        [None; 2]
+    } else {
+        [Some(q / a), (q != 0.0).then(|| c / q)]
+    };
+    roots.into_iter().flatten()
 }
 
 /// A ray in the planes of a swept probe: x is linear along it, and the depth below the sweep's axis is the length of a linear vector.
@@ -240,13 +236,8 @@ impl Plane<'_> {
             return crossings_of_a_line(start - depth[0] * sin, rate - depth[1] * sin, std::iter::once(0.0), found);
         }
         let [a, b, c] = self.squared();
-        let mut roots = Vec::new();
-        quadratic(
-            rate * rate - sin * sin * a,
-            2.0 * start * rate - sin * sin * b,
-            start * start - sin * sin * c,
-            &mut roots,
-        );
+        let square = sin * sin;
+        let roots = quadratic(rate * rate - square * a, 2.0 * start * rate - square * b, start * start - square * c);
         // Squares lose half the digits where two solutions nearly meet: two steps of Newton's rule get them back.
         let off = |s: f64| start + rate * s - self.depth(s) * sin;
         for mut s in roots {
@@ -271,13 +262,12 @@ impl Plane<'_> {
         // The least place by golden sections, until one lies within the range.
         let golden = (5f64.sqrt() - 1.0) / 2.0;
         let (mut a, mut b) = (low, high);
-        let inner = |a: f64, b: f64| (b - golden * (b - a), a + golden * (b - a));
         let mut within = [low, high].into_iter().find(|s| off(*s) < 0.0);
         for _ in 0..90 {
             if within.is_some() {
                 break;
             }
-            let (c, d) = inner(a, b);
+            let (c, d) = (b - golden * (b - a), a + golden * (b - a));
             let (fc, fd) = (off(c), off(d));
             within = if fc < 0.0 { Some(c) } else { (fd < 0.0).then_some(d) };
             (a, b) = if fc < fd { (a, d) } else { (c, b) };

@@ -53,9 +53,8 @@ impl<'a> Fade<'a> {
             let (middle, half) = ((pair[0] + pair[1]) / 2.0, (pair[1] - pair[0]) / 2.0);
             let [a, b] = [-0.5, 0.5].map(|x| self.beyond(middle + half * x));
             let (mean, rise) = ((a + b) / 2.0, b - a);
-            let mut roots = Vec::new();
-            quadratic(rise.length_squared(), 2.0 * mean.dot(rise), mean.length_squared() - 1.0, &mut roots);
-            found.extend(roots.into_iter().filter(|x| x.abs() < 1.0).map(|x| middle + half * x));
+            let roots = quadratic(rise.length_squared(), 2.0 * mean.dot(rise), mean.length_squared() - 1.0);
+            found.extend(roots.filter(|x| x.abs() < 1.0).map(|x| middle + half * x));
         }
         sorted(found, ends)
     }

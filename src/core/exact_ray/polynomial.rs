@@ -139,7 +139,7 @@ impl Polynomial {
         let rises = values.windows(2).all(|v| v[0] <= v[1]);
         let falls = values.windows(2).all(|v| v[0] >= v[1]);
         if rises || falls {
-            found.extend(self.bracketed(low, high));
+            found.extend(bracketed(|x| self.at(x), low, high));
             return;
         }
         if high - low < 1e-7 {
@@ -150,11 +150,6 @@ impl Polynomial {
         let middle = (low + high) / 2.0;
         self.isolate(left, [low, middle], found);
         self.isolate(right, [middle, high], found);
-    }
-
-    /// The root between two places at which the polynomial has different signs.
-    fn bracketed(&self, low: f64, high: f64) -> Option<f64> {
-        bracketed(|x| self.at(x), low, high)
     }
 }
 

@@ -74,12 +74,8 @@ impl MeshFile {
     }
 }
 
-fn three(v: DVec3) -> [u8; 12] {
-    let mut bytes = [0; 12];
-    for (place, value) in bytes.chunks_exact_mut(4).zip(v.to_array()) {
-        place.copy_from_slice(&(value as f32).to_le_bytes());
-    }
-    bytes
+fn three(v: DVec3) -> [[u8; 4]; 3] {
+    v.to_array().map(|value| (value as f32).to_le_bytes())
 }
 
 fn count(n: usize, what: &str) -> io::Result<u32> {
@@ -94,9 +90,8 @@ fn stl(mesh: &Mesh, file: &mut impl Write) -> io::Result<()> {
     file.write_all(&head)?;
     file.write_all(&count(mesh.triangles.len(), "triangles")?.to_le_bytes())?;
     for triangle in &mesh.triangles {
-        let corners = mesh.corners(triangle);
-        file.write_all(&three(mesh.normal_area(triangle).normalize_or_zero()))?;
-        corners.iter().try_for_each(|corner| file.write_all(&three(*corner)))?;
+        file.write_all(three(mesh.normal_area(triangle).normalize_or_zero()).as_flattened())?;
+        mesh.corners(triangle).iter().try_for_each(|corner| file.write_all(three(*corner).as_flattened()))?;
         file.write_all(&[0; 2])?;
     }
     Ok(())
@@ -112,8 +107,7 @@ fn ply(mesh: &Mesh, colours: Colours, file: &mut impl Write) -> io::Result<()> {
     )?;
     count(vertices, "vertices")?;
     for (n, (vertex, normal)) in mesh.vertices.iter().zip(mesh.normals()).enumerate() {
-        file.write_all(&three(*vertex))?;
-        file.write_all(&three(normal))?;
+        file.write_all([three(*vertex), three(normal)].as_flattened().as_flattened())?;
         file.write_all(&colours.of(n))?;
     }
     for triangle in &mesh.triangles {
@@ -185,8 +179,7 @@ fn glb(mesh: &Mesh, colours: Colours, file: &mut impl Write) -> io::Result<()> {
     file.write_all(b"BIN\0")?;
     for (n, (vertex, normal)) in mesh.vertices.iter().zip(mesh.normals()).enumerate() {
         let [r, g, b] = colours.of(n).map(linear);
-        file.write_all(&three(*vertex))?;
-        file.write_all(&three(normal))?;
+        file.write_all([three(*vertex), three(normal)].as_flattened().as_flattened())?;
         file.write_all(&[r, g, b, 255])?;
     }
     mesh.triangles.iter().flatten().try_for_each(|n| file.write_all(&n.to_le_bytes()))

@@ -41,7 +41,7 @@ pub fn simplified(mesh: &Mesh, tolerance: f64) -> Mesh {
 }
 
 /// The edges that do not belong to exactly two triangles, once in each direction.
-fn open_edges(triangles: &[[u32; 3]]) -> u64 {
+pub(super) fn open_edges(triangles: &[[u32; 3]]) -> u64 {
     // By edge, lower vertex first: how often it is passed in each direction.
     let mut passed: HashMap<[u32; 2], [u32; 2]> = HashMap::with_capacity(triangles.len() * 3 / 2);
     for [a, b, c] in triangles {

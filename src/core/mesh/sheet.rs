@@ -2,8 +2,8 @@
 //! neighbouring rays hit different surfaces.
 
 use super::Mesh;
+use super::quadrics::open_edges;
 use glam::DVec3;
-use std::collections::HashSet;
 
 /// Largest slope of a surface across a ray, tan 80 deg. Neighbouring hits that differ by more are taken as two surfaces, with a gap between them; a
 /// steeper surface would hardly be seen.
@@ -60,13 +60,6 @@ pub fn sheet(
     let triangles: Vec<[u32; 3]> = triangles.into_iter().map(|corners| corners.map(|n| vertex_of[n])).collect();
     let open_edges = open_edges(&triangles);
     (Mesh { vertices, triangles, open_edges }, rays)
-}
-
-/// Edges of one triangle alone.
-fn open_edges(triangles: &[[u32; 3]]) -> u64 {
-    let edges = triangles.iter().flat_map(|[a, b, c]| [(*a, *b), (*b, *c), (*c, *a)]);
-    let edges: HashSet<(u32, u32)> = edges.collect();
-    edges.iter().filter(|(a, b)| !edges.contains(&(*b, *a))).count() as u64
 }
 
 #[cfg(test)]

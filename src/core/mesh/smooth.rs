@@ -27,8 +27,7 @@ impl Smoother {
             let weight = |n: usize| if n == 0 { 1.0 } else { (-0.5 * (n as f64 / sigma).powi(2)).exp() };
             (0..=reach).map(weight).collect()
         };
-        let kernels = [kernel(0), kernel(1), kernel(2)];
-        Smoother { width: size[0], kernels, depth: size[2], slices: VecDeque::new(), first: 0 }
+        Smoother { width: size[0], kernels: [0, 1, 2].map(kernel), depth: size[2], slices: VecDeque::new(), first: 0 }
     }
 
     /// Writes the smoothed slice `z` to `out`. Slices must be requested in rising order. `raw(n, slice)` fills `slice` with the values of slice n

@@ -44,10 +44,9 @@ impl Chain {
 
     /// The filters that a scene asks for, in order.
     fn requested(self, scene: &Scene) -> impl Iterator<Item = (&'static Pass, Filter)> {
-        let filters = PASSES.iter().filter_map(|pass| match pass.link {
-            Link::Filter(filter) => Some((pass, filter)),
-            _ => None,
-        });
+        let filters = PASSES
+            .iter()
+            .filter_map(|pass| if let Link::Filter(filter) = pass.link { Some((pass, filter)) } else { None });
         filters.filter(move |(pass, filter)| filter.chain == self && asked_for(pass, *filter, scene).is_ok())
     }
 
@@ -153,11 +152,8 @@ impl Pass {
     /// The slots (read, written) of a dispatch of a chain's filter. For an observer ([`Link::Observer`]) only the first is meaningful: it writes
     /// slots of its own. None for a pass that is no link of a chain.
     pub fn link_slots(&self, scene: &Scene, args: &DispatchArgs) -> Option<(Slot, Slot)> {
-        let (chain, step) = match self.link {
-            Link::Filter(filter) => (filter.chain, args.iteration / (filter.dispatches)(scene)),
-            Link::Observer(chain) => (chain, 0),
-            Link::None | Link::AfterSlices => return None,
-        };
+        let chain = self.link.chain()?;
+        let step = if let Link::Filter(filter) = self.link { args.iteration / (filter.dispatches)(scene) } else { 0 };
         let (before, all) = chain.position(scene, self);
         let link = before + step;
         // A pass that the scene does not need is a link of no chain: it would write the next spare slot.
@@ -173,12 +169,7 @@ impl Pass {
     /// array of layers instead of the 3D texture.
     pub fn constants(&self, scene: &Scene, args: &DispatchArgs) -> Vec<(&'static str, i32)> {
         let mut constants = (self.constants)(scene, &Dispatch::new(args, self.link_slots(scene, args)));
-        let is_of_frames = match self.link {
-            Link::Filter(filter) => filter.chain.is_of_frames(),
-            Link::Observer(chain) => chain.is_of_frames(),
-            Link::None | Link::AfterSlices => false,
-        };
-        if is_of_frames {
+        if self.link.chain().is_some_and(Chain::is_of_frames) {
             let target = self.writes(scene, args).into_iter().find(|bind| bind.name == "target");
             constants.extend(target.map(|bind| ("LAYERED", bind.slot.is_layered(scene) as i32)));
         }
@@ -283,12 +274,7 @@ impl Pass {
             params = params.i32("first_column", r.first[0]).i32("first_row", r.first[1]);
             params = params.i32("end_column", end[0]).i32("end_row", end[1]);
         }
-        let of_slices = match self.link {
-            Link::Filter(filter) => filter.chain.is_of_frames(),
-            Link::Observer(chain) => chain.is_of_frames(),
-            Link::AfterSlices => true,
-            Link::None => false,
-        };
+        let of_slices = matches!(self.link, Link::AfterSlices) || self.link.chain().is_some_and(Chain::is_of_frames);
         match of_slices && params.0.iter().any(|(name, _)| *name == "slice") {
             true => params.first_stored(scene),
             false => params,
@@ -313,11 +299,9 @@ impl Pass {
             // A slice of tiles has one texel for each tile.
             let texels = if size == scene.grid.size.map(|n| n as usize) { 1 } else { TILE as usize };
             for (x, y) in kept.pixels() {
-                let made = [x, y]
-                    .iter()
-                    .zip(r.first)
-                    .zip(r.size)
-                    .all(|((at, first), size)| (first as usize..(first + size) as usize).contains(&(at * texels)));
+                let within =
+                    |at: usize, a: usize| (r.first[a]..r.first[a] + r.size[a]).contains(&((at * texels) as u32));
+                let made = within(x, 0) && within(y, 1);
                 (0..kept.size[2]).filter(|_| !made).for_each(|z| target.set([x, y, z], kept.get([x, y, z])));
             }
         }

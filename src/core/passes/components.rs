@@ -60,18 +60,11 @@ impl Lattice<'_> {
         for (slice, row) in (0..slices).flat_map(|slice| (0..rows).map(move |row| (slice, row))) {
             let first = runs.len();
             let begin = (slice * rows + row) * columns;
-            let mut column = 0;
-            while column < columns {
-                if !is_set(begin + column) {
-                    column += 1;
-                    continue;
-                }
-                let start = column;
-                while column < columns && is_set(begin + column) {
-                    column += 1;
-                }
-                runs.push(Run { columns: [start as u32, column as u32], row: (slice * rows + row) as u32 });
-            }
+            let of_this = stretches(columns, |column| is_set(begin + column));
+            runs.extend(
+                of_this
+                    .map(|run| Run { columns: [run.start as u32, run.end as u32], row: (slice * rows + row) as u32 }),
+            );
             parents.extend(first..runs.len());
             of_row.push(first..runs.len());
             for near in slice.saturating_sub(self.slices)..=slice {
@@ -109,6 +102,16 @@ impl Run {
         let [start, end] = self.columns.map(|column| self.row as usize * columns + column as usize);
         start..end
     }
+}
+
+/// The stretches of consecutive numbers below `count` for which `is_set` holds.
+pub(super) fn stretches(count: usize, is_set: impl Fn(usize) -> bool) -> impl Iterator<Item = Range<usize>> {
+    let mut next = 0;
+    std::iter::from_fn(move || {
+        let start = (next..count).find(|n| is_set(*n))?;
+        next = (start..count).find(|n| !is_set(*n)).unwrap_or(count);
+        Some(start..next)
+    })
 }
 
 /// Joins the runs of two rows that touch, also diagonally. Both are sorted.

@@ -58,19 +58,15 @@ pub(crate) const PASS: Pass = Pass {
     ),
     reference: |scene, args, reads, writes| {
         let source = reads.get("source");
-        let target = writes.get_mut("target");
         let cuts: Vec<_> = scene.cuts().collect();
         let curve = scene.start_curve();
-        for z in args.slice..args.slice + args.slices {
-            for (x, y) in source.pixels() {
-                let place = scene.texel_place([x as u32, y as u32, z]);
-                let is_before = scene.unveils() && (y as f64) < reads.get("start_surface").one(x, z as usize, 0);
-                let is_before = is_before || curve.as_ref().is_some_and(|curve| start_curve::is_before(curve, place));
-                let is_removed = is_before || cuts.iter().any(|cut| cut.removes(place));
-                let value = if is_removed { removed(scene) } else { source.one(x, y, z as usize) };
-                target.set([x, y, z as usize], &[value]);
-            }
-        }
+        writes.get_mut("target").fill_slices(args.written(), |[x, y, z]| {
+            let place = scene.texel_place([x, y, z].map(|n| n as u32));
+            let is_before = scene.unveils() && (y as f64) < reads.get("start_surface").one(x, z, 0);
+            let is_before = is_before || curve.as_ref().is_some_and(|curve| start_curve::is_before(curve, place));
+            let is_removed = is_before || cuts.iter().any(|cut| cut.removes(place));
+            [if is_removed { removed(scene) } else { source.one(x, y, z) }]
+        });
     },
     ..Pass::AFTER_SLICES
 };
@@ -152,7 +148,5 @@ pub(super) fn start_curve(scene: &Scene) -> Vec<f32> {
 
 /// For each texel of a slice, the share (0..1) of the frame's lines that fired before the line through that texel.
 pub(super) fn line_shares(scene: &Scene) -> Vec<f32> {
-    let [columns, rows] = scene.grid.size;
-    let texels = (0..rows).flat_map(|row| (0..columns).map(move |column| (column, row)));
-    lookup_tables::floats(texels.map(|(column, row)| scene.share_fired(column, row)))
+    lookup_tables::floats(pixels(scene.grid.size).map(|(column, row)| scene.share_fired(column, row)))
 }

@@ -23,9 +23,7 @@ pub const FILTERED: Pass = Pass {
     constants: |_, _| vec![("SAMPLING", 0), ("SAMPLES", SAMPLES as i32)],
     tolerance: Tolerance::absolute(2e-3)
         .because("a device's filter may have weights of 8 bits; R16F stores 1 to 4.9e-4"),
-    reference: |_, _, reads, writes| {
-        mean(reads, writes, |volume, at| volume.trilinear(at));
-    },
+    reference: |_, _, reads, writes| mean(reads, writes, Texels::trilinear),
     ..Pass::OF_RAYS
 };
 
@@ -59,10 +57,7 @@ pub const COPY: Pass = Pass {
     writes: |_, _| vec![whole("target", Slot::SmoothPicture)],
     constants: no_constants,
     tolerance: Tolerance::exact("nothing is computed"),
-    reference: |_, _, reads, writes| {
-        let source = reads.get("source");
-        writes.get_mut("target").values.copy_from_slice(&source.values);
-    },
+    reference: |_, _, reads, writes| writes.get_mut("target").values.copy_from_slice(&reads.get("source").values),
     ..FILTERED
 };
 
@@ -77,11 +72,10 @@ pub const POSITIONS: Pass = Pass {
         let volume = reads.get("volume");
         let values = writes.get_mut("values");
         let [width, height, _] = values.size;
-        for (x, y) in pixels([width, height]) {
+        values.fill(|x, y| {
             let share = sample_position([x, y], [width, height]);
-            let at = std::array::from_fn(|axis| share[axis] * volume.size[axis] as f64 - 0.5);
-            values.set([x, y, 0], &[volume.trilinear(at)]);
-        }
+            [volume.trilinear(std::array::from_fn(|axis| share[axis] * volume.size[axis] as f64 - 0.5))]
+        });
     },
     ..FILTERED
 };
@@ -97,15 +91,15 @@ pub fn sample_position(texel: [usize; 2], size: [usize; 2]) -> [f64; 3] {
 fn mean(reads: &Arrays, writes: &mut Arrays, sample: impl Fn(&Texels, [f64; 3]) -> f64) {
     let volume = reads.get("volume");
     let picture = writes.get_mut("picture");
-    let size = volume.size.map(|n| n as f64);
-    for (x, y) in picture.pixels() {
-        let share = [(x as f64 + 0.5) / picture.size[0] as f64, (y as f64 + 0.5) / picture.size[1] as f64];
+    let (size, [width, height, _]) = (volume.size.map(|n| n as f64), picture.size);
+    picture.fill(|x, y| {
+        let share = [(x as f64 + 0.5) / width as f64, (y as f64 + 0.5) / height as f64];
         let at = |i: u32| [share[0], share[1], (f64::from(i) + 0.5) / f64::from(SAMPLES)];
         let texel = |i: u32| std::array::from_fn(|axis| at(i)[axis] * size[axis] - 0.5);
         let sum: f64 = (0..SAMPLES).map(|i| sample(volume, texel(i))).sum();
         let mean = sum / f64::from(SAMPLES);
-        picture.set([x, y, 0], &[mean, mean, mean, 1.0]);
-    }
+        [mean, mean, mean, 1.0]
+    });
 }
 
 /// A scene with a Cartesian volume of `edge`^3 voxels in the default texel format and a picture of `pixels`^2.

@@ -15,50 +15,27 @@ const HOMOGENEOUS: u32 = 2;
 /// Largest distance that is stored, bricks; the kind is in the two bits above.
 const MAX_DISTANCE: u32 = 16;
 
-/// How a ray caster skips empty space.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::passes) enum Skipping {
-    /// Not at all: it takes every sample.
-    None,
-    /// By the kinds of bricks and the distance to the nearest brick of another kind, which are in this slot.
-    Kinds(Slot),
-    /// By the value ranges of bricks, which are compared with the largest (MIP) or smallest (MinIP) sample of the ray so far.
-    Ranges,
+/// The specialization constant SKIP of empty_space.glsl for a ray caster that skips empty space by a slot: by the value ranges of bricks, which are
+/// compared with the largest (MIP) or smallest (MinIP) sample of the ray so far, or by the kinds of bricks and the distance to the nearest brick of
+/// another kind, which any other slot holds. None takes every sample.
+pub(in crate::passes) fn skip_constant(slot: Option<Slot>) -> (&'static str, i32) {
+    let value = match slot {
+        None => 0,
+        Some(Slot::BrickRanges) => 2,
+        Some(_) => 1,
+    };
+    ("SKIP", value)
 }
 
-impl Skipping {
-    /// The slot that shaders name `bricks`. None if nothing is skipped.
-    pub fn slot(self) -> Option<Slot> {
-        match self {
-            Skipping::None => None,
-            Skipping::Kinds(slot) => Some(slot),
-            Skipping::Ranges => Some(Slot::BrickRanges),
-        }
-    }
-
-    /// The specialization constant SKIP of empty_space.glsl.
-    pub fn constant(self) -> (&'static str, i32) {
-        let value = match self {
-            Skipping::None => 0,
-            Skipping::Kinds(_) => 1,
-            Skipping::Ranges => 2,
-        };
-        ("SKIP", value)
-    }
+/// The slot, which shaders name `bricks`, by which the surface detector skips empty space. None if it does not.
+pub(in crate::passes) fn surface_skipping(scene: &Scene) -> Option<Slot> {
+    scene.skips().then_some(Slot::SurfaceBrickDistances)
 }
 
-/// How the surface detector skips empty space.
-pub(in crate::passes) fn surface_skipping(scene: &Scene) -> Skipping {
-    if scene.skips() { Skipping::Kinds(Slot::SurfaceBrickDistances) } else { Skipping::None }
-}
-
-/// How compositing and projections skip empty space.
-pub(in crate::passes) fn volume_skipping(scene: &Scene) -> Skipping {
-    match scene.settings.mode {
-        _ if !scene.skips() => Skipping::None,
-        Mode::Mip | Mode::MinIp => Skipping::Ranges,
-        _ => Skipping::Kinds(Slot::VolumeBrickDistances),
-    }
+/// The slot by which compositing and projections skip empty space. None if they do not.
+pub(in crate::passes) fn volume_skipping(scene: &Scene) -> Option<Slot> {
+    let has_ranges = matches!(scene.settings.mode, Mode::Mip | Mode::MinIp);
+    scene.skips().then_some(if has_ranges { Slot::BrickRanges } else { Slot::VolumeBrickDistances })
 }
 
 fn need(scene: &Scene) -> Need {
@@ -85,21 +62,17 @@ pub(crate) const TILE_RANGES: Pass = Pass {
     tolerance: Tolerance::absolute(2e-5).because("one of 65535 steps, up or down"),
     reference: |_, args, reads, writes| {
         let volume = reads.get("volume");
-        let target = writes.get_mut("tile_ranges");
         let edge = TILE as usize;
-        for z in args.slice as usize..(args.slice + args.slices) as usize {
-            for (x, y) in target.pixels() {
-                let (mut low, mut high) = (1.0f64, 0.0f64);
-                for row in edge * y..(edge * (y + 1)).min(volume.size[1]) {
-                    for column in edge * x..(edge * (x + 1)).min(volume.size[0]) {
-                        let value = volume.one(column, row, z);
-                        (low, high) = (low.min(value), high.max(value));
-                    }
+        writes.get_mut("tile_ranges").fill_slices(args.written(), |[x, y, z]| {
+            let (mut low, mut high) = (1.0f64, 0.0f64);
+            for row in edge * y..(edge * (y + 1)).min(volume.size[1]) {
+                for column in edge * x..(edge * (x + 1)).min(volume.size[0]) {
+                    let value = volume.one(column, row, z);
+                    (low, high) = (low.min(value), high.max(value));
                 }
-                let steps = [(low * 65535.0).floor(), (high * 65535.0).ceil()];
-                target.set([x, y, z], &steps.map(|n| n / 65535.0));
             }
-        }
+            [(low * 65535.0).floor(), (high * 65535.0).ceil()].map(|step| step / 65535.0)
+        });
     },
     ..Pass::AFTER_SLICES
 };
@@ -186,11 +159,7 @@ pub(crate) const CLASSIFY_VOLUME: Pass = Pass {
         (true, _, not) | (_, Mode::Mean, not) => not,
         _ => Err("nothing is composited or averaged in this mode"),
     },
-    reads: |s, _| {
-        let mut reads = ranges();
-        reads.extend(s.composites().then_some(whole("opaque_before", Slot::OpaqueBefore)));
-        reads
-    },
+    reads: |s, _| [ranges(), whole_if(s.composites(), "opaque_before", Slot::OpaqueBefore)].concat(),
     // What is composited has no quiet bricks; of a mean only those of zeros are.
     params: |s, _| {
         window(s, if s.composites() { s.volume_view() } else { s.projection_view() }).f32("quiet_level", 0.0)
@@ -323,24 +292,19 @@ fn distance_reference(beyond: u32, args: &DispatchArgs, reads: &Arrays, writes: 
     let axis = args.iteration as usize;
     let size = source.size;
     let code = |at: [usize; 3]| (source.one(at[0], at[1], at[2]) * 255.0).round() as u32;
-    for z in 0..size[2] {
-        for (x, y) in source.pixels() {
-            let at = [x, y, z];
-            let (kind, own) = (code(at) >> 6, code(at) & 63);
-            let mut best = own;
-            for along in 0..size[axis] {
-                let away = along.abs_diff(at[axis]) as u32;
-                let mut there = at;
-                there[axis] = along;
-                let other = code(there);
-                if away > 0 {
-                    best = best.min(if other >> 6 == kind { away.max(other & 63) } else { away });
-                }
-            }
-            if beyond != kind {
-                best = best.min(at[axis] as u32 + 1).min((size[axis] - at[axis]) as u32);
-            }
-            target.set(at, &[f64::from(kind * 64 + best) / 255.0]);
+    target.fill_slices(0..size[2], |at| {
+        let (kind, own) = (code(at) >> 6, code(at) & 63);
+        let mut best = own;
+        for along in (0..size[axis]).filter(|along| *along != at[axis]) {
+            let away = along.abs_diff(at[axis]) as u32;
+            let mut there = at;
+            there[axis] = along;
+            let other = code(there);
+            best = best.min(if other >> 6 == kind { away.max(other & 63) } else { away });
         }
-    }
+        if beyond != kind {
+            best = best.min(at[axis] as u32 + 1).min((size[axis] - at[axis]) as u32);
+        }
+        [f64::from(kind * 64 + best) / 255.0]
+    });
 }

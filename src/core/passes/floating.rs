@@ -26,14 +26,10 @@ pub const DROP: Pass = Pass {
     tolerance: Tolerance::absolute(5e-4).because("a copy, but for the level; R16F stores 1 to 4.9e-4"),
     reference: |scene, args, reads, writes| {
         let (source, floating) = (reads.get("source"), reads.get("floating"));
-        let target = writes.get_mut("target");
-        for z in args.slice as usize..(args.slice + args.slices) as usize {
-            for (x, y) in source.pixels() {
-                let value = source.one(x, y, z);
-                let is_dropped = floating.one(x, y, z) > 0.5;
-                target.set([x, y, z], &[if is_dropped { value.min(lowered(scene)) } else { value }]);
-            }
-        }
+        writes.get_mut("target").fill_slices(args.written(), |[x, y, z]| {
+            let (value, is_dropped) = (source.one(x, y, z), floating.one(x, y, z) > 0.5);
+            [if is_dropped { value.min(lowered(scene)) } else { value }]
+        });
     },
     ..Pass::AFTER_SLICES
 };
@@ -81,8 +77,7 @@ pub fn reference(scene: &Scene, volume: &Texels) -> Texels {
     let mut floating = Texels::from_fn(volume.size, 1, |_, _| 0.0);
     let mut seen = vec![false; columns * rows * slices];
     let index = |[x, y, z]: [usize; 3]| (z * rows + y) * columns + x;
-    let all = (0..slices).flat_map(|z| (0..rows).flat_map(move |y| (0..columns).map(move |x| [x, y, z])));
-    for start in all {
+    for start in cells(volume.size) {
         if seen[index(start)] || !is_set(start) {
             continue;
         }
@@ -93,11 +88,11 @@ pub fn reference(scene: &Scene, volume: &Texels) -> Texels {
             let around = |at: usize, by: i64, count: usize| {
                 (at as i64 - by).max(0) as usize..(at as i64 + by + 1).min(count as i64) as usize
             };
-            for (x, y, z) in around(z, reach, slices)
-                .flat_map(|z| around(y, 1, rows).flat_map(move |y| around(x, 1, columns).map(move |x| (x, y, z))))
+            for at in around(z, reach, slices)
+                .flat_map(|z| around(y, 1, rows).flat_map(move |y| around(x, 1, columns).map(move |x| [x, y, z])))
             {
-                if is_set([x, y, z]) && !std::mem::replace(&mut seen[index([x, y, z])], true) {
-                    part.push([x, y, z]);
+                if is_set(at) && !std::mem::replace(&mut seen[index(at)], true) {
+                    part.push(at);
                 }
             }
         }

@@ -11,7 +11,7 @@ use crate::spirv::volumes_to_layers::volumes_to_layers;
 use crate::spirv::{self, Access, Dimension, Kind, Member, Module};
 
 /// Textures and tables that a shader declares and a pass may not bind. Specialization constants say whether they are read or written.
-const OPTIONAL: [&str; 37] = [
+const OPTIONAL: [&str; 35] = [
     "back_light",
     "before",
     "bricks",
@@ -29,8 +29,6 @@ const OPTIONAL: [&str; 37] = [
     "line_shares",
     "majorants",
     "marks",
-    "net_lines",
-    "net_slices",
     "occlusion",
     "opaque_before",
     "packed_neighbours",
@@ -81,15 +79,14 @@ pub fn for_cpu(
         let binding = module.bindings.iter().find(|b| b.name == bind.name);
         binding.is_some_and(|b| matches!(b.kind, Kind::Sampled | Kind::Filtered))
     };
-    let textures: Vec<_> = pass
-        .reads(scene, args)
-        .into_iter()
+    let reads = pass.reads(scene, args);
+    let textures: Vec<_> = reads
+        .iter()
         .filter(|bind| !bind.filtered && stores(bind.slot) && is_texture(bind))
         .filter_map(|bind| Some((bind.name, ImageFormat::from_u32(bind.slot.format(scene) as u32)?)))
         .collect();
     let words =
         hoist_uniforms(words).and_then(|words| texture_to_storage(&words, &textures)).map_err(|e| e.to_string())?;
-    let reads = pass.reads(scene, args);
     storage_to_texel_buffer(&words, |name| reads.iter().any(|b| b.name == name && stores(b.slot)))
         .map_err(|e| e.to_string())
 }
@@ -101,12 +98,8 @@ pub fn for_cpu(
 /// The first disagreement, with what the declaration and the shader say.
 pub fn check(pass: &Pass, scene: &Scene, args: &DispatchArgs, module: &Module) -> Result<(), String> {
     let (reads, writes) = (pass.reads(scene, args), pass.writes(scene, args));
-    for bind in &reads {
-        check_bind(scene, module, bind, Access::Read)?;
-    }
-    for bind in &writes {
-        check_bind(scene, module, bind, Access::Write)?;
-    }
+    reads.iter().try_for_each(|bind| check_bind(scene, module, bind, Access::Read))?;
+    writes.iter().try_for_each(|bind| check_bind(scene, module, bind, Access::Write))?;
     for binding in module.bindings.iter().filter(|b| b.kind != Kind::Params) {
         if !reads.iter().chain(&writes).any(|b| b.name == binding.name) {
             return Err(format!("glsl declares '{}', the pass neither reads nor writes it", binding.name));
@@ -176,25 +169,32 @@ fn check_params(module: &Module, params: &Params) -> Result<(), String> {
 }
 
 fn fits(member: &Member, value: &Value) -> bool {
-    match value {
-        Value::F32(_) => member.is_float && member.components == 1,
-        Value::I32(_) => !member.is_float && member.is_signed && member.components == 1,
-        Value::Vec2(_) => member.is_float && member.components == 2,
-        Value::Vec3(_) => member.is_float && member.components == 3,
-        Value::Vec4(_) => member.is_float && member.components == 4,
-        Value::Floats(v) => member.is_float && member.components as usize == v.len(),
-    }
+    let is_type = match value {
+        Value::I32(_) => !member.is_float && member.is_signed,
+        _ => member.is_float,
+    };
+    // Every component has 4 bytes.
+    is_type && 4 * member.components as usize == bytes_of(value).len()
 }
 
 fn type_name(member: &Member) -> String {
-    let scalar = if member.is_float {
-        "float"
-    } else if member.is_signed {
-        "int"
-    } else {
-        "uint"
+    let scalar = match (member.is_float, member.is_signed) {
+        (true, _) => "float",
+        (false, true) => "int",
+        (false, false) => "uint",
     };
     if member.components == 1 { scalar.into() } else { format!("{scalar} x {}", member.components) }
+}
+
+fn bytes_of(value: &Value) -> &[u8] {
+    match value {
+        Value::F32(v) => bytemuck::bytes_of(v),
+        Value::I32(v) => bytemuck::bytes_of(v),
+        Value::Vec2(v) => bytemuck::bytes_of(v),
+        Value::Vec3(v) => bytemuck::bytes_of(v),
+        Value::Vec4(v) => bytemuck::bytes_of(v),
+        Value::Floats(v) => bytemuck::cast_slice(&v[..]),
+    }
 }
 
 /// Packs the parameters into the bytes of the parameter block that the shader declares. A member without a parameter of its name is 0.
@@ -202,16 +202,8 @@ pub fn pack(module: &Module, params: &Params) -> Vec<u8> {
     let mut block = vec![0; module.params_size as usize];
     for member in &module.params {
         let Some((_, value)) = params.0.iter().find(|(name, _)| *name == member.name) else { continue };
-        let words: &[u8] = match value {
-            Value::F32(v) => bytemuck::bytes_of(v),
-            Value::I32(v) => bytemuck::bytes_of(v),
-            Value::Vec2(v) => bytemuck::bytes_of(v),
-            Value::Vec3(v) => bytemuck::bytes_of(v),
-            Value::Vec4(v) => bytemuck::bytes_of(v),
-            Value::Floats(v) => bytemuck::cast_slice(&v[..]),
-        };
-        let at = member.offset as usize;
-        block[at..at + words.len()].copy_from_slice(words);
+        let (at, bytes) = (member.offset as usize, bytes_of(value));
+        block[at..at + bytes.len()].copy_from_slice(bytes);
     }
     block
 }

@@ -72,8 +72,8 @@ fn rays_per_pixel(scene: &Scene) -> f64 {
 fn params(scene: &Scene) -> Params {
     let style = &scene.settings.labels;
     let [x, y, z] = scene.labels().map_or([[0.0; 4]; 3], |labels| {
-        let matrix = labels.to_index().matrix3;
-        let offset = labels.to_index().transform_point3(scene.local_origin());
+        let matrix = labels.to_index.matrix3;
+        let offset = labels.to_index.transform_point3(scene.local_origin());
         std::array::from_fn(|n| matrix.row(n).extend(offset[n]).to_array())
     });
     let area = |corner: [u32; 2], size: [u32; 2]| [corner[0], corner[1], size[0], size[1]].map(f64::from);
@@ -110,7 +110,7 @@ fn reference(scene: &Scene, reads: &Arrays, screen: &mut Texels) {
     let (below, rendering) = (reads.get("unlabelled"), scene.rendering_area());
     let tiling = scene.cuts_planes().then(|| scene.tiling());
     let columns = tiling.iter().flat_map(|tiling| tiling.tiles.last()).flat_map(Tile::columns).collect::<Vec<_>>();
-    for (x, y) in screen.pixels() {
+    screen.fill(|x, y| {
         let over = match &tiling {
             Some(tiling) if scene.is_flat() || !rendering.holds([x, y]) => {
                 on_plane(scene, &field, tiling, &columns, [x, y])
@@ -124,9 +124,9 @@ fn reference(scene: &Scene, reads: &Arrays, screen: &mut Texels) {
         };
         let over = over.unwrap_or_default();
         let below = below.get([x, y, 0]);
-        let mixed: [f64; 3] = std::array::from_fn(|c| below[c] * (1.0 - over[3]) + over[c]);
-        screen.set([x, y, 0], &[mixed[0], mixed[1], mixed[2], 1.0]);
-    }
+        let [r, g, b] = [0, 1, 2].map(|c| below[c] * (1.0 - over[3]) + over[c]);
+        [r, g, b, 1.0]
+    });
 }
 
 /// Labels, and the shares of the surroundings that have one, as functions of place.
@@ -170,7 +170,7 @@ impl Field<'_> {
     }
 
     fn colour(&self, label: u8) -> [f64; 3] {
-        self.labels.colours()[usize::from(label)]
+        self.labels.colours[usize::from(label)]
     }
 }
 
@@ -193,9 +193,9 @@ fn on_plane(
         // A single column has no direction.
         right = column(n + 1).map(|after| after - here).or_else(|| Some(here - before()?)).unwrap_or(DVec3::ZERO);
     }
-    let axes = [right, tile.plane.down * tile.pixel].map(|v| field.labels.to_index().transform_vector3(v));
+    let axes = [right, tile.plane.down * tile.pixel].map(|v| field.labels.to_index.transform_vector3(v));
     let pixels = |value: f64, slope: DVec3| value / slope.dot(axes[0]).hypot(slope.dot(axes[1])).max(1e-6);
-    let q = field.labels.to_index().transform_point3(place);
+    let q = field.labels.to_index.transform_point3(place);
     let shares = field.shares(q);
     let (label, most, slope) = *shares.first()?;
     let rise = field.corners(q).map(|(_, cover, _, slope)| slope * cover).sum();
@@ -216,7 +216,7 @@ fn on_plane(
 
 fn on_ray(scene: &Scene, field: &Field, reads: &Arrays, ray: [f64; 2]) -> Option<Over> {
     let (origin, along) = scene.rays.at(ray[0], ray[1]);
-    let to_index = field.labels.to_index();
+    let to_index = &field.labels.to_index;
     let (q, pace) = (to_index.transform_point3(origin), to_index.transform_vector3(along));
     let (mut enter, mut leave) = (0.0_f64, f64::INFINITY);
     for axis in 0..3 {

@@ -1,7 +1,7 @@
 //! Tables that the CPU computes from the scene in f64, so that shaders need not compute them for every sample.
 
 use crate::probe::{Advance, Array, Axis, Geometry, Motion, Probe};
-use crate::scene::{Bricks, LabelVolume, Reach, Scene, Side, self_attenuation, transfer};
+use crate::scene::{Bricks, Reach, Scene, Side, self_attenuation, transfer};
 use rayon::prelude::*;
 
 pub(super) fn floats(values: impl IntoIterator<Item = f64>) -> Vec<f32> {
@@ -15,12 +15,10 @@ pub fn scan_lut(scene: &Scene) -> Vec<f32> {
     let Some(probe) = scene.probe() else { return Vec::new() };
     let [width, height] = scene.grid.size;
     let mut lut = Vec::with_capacity(2 * width as usize * height as usize);
-    for row in 0..height {
-        for column in 0..width {
-            let (x, y) = scene.grid.place(f64::from(column), f64::from(row));
-            let (sample, line) = scan_index(scene, probe, x, y).unwrap_or((-1.0, -1.0));
-            lut.extend([sample as f32, line as f32]);
-        }
+    for (column, row) in (0..height).flat_map(|row| (0..width).map(move |column| (column, row))) {
+        let (x, y) = scene.grid.place(f64::from(column), f64::from(row));
+        let (sample, line) = scan_index(scene, probe, x, y).unwrap_or((-1.0, -1.0));
+        lut.extend([sample as f32, line as f32]);
     }
     lut
 }
@@ -55,50 +53,45 @@ pub fn scan_index(scene: &Scene, probe: &Probe, x: f64, y: f64) -> Option<(f64, 
     (away <= scene.apron).then_some((near_sample.min(kept) / factor, near_line))
 }
 
-/// The parameter of the sweep look-up table: the tangent of half the angle about the wobble axis, or mm.
-fn sweep_parameter(motion: Motion, position: f64) -> f64 {
-    match motion {
-        Motion::Fan { .. } => (position / 2.0).tan(),
-        _ => position,
-    }
+/// The abscissa of a look-up table over positions: the tangent of a `parts`-th of an angle (rad), or without `parts` the position itself, mm.
+fn abscissa(parts: Option<f64>, position: f64) -> f64 {
+    parts.map_or(position, |parts| (position / parts).tan())
 }
 
-fn sweep_position(motion: Motion, parameter: f64) -> f64 {
-    match motion {
-        Motion::Fan { .. } => 2.0 * parameter.atan(),
-        _ => parameter,
-    }
+/// The opposite of [`abscissa`].
+fn position(parts: Option<f64>, abscissa: f64) -> f64 {
+    parts.map_or(abscissa, |parts| parts * abscissa.atan())
 }
 
-/// The abscissa of the line look-up table: the tangent of half the in-plane angle, or mm for a linear array. For a radial probe it is the tangent of
-/// a quarter of the angle, because that of half has no bound towards 180 degrees.
-pub(super) fn line_parameter(probe: &Probe, position: f64) -> f64 {
-    match probe.array {
-        Array::Curved { .. } if probe.is_radial() => (position / 4.0).tan(),
-        Array::Curved { .. } => (position / 2.0).tan(),
-        Array::Linear => position,
-    }
+/// By what an angle about the wobble axis is divided before its tangent is taken. None where positions are mm: translated or still motion.
+fn sweep_parts(probe: &Probe) -> Option<f64> {
+    matches!(probe.motion, Motion::Fan { .. }).then_some(2.0)
 }
 
-fn line_position(probe: &Probe, parameter: f64) -> f64 {
-    match probe.array {
-        Array::Curved { .. } if probe.is_radial() => 4.0 * parameter.atan(),
-        Array::Curved { .. } => 2.0 * parameter.atan(),
-        Array::Linear => parameter,
-    }
+/// By what the in-plane angle of a curved array is divided before its tangent is taken: 2, and 4 for a radial probe, because the tangent of half the
+/// angle has no bound towards 180 degrees. None for a linear array, whose positions are mm.
+fn line_parts(probe: &Probe) -> Option<f64> {
+    let is_curved = matches!(probe.array, Array::Curved { .. });
+    is_curved.then(|| if probe.is_radial() { 4.0 } else { 2.0 })
+}
+
+/// Lowest and highest abscissa of the line look-up table.
+pub(super) fn line_span(probe: &Probe) -> (f64, f64) {
+    let of = |position: f64| abscissa(line_parts(probe), position);
+    (of(probe.lines.first()), of(probe.lines.last()))
 }
 
 /// Lowest and highest abscissa of the sweep look-up table.
 pub(super) fn sweep_span(probe: &Probe) -> (f64, f64) {
     let (first, last) = probe.slice_bounds();
-    (sweep_parameter(probe.motion, first), sweep_parameter(probe.motion, last))
+    (abscissa(sweep_parts(probe), first), abscissa(sweep_parts(probe), last))
 }
 
 /// The interval of the sweep table's abscissa that shaders take as inside the sweep. It is a little wider than the outermost slices, since rounding
 /// may move places on them outside.
 pub(super) fn sweep_border(probe: &Probe) -> [f64; 2] {
     let ((first, last), margin) = (probe.slice_bounds(), 1e-4 * probe.slices.pitch());
-    [first - margin, last + margin].map(|position| sweep_parameter(probe.motion, position))
+    [first - margin, last + margin].map(|position| abscissa(sweep_parts(probe), position))
 }
 
 /// Position in the sweep, in mean slice pitches from slice 0, at `ray.entries` equidistant abscissae between the bounds of the slice positions
@@ -107,12 +100,14 @@ pub(super) fn sweep_border(probe: &Probe) -> [f64; 2] {
 /// for a Cartesian volume.
 pub fn sweep_lut(scene: &Scene) -> Vec<f32> {
     let Some(probe) = scene.probe() else { return Vec::new() };
+    let positions = equidistant(scene, sweep_span(probe)).map(|at| position(sweep_parts(probe), at));
+    floats(positions.map(|position| (position - probe.slices.first()) / probe.slices.pitch()))
+}
+
+/// `ray.entries` equidistant abscissae, both ends included.
+fn equidistant(scene: &Scene, (low, high): (f64, f64)) -> impl Iterator<Item = f64> {
     let entries = scene.settings.ray.entries;
-    let (low, high) = sweep_span(probe);
-    floats((0..entries).map(|i| {
-        let parameter = low + (high - low) * f64::from(i) / f64::from(entries - 1);
-        (sweep_position(probe.motion, parameter) - probe.slices.first()) / probe.slices.pitch()
-    }))
+    (0..entries).map(move |i| low + (high - low) * f64::from(i) / f64::from(entries - 1))
 }
 
 /// Fractional line index divided by the number of lines, which is the share of the frame that was acquired before the line. It is given at
@@ -120,13 +115,8 @@ pub fn sweep_lut(scene: &Scene) -> Vec<f32> {
 /// for a linear array. Empty for a Cartesian volume.
 pub fn line_lut(scene: &Scene) -> Vec<f32> {
     let Some(probe) = scene.probe() else { return Vec::new() };
-    let entries = scene.settings.ray.entries;
-    let low = line_parameter(probe, probe.lines.first());
-    let high = line_parameter(probe, probe.lines.last());
-    floats((0..entries).map(|i| {
-        let parameter = low + (high - low) * f64::from(i) / f64::from(entries - 1);
-        probe.lines.index_of(line_position(probe, parameter)) / probe.lines.len() as f64
-    }))
+    let positions = equidistant(scene, line_span(probe)).map(|at| position(line_parts(probe), at));
+    floats(positions.map(|position| probe.lines.index_of(position) / probe.lines.len() as f64))
 }
 
 /// For every slice two values: its position from slice 0, and the motor's travel during its frame ([`Advance`]), both in mean slice pitches. Empty
@@ -134,14 +124,10 @@ pub fn line_lut(scene: &Scene) -> Vec<f32> {
 pub fn slice_table(scene: &Scene) -> Vec<f32> {
     let Some(probe) = scene.probe() else { return Vec::new() };
     let pitch = probe.slices.pitch();
-    floats((0..probe.slices.len()).flat_map(|k| {
-        let advance = match &probe.advance {
-            Advance::None => 0.0,
-            Advance::Same(a) => *a,
-            Advance::Each(table) => table.get(k).copied().unwrap_or(0.0),
-        };
-        [(probe.slices.at(k as f64) - probe.slices.first()) / pitch, advance / pitch]
-    }))
+    floats(
+        (0..probe.slices.len())
+            .flat_map(|k| [(probe.slices.at(k as f64) - probe.slices.first()) / pitch, probe.advance_of(k) / pitch]),
+    )
 }
 
 /// True if slices have non-uniform positions or are swept in mixed directions, so that shaders search for the slice at a position.
@@ -243,12 +229,12 @@ pub(super) fn curve_table(scene: &Scene) -> Vec<f32> {
 
 /// The label of each voxel of the box that holds all labels, divided by 255; x fastest.
 pub(super) fn label_ids(scene: &Scene) -> Vec<f32> {
-    shares(scene.labels().map_or(&[0], LabelVolume::ids))
+    shares(scene.labels().map_or(&[0], |labels| &labels.ids))
 }
 
 /// For each voxel of the box that holds all labels, x fastest: the share (0..1) of its surroundings that has a label.
 pub(super) fn label_cover(scene: &Scene) -> Vec<f32> {
-    shares(scene.labels().map_or(&[0], LabelVolume::cover))
+    shares(scene.labels().map_or(&[0], |labels| &labels.cover))
 }
 
 fn shares(bytes: &[u8]) -> Vec<f32> {
@@ -257,7 +243,7 @@ fn shares(bytes: &[u8]) -> Vec<f32> {
 
 /// The colour of each of 256 labels: red, green and blue in 0..1, and 1. Labels without a colour have four zeros.
 pub(super) fn label_colours(scene: &Scene) -> Vec<f32> {
-    let colours = scene.labels().map_or(&[][..], LabelVolume::colours);
+    let colours = scene.labels().map_or(&[][..], |labels| &labels.colours);
     let entry = |n: usize| colours.get(n).map_or([0.0; 4], |[r, g, b]| [*r as f32, *g as f32, *b as f32, 1.0]);
     (0..256).flat_map(entry).collect()
 }
@@ -270,12 +256,8 @@ pub(super) fn labels_differ(old: &Scene, new: &Scene) -> bool {
 /// The half-spaces of the block of mode cube, four floats each: the outward normal n and the limit w of dot(n, p) <= w, for p relative to
 /// [`Scene::local_origin`], mm.
 pub(super) fn block_table(scene: &Scene) -> Vec<f32> {
-    floats(
-        scene
-            .block()
-            .iter()
-            .flat_map(|f| [f.normal.x, f.normal.y, f.normal.z, scene.limit_to_local(f.normal, f.limit)]),
-    )
+    let block = scene.block();
+    floats(block.iter().flat_map(|f| f.normal.extend(scene.limit_to_local(f.normal, f.limit)).to_array()))
 }
 
 /// For each brick the texels that samples in it may touch; bricks are in the order x fastest, then y.

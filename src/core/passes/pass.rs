@@ -3,12 +3,12 @@
 
 pub use super::slots::{Found, Search, Slot, rendered};
 pub(super) use super::slots::{composited_beside_surface, toned_slot};
-pub(super) use super::texels::pixels;
 pub use super::texels::{Arrays, Texels};
+pub(super) use super::texels::{cells, pixels};
 use crate::scene::{MAX_DEVIATION, Scene};
-use crate::tree::Name;
+use crate::tree::{Defaults, Name};
 use glam::DVec3;
-use std::ops::Deref;
+use std::ops::{Deref, Range};
 
 /// The value of a distance map where the ray hit nothing: the largest finite float, so that shaders need no infinities.
 pub const MISS: f64 = f32::MAX as f64;
@@ -38,13 +38,14 @@ pub enum Frequency {
 }
 
 /// The arguments of a dispatch: the numbers in which two dispatches of the same pass and scene differ. The default is one frame in slice 0.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Defaults, PartialEq, Eq)]
 pub struct DispatchArgs {
     /// The layer of the frame array that holds the first frame of the dispatch.
     pub layer: u32,
     /// The first slice that the dispatch writes. For a pass over frames it is the slice of the first frame.
     pub slice: u32,
     /// Number of slices that the dispatch writes. For a pass over frames it is the number of frames.
+    #[value(1)]
     pub slices: u32,
     /// Number of the dispatch, from 0, among those of a pass that repeats.
     pub iteration: u32,
@@ -52,9 +53,10 @@ pub struct DispatchArgs {
     pub image: u32,
 }
 
-impl Default for DispatchArgs {
-    fn default() -> DispatchArgs {
-        DispatchArgs { layer: 0, slice: 0, slices: 1, iteration: 0, image: 0 }
+impl DispatchArgs {
+    /// The slices that the dispatch writes.
+    pub(super) fn written(&self) -> Range<usize> {
+        self.slice as usize..(self.slice + self.slices) as usize
     }
 }
 
@@ -92,10 +94,7 @@ impl<'a> Dispatch<'a> {
     }
 
     fn link(&self) -> (Slot, Slot) {
-        match self.slots {
-            Some(slots) => slots,
-            None => panic!("a pass that is no link of a chain asks for the chain's slots"),
-        }
+        self.slots.unwrap_or_else(|| panic!("a pass that is no link of a chain asks for the chain's slots"))
     }
 }
 
@@ -135,6 +134,11 @@ pub struct Bind {
 
 pub fn whole(name: &'static str, slot: Slot) -> Bind {
     Bind { name, slot, part: Part::Whole, filtered: false }
+}
+
+/// Binds a whole slot if `is_bound`, otherwise nothing.
+pub(super) fn whole_if(is_bound: bool, name: &'static str, slot: Slot) -> Vec<Bind> {
+    is_bound.then_some(whole(name, slot)).into_iter().collect()
 }
 
 /// Binds the dispatch's slices of a slot.
@@ -220,6 +224,17 @@ pub enum Link {
     Observer(Chain),
     /// The pass reads the finished slices of the volume, and computes the visible part of each slice of its own output.
     AfterSlices,
+}
+
+impl Link {
+    /// The chain whose slots the pass reads. None for a pass that is no link of one.
+    pub(super) fn chain(&self) -> Option<Chain> {
+        match self {
+            Link::Filter(filter) => Some(filter.chain),
+            Link::Observer(chain) => Some(*chain),
+            Link::None | Link::AfterSlices => None,
+        }
+    }
 }
 
 /// A filter of a chain. One step of it is one application of the filter, which may take several dispatches.
@@ -370,6 +385,17 @@ pub fn once(_: &Scene) -> u32 {
     1
 }
 
+/// The constants without those of the names `without`, and with those of `with`.
+pub(super) fn replaced<const N: usize>(
+    mut constants: Vec<(&'static str, i32)>,
+    without: &[&str],
+    with: [(&'static str, i32); N],
+) -> Vec<(&'static str, i32)> {
+    constants.retain(|(name, _)| !without.contains(name));
+    constants.extend(with);
+    constants
+}
+
 pub(super) fn no_constants(_: &Scene, _: &Dispatch) -> Vec<(&'static str, i32)> {
     Vec::new()
 }
@@ -446,13 +472,16 @@ fn finite(value: f64) -> f32 {
 impl Params {
     /// Adds a float. Values beyond the range of f32, also infinities, become the largest finite float of their sign, so that shaders need not handle
     /// infinities.
-    pub fn f32(mut self, name: &'static str, value: f64) -> Params {
-        self.0.push((name, Value::F32(finite(value))));
-        self
+    pub fn f32(self, name: &'static str, value: f64) -> Params {
+        self.with(name, Value::F32(finite(value)))
     }
 
-    pub fn i32(mut self, name: &'static str, value: u32) -> Params {
-        self.0.push((name, Value::I32(value as i32)));
+    pub fn i32(self, name: &'static str, value: u32) -> Params {
+        self.with(name, Value::I32(value as i32))
+    }
+
+    fn with(mut self, name: &'static str, value: Value) -> Params {
+        self.0.push((name, value));
         self
     }
 
@@ -462,27 +491,23 @@ impl Params {
         self.i32("first_stored_column", column).i32("first_stored_row", row).i32("first_stored_slice", slice)
     }
 
-    pub fn vec2(mut self, name: &'static str, value: [f64; 2]) -> Params {
-        self.0.push((name, Value::Vec2(value.map(finite))));
-        self
+    pub fn vec2(self, name: &'static str, value: [f64; 2]) -> Params {
+        self.with(name, Value::Vec2(value.map(finite)))
     }
 
-    pub(super) fn vec4(mut self, name: &'static str, value: [f64; 4]) -> Params {
-        self.0.push((name, Value::Vec4(value.map(finite))));
-        self
+    pub(super) fn vec4(self, name: &'static str, value: [f64; 4]) -> Params {
+        self.with(name, Value::Vec4(value.map(finite)))
     }
 
     /// Adds an array of at most [`MOST_FLOATS`] values; missing ones are 0.
-    pub(super) fn floats(mut self, name: &'static str, values: &[f64]) -> Params {
+    pub(super) fn floats(self, name: &'static str, values: &[f64]) -> Params {
         assert!(values.len() <= MOST_FLOATS, "{name}: {} values", values.len());
         let value = |n: usize| values.get(n).copied().map_or(0.0, finite);
-        self.0.push((name, Value::Floats(Box::new(std::array::from_fn(value)))));
-        self
+        self.with(name, Value::Floats(Box::new(std::array::from_fn(value))))
     }
 
-    pub fn vec3(mut self, name: &'static str, value: impl Into<DVec3>) -> Params {
-        self.0.push((name, Value::Vec3(value.into().to_array().map(finite))));
-        self
+    pub fn vec3(self, name: &'static str, value: impl Into<DVec3>) -> Params {
+        self.with(name, Value::Vec3(value.into().to_array().map(finite)))
     }
 }
 

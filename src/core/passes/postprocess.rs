@@ -1,7 +1,6 @@
 //! Stage 4: the picture from the rendering, toned to 8 bits.
 
 use crate::passes::pass::*;
-use crate::passes::raycast::cap;
 use crate::passes::{chain, edge_coverage};
 use crate::scene::planes::{Frame, Plane, Tile, Tiling};
 use crate::scene::{ColourMap, Layout, Scene, transfer};
@@ -20,11 +19,7 @@ pub const TONE: Pass = Pass {
         (false, true) => Err("the picture is assembled straight to 8 bits"),
         (false, false) => Ok("every picture ends in 8 bits"),
     },
-    reads: |s, t| {
-        let mut reads = vec![whole("picture", t.source())];
-        reads.extend(s.draws_lines().then_some(whole("tiles", Slot::Tiles)));
-        reads
-    },
+    reads: |s, t| [vec![whole("picture", t.source())], whole_if(s.draws_lines(), "tiles", Slot::Tiles)].concat(),
     writes: |s, _| vec![whole("screen", toned_slot(s))],
     params: |s, _| {
         let [x, y] = s.tile_area().corner;
@@ -38,11 +33,11 @@ pub const TONE: Pass = Pass {
 
 fn tone_picture(scene: &Scene, picture: &Texels, screen: &mut Texels) {
     let tiling = scene.draws_lines().then(|| scene.tiling());
-    for (x, y) in picture.pixels() {
+    screen.fill(|x, y| {
         let rgba = picture.get([x, y, 0]);
         let colour = (rgba[3] > 0.0).then_some([rgba[0], rgba[1], rgba[2]]);
-        screen.set([x, y, 0], &reference_pixel(scene, tiling.as_ref(), colour, x, y));
-    }
+        reference_pixel(scene, tiling.as_ref(), colour, x, y)
+    });
 }
 
 fn tone_and_lines_params(scene: &Scene, params: Params) -> Params {
@@ -116,6 +111,11 @@ pub fn toned(scene: &Scene, colour: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|c| map[n][c] + (map[n + 1][c] - map[n][c]) * (grey - n as f64))
 }
 
+/// A colour, premultiplied, as the screen shows it: black where nothing is.
+pub(crate) fn on_screen(scene: &Scene, rgba: &[f64]) -> [f64; 3] {
+    if rgba[3] > 0.0 { toned(scene, [rgba[0], rgba[1], rgba[2]]) } else { [0.0; 3] }
+}
+
 /// A pixel's colour under the cross-lines and the frame of its tile.
 fn with_lines(tiling: &Tiling, tile: &Tile, mut colour: [f64; 3], x: usize, y: usize) -> [f64; 3] {
     let place = tiling.place(tile, x, y);
@@ -153,16 +153,16 @@ fn guide(scene: &Scene) -> Option<Slot> {
     (has_edges(scene) && scene.has_distance()).then(|| chain::distance_end(scene))
 }
 
-/// Cut faces, where they tell edges.
-fn cut_faces(scene: &Scene) -> Option<Bind> {
-    cap::reads(scene).filter(|_| has_edges(scene))
+/// True if cut faces tell edges.
+fn has_cut_edges(scene: &Scene) -> bool {
+    scene.has_caps() && has_edges(scene)
 }
 
 /// The distance of each ray that tells edges of the rendering, or of the composited half of a pair. A cut face is nearer than all else: it has an edge where it
 /// meets the surface that it cuts, too.
 fn edge_distances(scene: &Scene, reads: &Arrays, is_rendering: bool) -> Option<Texels> {
     let distances = guide(scene).filter(|_| is_rendering).map(|_| reads.get("guide"));
-    let faces = cut_faces(scene).map(|_| reads.get("cap"));
+    let faces = has_cut_edges(scene).then(|| reads.get("cap"));
     let size = distances.or(faces)?.size;
     Some(Texels::from_fn(size, 1, |at, _| match faces {
         Some(faces) if faces.get(at)[1] > 0.0 => 0.0,
@@ -218,11 +218,7 @@ pub(crate) const ASSEMBLE_TONED: Pass = Pass {
         (true, false) => Err("the picture is filtered, or wanted in floats"),
         (false, _) => Err("one ray makes a pixel of the whole picture"),
     },
-    reads: |s, _| {
-        let mut reads = assemble_reads(s);
-        reads.extend(s.draws_lines().then_some(whole("tiles", Slot::Tiles)));
-        reads
-    },
+    reads: |s, _| [assemble_reads(s), whole_if(s.draws_lines(), "tiles", Slot::Tiles)].concat(),
     writes: |s, _| vec![whole("screen", toned_slot(s))],
     params: |s, _| tone_and_lines_params(s, assemble_params(s)),
     constants: |s, _| [assemble_constants(s), tone_and_lines_constants(s)].concat(),
@@ -258,7 +254,7 @@ fn assemble_reads(scene: &Scene) -> Vec<Bind> {
         reads.extend([whole("marks", Slot::EdgeMarks), whole("single", Slot::PixelRays)]);
     }
     reads.extend(guide(scene).map(|slot| whole("guide", slot)));
-    reads.extend(cut_faces(scene));
+    reads.extend(whole_if(has_cut_edges(scene), "cap", Slot::Cap));
     reads
 }
 
@@ -274,15 +270,13 @@ fn assemble_constants(scene: &Scene) -> Vec<(&'static str, i32)> {
         Layout::Beside => 3,
     };
     let ray = &scene.settings.ray;
-    let guided = guide(scene).is_some();
-    let refined = scene.adapts_rays();
     vec![
         ("RAYS", ray.rays as i32),
         ("APART", ray.subsampling as i32),
         ("LAYOUT", layout),
-        ("GUIDED", guided as i32),
-        ("REFINED", refined as i32),
-        ("CAPPED", cut_faces(scene).is_some() as i32),
+        ("GUIDED", guide(scene).is_some() as i32),
+        ("REFINED", scene.adapts_rays() as i32),
+        ("CAPPED", has_cut_edges(scene) as i32),
     ]
 }
 
@@ -291,41 +285,37 @@ fn assemble(scene: &Scene, reads: &Arrays, picture: &mut Texels) {
     let [beside, of_rendering] = [false, true].map(|is_rendering| edge_distances(scene, reads, is_rendering));
     let rendering = scene.rendering_area();
     let [corner, tiles] = [rendering, scene.tile_area()].map(|area| area.corner.map(|n| n as usize));
-    for (x, y) in picture.pixels() {
+    picture.fill(|x, y| {
         let is_rendering = rendering.holds([x, y]);
         if !is_rendering && scene.cuts_planes() {
-            let plane = reads.get("planes").get([x - tiles[0], y - tiles[1], 0]).to_vec();
-            picture.set([x, y, 0], &plane);
-            continue;
+            return colour_at(reads.get("planes"), [x - tiles[0], y - tiles[1]]);
         }
-        let (shown, corner) = match is_rendering {
-            true => (reads.get("rendered"), corner),
-            false => (reads.get("composited"), [0, 0]),
+        let (shown, distances, corner) = match is_rendering {
+            true => (reads.get("rendered"), &of_rendering, corner),
+            false => (reads.get("composited"), &beside, [0, 0]),
         };
-        let distances = if is_rendering { &of_rendering } else { &beside };
-        if scene.settings.ray.subsampling > 1 {
-            let apart = f64::from(scene.settings.ray.subsampling);
-            let guide = distances.as_ref().map(|distances| (distances, scene.cliff()));
-            picture.set([x, y, 0], &between(shown, guide, apart, [x - corner[0], y - corner[1]]));
-            continue;
-        }
         let at = [x - corner[0], y - corner[1]];
+        if scene.settings.ray.subsampling > 1 {
+            let guide = distances.as_ref().map(|distances| (distances, scene.cliff()));
+            return between(shown, guide, f64::from(scene.settings.ray.subsampling), at);
+        }
         if let Some(distances) = distances {
-            picture.set([x, y, 0], &antialiased(shown, distances, scene.cliff(), at));
-            continue;
+            return antialiased(shown, distances, scene.cliff(), at);
         }
         if scene.adapts_rays() && reads.get("marks").one(at[0], at[1], 0) == 0.0 {
-            let single = reads.get("single").get([at[0], at[1], 0]).to_vec();
-            picture.set([x, y, 0], &single);
-            continue;
+            return colour_at(reads.get("single"), at);
         }
         let mut mean = [0.0; 4];
-        for (i, j) in (0..rays * rays).map(|n| (n % rays, n / rays)) {
+        for (i, j) in pixels([rays, rays]) {
             let ray = shown.get([at[0] * rays + i, at[1] * rays + j, 0]);
             mean.iter_mut().zip(ray).for_each(|(m, v)| *m += v / (rays * rays) as f64);
         }
-        picture.set([x, y, 0], &mean);
-    }
+        mean
+    });
+}
+
+fn colour_at(picture: &Texels, [x, y]: [usize; 2]) -> [f64; 4] {
+    std::array::from_fn(|c| picture.get([x, y, 0])[c])
 }
 
 /// The colour of a pixel with one ray: at an edge, its own and the mean of those around it beyond the edge, by the share of the pixel that lies beyond. A step
@@ -336,7 +326,7 @@ fn antialiased(rendered: &Texels, distances: &Texels, cliff: f64, [x, y]: [usize
         [inside(x, dx, rendered.size[0]), inside(y, dy, rendered.size[1]), 0]
     };
     let distance = |dx: i64, dy: i64| distances.get(ray(dx, dy))[0];
-    let own: [f64; 4] = std::array::from_fn(|c| rendered.get(ray(0, 0))[c]);
+    let own = colour_at(rendered, [x, y]);
     let here = distance(0, 0);
     let mut jump = 0.0;
     let mut limit = here;

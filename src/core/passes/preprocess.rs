@@ -11,18 +11,12 @@ use crate::scene::{Conditioning, Scene, VolumeFormat, gaussian_radius};
 pub(crate) const SCAN_CONVERT: Pass = Pass {
     name: "scan_convert",
     shader: |_, _| "preprocess/scan_convert",
-    needed: |s| match s.probe() {
-        Some(_) => Ok("frames are polar"),
-        None => Err("the volume is Cartesian already"),
-    },
+    needed: |s| s.probe().map(|_| "frames are polar").ok_or("the volume is Cartesian already"),
     reads: |s, _| {
         let frames = if s.conditions() { slices("frames", Slot::Conditioned) } else { layers("frames", Slot::Frames) };
         vec![frames, whole("scan_lut", Slot::ScanLut)]
     },
-    params: |s, t| {
-        let (gain, offset) = scale(s);
-        Params::default().f32("gain", gain).f32("offset", offset).i32("slice", t.slice)
-    },
+    params: scaling_params,
     tolerance: Tolerance::absolute(1e-3).because(
         "a table entry near 3640 has 2.4e-4 samples of rounding in f32, times a step of at most 1 between samples, \
          twice over two interpolations; R16F stores 1 to 4.9e-4",
@@ -177,16 +171,13 @@ pub(crate) const LOAD_SLICE: Pass = Pass {
         Some(_) => Err("frames are polar"),
     },
     reads: |_, _| vec![layers("frames", Slot::Frames)],
-    params: load_params,
+    params: scaling_params,
     tolerance: Tolerance::absolute(5e-4).because("one multiplication and addition in f32; R16F stores 1 to 4.9e-4"),
     reference: |scene, args, reads, writes| {
         let frames = reads.get("frames");
         let (target, z) = target_of(writes, args);
         let (gain, offset) = normalisation(scene);
-        for (x, y) in frames.pixels() {
-            let value = frames.one(x, y, 0) * gain + offset;
-            target.set([x, y, z], &[value.clamp(0.0, 1.0)]);
-        }
+        target.fill_slices(z..z + 1, |[x, y, _]| [(frames.one(x, y, 0) * gain + offset).clamp(0.0, 1.0)]);
     },
     ..Pass::OF_SLICES
 };
@@ -207,8 +198,9 @@ fn is_unscaled(scene: &Scene) -> bool {
     scene.input.stored != StoredType::F32 && normalisation(scene) == (1.0, 0.0)
 }
 
-fn load_params(scene: &Scene, args: &DispatchArgs) -> Params {
-    let (gain, offset) = normalisation(scene);
+/// A Cartesian volume is never conditioned: its scale is that of the samples.
+fn scaling_params(scene: &Scene, args: &DispatchArgs) -> Params {
+    let (gain, offset) = scale(scene);
     Params::default().f32("gain", gain).f32("offset", offset).i32("slice", args.slice)
 }
 
@@ -228,7 +220,7 @@ pub const PACKED_NEIGHBOURS: Pass = Pass {
         vec![Bind { part: Part::Around(reach), ..whole("volume", Slot::of_rays(s)) }]
     },
     writes: |_, _| vec![Bind { part: Part::Around(0), ..whole("packed_neighbours", Slot::PackedNeighbours) }],
-    extent: |s, t| in_runs([s.grid.size[0], s.grid.size[1], t.slices], 0),
+    extent: |s, t| in_runs(slice_extent(s, t), 0),
     params: |_, t| Params::default().i32("slice", t.slice),
     constants: |s, _| vec![("RUN", RUN as i32), ("STORED", packed_format(s))],
     tolerance: Tolerance::exact("copies of what is stored"),
@@ -238,11 +230,9 @@ pub const PACKED_NEIGHBOURS: Pass = Pass {
         let [width, height, depth] = target.size;
         // Beyond the stored part of the volume its border repeats. No sample needs what is there.
         let first = Slot::PackedNeighbours.first_texel(scene).map(|n| n as usize);
-        for z in (args.slice as usize..(args.slice + args.slices) as usize)
-            .filter(|z| (first[2]..first[2] + depth).contains(z))
-        {
-            for to in (0..height).flat_map(|y| (0..width).map(move |x| [x, y])) {
-                let (x, y) = (to[0] + first[0], to[1] + first[1]);
+        for z in args.written().filter(|z| (first[2]..first[2] + depth).contains(z)) {
+            for (column, row) in pixels([width, height]) {
+                let (x, y) = (column + first[0], row + first[1]);
                 let (right, below) = ((x + 1).min(first[0] + width - 1), (y + 1).min(first[1] + height - 1));
                 let slices = [z, (z + 1).min(first[2] + depth - 1)];
                 let slices = &slices[..1 + usize::from(packs_two_slices(scene))];
@@ -251,7 +241,7 @@ pub const PACKED_NEIGHBOURS: Pass = Pass {
                 let packed = Texels { size: [4 * slices.len(), 1, 1], channels: 1, values: of.collect() };
                 let bytes = packed.encode(Slot::Volume.format(scene));
                 let words = bytes.chunks_exact(4).map(|b| f64::from(u32::from_le_bytes([b[0], b[1], b[2], b[3]])));
-                target.set([to[0], to[1], z - first[2]], &words.collect::<Vec<_>>());
+                target.set([column, row, z - first[2]], &words.collect::<Vec<_>>());
             }
         }
     },

@@ -47,19 +47,13 @@ pub const LIGHT: Pass = Pass {
     constants: |s, _| {
         let light = &s.settings.light;
         let dims_pixel = light.shadow.is_some_and(|shadow| shadow.dims == Dims::Pixel);
-        let subject = match lit_thing(s) {
-            Lit::Surface => 0,
-            Lit::BehindLayer => 1,
-            Lit::Composited => 2,
-            Lit::Coloured => 3,
-        };
         vec![
             ("POINT", light.position.is_some() as i32),
             ("SKIN", s.skin().is_some() as i32),
             ("DIMS_PIXEL", dims_pixel as i32),
             ("AMBIENT_ONLY", keeps_ambient(s) as i32),
             ("ECHO", s.lights_by_echo() as i32),
-            ("SUBJECT", subject),
+            ("SUBJECT", lit_thing(s) as i32),
             ("SHADOWED", casts_shadow(s) as i32),
             ("OCCLUDED", is_occluded(s) as i32),
             cap::constant(s),
@@ -70,30 +64,29 @@ pub const LIGHT: Pass = Pass {
          exactly the cliff's height may count or not",
     ),
     reference: |scene, _, reads, writes| {
-        let picture = writes.get_mut("picture");
-        for (x, y) in picture.pixels() {
+        writes.get_mut("picture").fill(|x, y| {
             // Echoes are not lit.
             let cut = cap::cut_at(scene, reads, x, y);
             let behind = match cut.filter(|cut| cut.ends_ray()) {
                 Some(_) => [0.0; 4],
                 None => reference_pixel(scene, reads, lit(scene, reads, x, y), x, y),
             };
-            let colour = cut.map_or(behind, |cut| cut.over(behind));
-            picture.set([x, y, 0], &colour);
-        }
+            cut.map_or(behind, |cut| cut.over(behind))
+        });
     },
     ..Pass::OF_DISTANCES
 };
 
+/// What is lit: the numbers of SUBJECT in light.comp.
 #[derive(PartialEq)]
 enum Lit {
-    Surface,
+    Surface = 0,
     /// A surface behind a composited volume.
-    BehindLayer,
+    BehindLayer = 1,
     /// The volume itself, where rays hit it first.
-    Composited,
+    Composited = 2,
     /// A surface with the colour that volume rendering gives its ray.
-    Coloured,
+    Coloured = 3,
 }
 
 fn lit_thing(scene: &Scene) -> Lit {
@@ -260,12 +253,7 @@ pub const SHADOW: Pass = Pass {
     name: "shadow",
     link: Link::Observer(Chain::Distances),
     shader: |_, _| "shade/shadow",
-    needed: |s| match (s.has_distance(), s.settings.light.shadow) {
-        (false, _) => Err("no surface in this mode"),
-        (true, None) => Err("not asked for"),
-        (true, Some(shadow)) if shadow.strength == 0.0 => Err("a strength of 0 casts none"),
-        _ => Ok("asked for"),
-    },
+    needed: |s| need(s, s.settings.light.shadow.map(|shadow| shadow.strength), "a strength of 0 casts none"),
     reads: |_, t| vec![whole("distance_map", t.source())],
     writes: |_, _| vec![whole("shadow", Slot::Shadow)],
     params: |s, _| {
@@ -295,15 +283,23 @@ pub const SHADOW: Pass = Pass {
     ),
     reference: |scene, _, reads, writes| {
         let distances = reads.get("distance_map");
-        let shadow = writes.get_mut("shadow");
-        for (x, y) in shadow.pixels() {
-            let arrives = place(scene, distances, x as i64, y as i64)
-                .map_or(1.0, |(place, distance)| arriving(scene, distances, x, y, place, distance));
-            shadow.set([x, y, 0], &[arrives]);
-        }
+        writes.get_mut("shadow").fill(|x, y| {
+            let place = place(scene, distances, x as i64, y as i64);
+            [place.map_or(1.0, |(place, distance)| arriving(scene, distances, x, y, place, distance))]
+        });
     },
     ..Pass::OF_DISTANCES
 };
+
+/// Whether what darkens a surface with this strength is needed; `weak`: why not with a strength of 0.
+fn need(scene: &Scene, strength: Option<f64>, weak: &'static str) -> Need {
+    match strength {
+        _ if !scene.has_distance() => Err("no surface in this mode"),
+        None => Err("not asked for"),
+        Some(0.0) => Err(weak),
+        Some(_) => Ok("asked for"),
+    }
+}
 
 /// True if the light casts a shadow in this scene.
 fn casts_shadow(scene: &Scene) -> bool {
@@ -381,11 +377,8 @@ pub(crate) const OCCLUSION: Pass = Pass {
     name: "occlusion",
     link: Link::Observer(Chain::Distances),
     shader: |_, _| "shade/occlusion",
-    needed: |s| match (s.has_distance(), s.settings.light.occlusion) {
-        (false, _) => Err("no surface in this mode"),
-        (true, None) => Err("not asked for"),
-        (true, Some(occlusion)) if occlusion.strength == 0.0 => Err("a strength of 0 takes nothing"),
-        _ => Ok("asked for"),
+    needed: |s| {
+        need(s, s.settings.light.occlusion.map(|occlusion| occlusion.strength), "a strength of 0 takes nothing")
     },
     reads: |_, t| vec![whole("distance_map", t.source())],
     writes: |_, _| vec![whole("occlusion", Slot::Occlusion)],
@@ -399,10 +392,7 @@ pub(crate) const OCCLUSION: Pass = Pass {
     ),
     reference: |scene, _, reads, writes| {
         let distances = reads.get("distance_map");
-        let occlusion = writes.get_mut("occlusion");
-        for (x, y) in occlusion.pixels() {
-            occlusion.set([x, y, 0], &[open(scene, distances, x as i64, y as i64).unwrap_or(1.0)]);
-        }
+        writes.get_mut("occlusion").fill(|x, y| [open(scene, distances, x as i64, y as i64).unwrap_or(1.0)]);
     },
     ..Pass::OF_DISTANCES
 };
@@ -451,10 +441,7 @@ fn direction_to_light(scene: &Scene) -> DVec3 {
 
 /// Unit direction to a directional light, or the position of a point light as the shaders get it.
 fn light_at(scene: &Scene) -> DVec3 {
-    match scene.light_place() {
-        Some(place) => scene.to_local(place),
-        None => direction_to_light(scene),
-    }
+    scene.light_place().map_or_else(|| direction_to_light(scene), |place| scene.to_local(place))
 }
 
 /// Unit direction from a place to the light, and the distance to it; the direction is `otherwise` for a light at that place.

@@ -21,18 +21,9 @@ impl Texels {
     }
 
     pub fn from_fn(size: [usize; 3], channels: usize, f: impl Fn([usize; 3], usize) -> f64) -> Texels {
-        let mut texels = Texels::untouched(size, channels);
-        for z in 0..size[2] {
-            for y in 0..size[1] {
-                for x in 0..size[0] {
-                    for c in 0..channels {
-                        let at = texels.index([x, y, z]) + c;
-                        texels.values[at] = f([x, y, z], c);
-                    }
-                }
-            }
-        }
-        texels
+        let mut values = Vec::with_capacity(size.iter().product::<usize>() * channels);
+        cells(size).for_each(|at| values.extend((0..channels).map(|c| f(at, c))));
+        Texels { size, channels, values }
     }
 
     /// The places (x, y) of one layer, row by row.
@@ -65,6 +56,18 @@ impl Texels {
         self.values[i..i + self.channels].copy_from_slice(value);
     }
 
+    /// Sets each texel of a single layer to what `of` makes of its column and row.
+    pub(super) fn fill<V: AsRef<[f64]>>(&mut self, mut of: impl FnMut(usize, usize) -> V) {
+        self.fill_slices(0..1, |[x, y, _]| of(x, y));
+    }
+
+    /// Sets each texel of these slices to what `of` makes of its column, row and slice.
+    pub(super) fn fill_slices<V: AsRef<[f64]>>(&mut self, slices: Range<usize>, mut of: impl FnMut([usize; 3]) -> V) {
+        for z in slices {
+            self.pixels().for_each(|(x, y)| self.set([x, y, z], of([x, y, z]).as_ref()));
+        }
+    }
+
     fn part(&self, first: [usize; 3], size: [usize; 3]) -> Texels {
         let mut part = Texels::untouched(size, self.channels);
         for (y, z) in (0..size[2]).flat_map(|z| (0..size[1]).map(move |y| (y, z))) {
@@ -95,10 +98,10 @@ impl Texels {
 
     /// The part of a slot's array ([`Slot::array_size`]) that the device stores; all of it for a slot that is no volume.
     pub fn stored_part(&self, slot: Slot, scene: &Scene) -> Texels {
-        match slot {
-            _ if slot.is_volume() => self.part(slot.first_texel(scene).map(|n| n as usize), slot.shape(scene).size()),
-            _ => self.clone(),
+        if !slot.is_volume() {
+            return self.clone();
         }
+        self.part(slot.first_texel(scene).map(|n| n as usize), slot.shape(scene).size())
     }
 
     /// The opposite of [`Texels::stored_part`]: from the stored part, the slot's whole array, in which texels that the device does not store have the
@@ -114,33 +117,25 @@ impl Texels {
 
     /// First channel, interpolated linearly at fractional texel indices, whole at the centres of texels. Beyond the border the nearest texel counts.
     pub fn trilinear(&self, at: [f64; 3]) -> f64 {
-        let low = at.map(f64::floor);
-        let mut sum = 0.0;
-        for corner in 0..8 {
-            let mut weight = 1.0;
-            let mut tap = [0i64; 3];
-            for axis in 0..3 {
-                let share = at[axis] - low[axis];
-                let upper = corner >> axis & 1;
-                weight *= if upper == 1 { share } else { 1.0 - share };
-                tap[axis] = low[axis] as i64 + upper;
-            }
-            sum += weight * self.clamped(tap[0], tap[1], tap[2]);
-        }
-        sum
+        let [value] = self.mixed(at);
+        value
     }
 
-    /// Up to four channels, interpolated linearly at fractional texel indices, which must lie within the array.
+    /// Up to four channels, interpolated as [`Texels::trilinear`] does the first.
     pub fn interpolated(&self, at: [f64; 3]) -> [f64; 4] {
-        let mut sum = [0.0; 4];
+        self.mixed(at)
+    }
+
+    fn mixed<const N: usize>(&self, at: [f64; 3]) -> [f64; N] {
+        let low = at.map(f64::floor);
+        let mut sum = [0.0; N];
         for corner in 0..8 {
             let mut weight = 1.0;
             let tap = std::array::from_fn(|axis| {
-                let low = at[axis].floor().min((self.size[axis] - 1) as f64);
-                let share = at[axis] - low;
+                let share = at[axis] - low[axis];
                 let upper = corner >> axis & 1;
                 weight *= if upper == 1 { share } else { 1.0 - share };
-                (low as usize + upper).min(self.size[axis] - 1)
+                (low[axis] as i64 + upper).clamp(0, self.size[axis] as i64 - 1) as usize
             });
             sum.iter_mut().zip(self.get(tap)).for_each(|(sum, value)| *sum += weight * value);
         }
@@ -239,6 +234,11 @@ where
     (T::default()..height).flat_map(move |y| (T::default()..width).map(move |x| (x, y)))
 }
 
+/// The places (x, y, z) of an array of this size, in the order of its texels.
+pub(super) fn cells([width, height, depth]: [usize; 3]) -> impl Iterator<Item = [usize; 3]> {
+    (0..depth).flat_map(move |z| pixels([width, height]).map(move |(x, y)| [x, y, z]))
+}
+
 /// The arrays of one pass by the names that its shader gives them.
 #[derive(Clone, Debug, Default)]
 pub struct Arrays(Vec<(&'static str, Texels)>);
@@ -254,10 +254,8 @@ impl Arrays {
     /// # Panics
     /// The pass did not declare the name: its declaration and its reference disagree.
     pub fn get(&self, name: &str) -> &Texels {
-        match self.0.iter().find(|(n, _)| *n == name) {
-            Some((_, texels)) => texels,
-            None => panic!("reference reads '{name}', which its pass does not declare"),
-        }
+        let found = self.0.iter().find(|(n, _)| *n == name);
+        &found.unwrap_or_else(|| panic!("reference reads '{name}', which its pass does not declare")).1
     }
 
     /// The array under this name, to be changed.
@@ -265,10 +263,8 @@ impl Arrays {
     /// # Panics
     /// The pass did not declare the name: its declaration and its reference disagree.
     pub fn get_mut(&mut self, name: &str) -> &mut Texels {
-        match self.0.iter_mut().find(|(n, _)| *n == name) {
-            Some((_, texels)) => texels,
-            None => panic!("reference writes '{name}', which its pass does not declare"),
-        }
+        let found = self.0.iter_mut().find(|(n, _)| *n == name);
+        &mut found.unwrap_or_else(|| panic!("reference writes '{name}', which its pass does not declare")).1
     }
 
     pub fn iter(&self) -> impl Iterator<Item = (&'static str, &Texels)> {

@@ -7,6 +7,7 @@ use crate::barriers::{Access, Barrier, PipelineStage, PipelineStages, Resource};
 use crate::passes::Slot;
 use crate::passes::slots::Shape;
 use crate::scene::Scene;
+use std::collections::BTreeMap;
 
 /// An entry in the recording of a submission.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -34,7 +35,8 @@ pub struct Submission {
 #[derive(Clone, Debug, Default)]
 pub struct SubmissionLog {
     pub submissions: Vec<Submission>,
-    open: Vec<(usize, Vec<Event>)>,
+    /// By queue.
+    open: BTreeMap<usize, Vec<Event>>,
 }
 
 /// Two conflicting accesses to a resource without an order between them. Each is given by its index in [`SubmissionLog::submissions`] and that of its
@@ -49,28 +51,26 @@ pub struct Hazard {
 impl SubmissionLog {
     /// Begins the recording of a submission. A recording of the same queue that was not submitted is dropped.
     pub fn begin(&mut self, queue: usize) {
-        self.open.retain(|(of, _)| *of != queue);
-        self.open.push((queue, Vec::new()));
+        self.open.insert(queue, Vec::new());
     }
 
     /// Records an operation on a queue, after its barrier if it has one. Nothing happens if no recording of the queue has begun.
     pub fn record(&mut self, queue: usize, barrier: Option<Barrier>, accesses: &[Access]) {
-        let Some((_, events)) = self.open.iter_mut().find(|(of, _)| *of == queue) else { return };
+        let Some(events) = self.open.get_mut(&queue) else { return };
         events.extend(barrier.map(Event::Barrier));
         events.push(Event::Operation(accesses.to_vec()));
     }
 
     /// Records an event of a queue that touches no memory.
     pub fn event(&mut self, queue: usize, event: Event) {
-        if let Some((_, events)) = self.open.iter_mut().find(|(of, _)| *of == queue) {
+        if let Some(events) = self.open.get_mut(&queue) {
             events.push(event);
         }
     }
 
     /// Submits the recording of a queue, which waits for `waits` and signals `value`.
     pub fn submit(&mut self, queue: usize, waits: &[Wait], value: u64) {
-        let Some(at) = self.open.iter().position(|(of, _)| *of == queue) else { return };
-        let (_, events) = self.open.swap_remove(at);
+        let Some(events) = self.open.remove(&queue) else { return };
         self.submissions.push(Submission { queue, value, waits: waits.to_vec(), events });
     }
 

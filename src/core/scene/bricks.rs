@@ -5,7 +5,7 @@
 use super::Scene;
 use super::region::insonified_box;
 use super::visible_bounds::{marched_box, reach};
-use crate::probe::{Advance, Array, Geometry, Motion, Probe};
+use crate::probe::{Array, Geometry, Motion, Probe};
 use glam::DVec3;
 
 /// Edge of a brick where no setting says another, texels.
@@ -31,8 +31,8 @@ pub struct Bricks {
     pub count: [u32; 3],
 }
 
-/// Position of a brick relative to the insonified region.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Position of a brick relative to the insonified region. Of two bounds the lesser one holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Side {
     /// Entirely outside the insonified region: no sample is taken there.
     Outside,
@@ -40,17 +40,6 @@ pub enum Side {
     Across,
     /// Entirely inside the insonified region.
     Inside,
-}
-
-impl Side {
-    /// The combination of two bounds.
-    fn and(self, other: Side) -> Side {
-        match (self, other) {
-            (Side::Outside, _) | (_, Side::Outside) => Side::Outside,
-            (Side::Inside, Side::Inside) => Side::Inside,
-            _ => Side::Across,
-        }
-    }
 }
 
 /// The texels that samples within a brick may read, as inclusive ranges [first, last]: `tiles` has those of the columns and rows of tiles ([`TILE`]),
@@ -81,10 +70,12 @@ impl Scene {
     /// True if rays skip bricks: they are switched on (`ray.brick`, or `bricks_pay` where it is absent), and the mode renders the volume by rays.
     /// False where the look-up table of the sweep, or positions in f32, are too coarse for bricks.
     pub fn skips(&self) -> bool {
-        let casts = self.composites() || self.detects_surface() || self.projects();
         let swept = self.probe().is_some_and(|p| !matches!(p.motion, Motion::Still { .. }));
         let is_wanted = self.settings.ray.brick.map_or(self.bricks_pay, |edge| edge > 0);
-        if !casts || !is_wanted || (swept && self.slice_terms() == 0 && self.settings.ray.entries < MIN_ENTRIES) {
+        if !self.renders()
+            || !is_wanted
+            || (swept && self.slice_terms() == 0 && self.settings.ray.entries < MIN_ENTRIES)
+        {
             return false;
         }
         // No skipping where f32 cannot resolve positions to a brick's margin, as with a camera kilometres away.
@@ -188,7 +179,7 @@ impl Extent {
                 let (depths, positions) = unswept(probe, low, high);
                 let sector_side = in_plane(probe, [low.x, high.x], depths);
                 let (slices, sweep_side) = sliced(probe, positions);
-                Extent { texels: [columns, rows(depths), slices], side: sector_side.and(sweep_side) }
+                Extent { texels: [columns, rows(depths), slices], side: sector_side.min(sweep_side) }
             }
         }
     }
@@ -238,7 +229,7 @@ fn in_plane(probe: &Probe, x: [f64; 2], y: [f64; 2]) -> Side {
     };
     let by_range = side(ranges, [probe.first_range(), probe.last_range()]);
     let by_line = lines.map_or(Side::Across, |l| side(l, [probe.lines.first(), probe.lines.last()]));
-    by_range.and(by_line)
+    by_range.min(by_line)
 }
 
 /// Range of slice indices of all lines at these positions, and its position relative to the sweep.
@@ -251,14 +242,9 @@ fn sliced(probe: &Probe, positions: Option<[f64; 2]>) -> ([f64; 2], Side) {
     let Some([from, to]) = positions else { return (all, Side::Across) };
     let margin = SLICE_MARGIN * probe.slices.pitch();
     let (from, to) = (from - margin, to + margin);
-    let advance = |k: usize| match &probe.advance {
-        Advance::None => 0.0,
-        Advance::Same(a) => *a,
-        Advance::Each(table) => table.get(k).copied().unwrap_or(0.0),
-    };
     // Both sweep directions, so that bricks stay valid when the motor reverses.
-    let least = |k: usize| probe.slices.at(k as f64) - advance(k).abs();
-    let most = |k: usize| probe.slices.at(k as f64) + advance(k).abs();
+    let least = |k: usize| probe.slices.at(k as f64) - probe.advance_of(k).abs();
+    let most = |k: usize| probe.slices.at(k as f64) + probe.advance_of(k).abs();
     if to < least(0) || from > most(count - 1) {
         return (all, Side::Outside);
     }

@@ -82,37 +82,34 @@ pub fn rays(settings: &Settings, low: DVec3, high: DVec3, depth_offset: f64, sti
     let corner = |right: DVec3, up: DVec3| right * (-width / 2.0) + up * (height / 2.0);
     // The ray of several pixels passes through their middle.
     let apart = f64::from(settings.ray.subsampling);
-    if camera.field_of_view > 0.0 {
-        let spread = 2.0 * (camera.field_of_view.to_radians() / 2.0).tan() / height;
-        // The picture fits the near side of the box at zoom 1. As the zoom grows the camera comes nearer to that side, and never into the box.
-        let distance = pixel / spread + along(forward);
-        Rays {
-            origin: target - forward * distance,
-            origin_dx: DVec3::ZERO,
-            origin_dy: DVec3::ZERO,
-            direction: forward + corner(right, up) * spread,
-            direction_dx: right * spread * apart,
-            direction_dy: -up * spread * apart,
-            right,
-            up,
-            forward,
-            target,
-            is_perspective: true,
-        }
-    } else {
-        Rays {
-            origin: target - forward * away + corner(right, up) * pixel,
-            origin_dx: right * pixel * apart,
-            origin_dy: -up * pixel * apart,
-            direction: forward,
-            direction_dx: DVec3::ZERO,
-            direction_dy: DVec3::ZERO,
-            right,
-            up,
-            forward,
-            target,
-            is_perspective: false,
-        }
+    let parallel = Rays {
+        origin: target - forward * away + corner(right, up) * pixel,
+        origin_dx: right * pixel * apart,
+        origin_dy: -up * pixel * apart,
+        direction: forward,
+        direction_dx: DVec3::ZERO,
+        direction_dy: DVec3::ZERO,
+        right,
+        up,
+        forward,
+        target,
+        is_perspective: false,
+    };
+    if camera.field_of_view <= 0.0 {
+        return parallel;
+    }
+    let spread = 2.0 * (camera.field_of_view.to_radians() / 2.0).tan() / height;
+    // The picture fits the near side of the box at zoom 1. As the zoom grows the camera comes nearer to that side, and never into the box.
+    let distance = pixel / spread + along(forward);
+    Rays {
+        origin: target - forward * distance,
+        origin_dx: DVec3::ZERO,
+        origin_dy: DVec3::ZERO,
+        direction: forward + corner(right, up) * spread,
+        direction_dx: right * spread * apart,
+        direction_dy: -up * spread * apart,
+        is_perspective: true,
+        ..parallel
     }
 }
 

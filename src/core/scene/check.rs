@@ -2,20 +2,17 @@
 
 use super::planes::{MAX_SLAB, MAX_TILES, SAME_POINT};
 use super::{
-    Cine, Clip, Compositing, Conditioning, Curve, Detector, Distance, Elevation, EnhancedSigma, Layout, Light,
-    MAX_BODY_MARKS, MAX_CLIPS, MAX_CURVE_POINTS, MAX_DEVIATION, MAX_PICTURE, Mode, Noise, PeronaMalik, Place, Scene,
-    SceneError, Scheme, Settings, Sign, Smooth, Surface, refuse, transfer,
+    Clip, Compositing, Conditioning, Curve, Detector, Distance, Elevation, EnhancedSigma, Layout, Light,
+    MAX_BODY_MARKS, MAX_CLIPS, MAX_CURVE_POINTS, MAX_DEVIATION, MAX_PICTURE, Mode, Noise, PeronaMalik, Place, Planes,
+    Scene, SceneError, Scheme, Settings, Sign, Smooth, Surface, refuse, transfer,
 };
 use crate::probe::Geometry;
 use glam::DVec3;
 
 /// A tolerance needs rays whose samples another step takes as well, and whose colour is all that makes a pixel.
 fn check_tolerance(settings: &Settings) -> Result<(), SceneError> {
-    let (ray, levels) = (&settings.ray, settings.ray.tolerance);
-    if levels == 0.0 {
-        return Ok(());
-    }
-    if settings.mode != Mode::Volume || settings.still.is_some() {
+    let ray = &settings.ray;
+    if ray.tolerance == 0.0 || settings.mode != Mode::Volume || settings.still.is_some() {
         return Ok(());
     }
     let fault = if ray.sliding != 0 {
@@ -65,7 +62,7 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     if settings.layout.has_planes() && settings.mode.is_flat() {
         return refuse("layout", "four and beside show planes and a rendering: the mode must be one that renders");
     }
-    if settings.marks.are_mirrored() {
+    if settings.drawn.marks.are_mirrored() {
         return refuse(
             "marks.elevation",
             "lateral, depth and elevation are those of a mirror image: exchange the sides of one",
@@ -90,12 +87,12 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     check_enhanced("slices.enhanced_sigma", s.enhanced_sigma)?;
     check_perona_malik("slices.perona_malik", s.perona_malik)?;
     check_distance(&settings.distance)?;
-    check_enhanced("post.enhanced_sigma", settings.post.enhanced_sigma)?;
-    check_perona_malik("post.perona_malik", settings.post.perona_malik)?;
-    if settings.post.perona_malik.is_some_and(|p| matches!(p.scheme, Scheme::AosRichardson | Scheme::Rkl1)) {
+    let post = &settings.post;
+    check_enhanced("post.enhanced_sigma", post.enhanced_sigma)?;
+    check_perona_malik("post.perona_malik", post.perona_malik)?;
+    if post.perona_malik.is_some_and(|p| matches!(p.scheme, Scheme::AosRichardson | Scheme::Rkl1)) {
         return refuse("post.perona_malik", "pictures take the schemes explicit and aos only");
     }
-    let post = &settings.post;
     for (field, has_mm) in [
         ("post.sigma", post.sigma.is_some_and(|s| s.window_mm.is_some())),
         ("post.enhanced_sigma", post.enhanced_sigma.is_some_and(|e| e.window_mm.or(e.largest_mm).is_some())),
@@ -105,7 +102,7 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
             return refuse(field, "filters the pixels of a finished picture: give its size in pixels");
         }
     }
-    if settings.post.enhanced_sigma.is_some_and(|e| e.growth) {
+    if post.enhanced_sigma.is_some_and(|e| e.growth) {
         return refuse("post.enhanced_sigma", NO_GROWTH);
     }
     for (field, [low, high]) in [
@@ -127,9 +124,13 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
         return refuse(field, fault);
     }
     check_light(&settings.light)?;
-    check_cine(&settings.cine)?;
-    if settings.body_marks.len() > MAX_BODY_MARKS {
-        let count = settings.body_marks.len();
+    if let (Some(first), Some(last)) = (settings.drawn.cine.first, settings.drawn.cine.last)
+        && first > last
+    {
+        return refuse("cine.last", format!("is {last}, must not be below cine.first, {first}"));
+    }
+    let count = settings.drawn.body_marks.len();
+    if count > MAX_BODY_MARKS {
         return refuse("body_marks", format!("has {count} entries, at most {MAX_BODY_MARKS}"));
     }
     if settings.volume.compositing == Compositing::Exponential {
@@ -144,25 +145,25 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     Ok(())
 }
 
+/// Refuses a direction that is not finite, or shorter than `least`.
+fn check_direction(field: &'static str, direction: DVec3, least: f64) -> Result<(), SceneError> {
+    match direction.is_finite() && direction.length() >= least {
+        true => Ok(()),
+        false => refuse(field, "must be finite and not zero"),
+    }
+}
+
 fn check_clip(planes: &[Clip]) -> Result<(), SceneError> {
     if planes.len() > MAX_CLIPS {
         return refuse("clip", format!("has {} planes, at most {MAX_CLIPS}", planes.len()));
     }
-    for plane in planes {
-        let normal = DVec3::from(plane.normal);
-        if !normal.is_finite() || normal.length() < 1e-9 {
-            return refuse("clip.normal", "must be finite and not zero");
-        }
-    }
-    Ok(())
+    planes.iter().try_for_each(|plane| check_direction("clip.normal", plane.normal.into(), 1e-9))
 }
 
 /// Checks the conditioning of lines by itself and against the geometry of the frames.
 pub(super) fn check_conditioning(c: &Conditioning, geometry: &Geometry) -> Result<(), SceneError> {
-    for (i, point) in c.tgc.iter().enumerate() {
-        if i > 0 && c.tgc[i - 1].depth >= point.depth {
-            return refuse("conditioning.tgc", format!("point {}: depths must rise from point to point", i + 1));
-        }
+    if let Some(n) = c.tgc.windows(2).position(|pair| pair[0].depth >= pair[1].depth) {
+        return refuse("conditioning.tgc", format!("point {}: depths must rise from point to point", n + 2));
     }
     match geometry {
         Geometry::Cartesian(_) => {
@@ -199,26 +200,13 @@ pub(super) fn check_conditioning(c: &Conditioning, geometry: &Geometry) -> Resul
 }
 
 fn check_light(l: &Light) -> Result<(), SceneError> {
-    if !l.direction.is_finite() || l.direction.length() < 1e-6 {
-        return refuse("light.direction", "must be finite and not zero");
-    }
-    let volume = l.volume.unwrap_or_default();
-    if !volume.back_direction.is_finite() || volume.back_direction.length() < 1e-6 {
-        return refuse("light.volume.back_direction", "must be finite and not zero");
-    }
+    let back = l.volume.unwrap_or_default().back_direction;
+    check_direction("light.direction", l.direction, 1e-6)?;
+    check_direction("light.volume.back_direction", back, 1e-6)?;
     if l.volume.is_some() && l.position.is_some() {
         return refuse("light.volume", "takes a distant light: leave light.position out");
     }
     Ok(())
-}
-
-fn check_cine(cine: &Cine) -> Result<(), SceneError> {
-    match (cine.first, cine.last) {
-        (Some(first), Some(last)) if first > last => {
-            refuse("cine.last", format!("is {last}, must not be below cine.first, {first}"))
-        }
-        _ => Ok(()),
-    }
 }
 
 const NO_GROWTH: &str = "growth is counted on slices only: leave it out";
@@ -243,11 +231,9 @@ fn check_distance(d: &Distance) -> Result<(), SceneError> {
     if d.enhanced_sigma.is_some_and(|e| e.growth) {
         return refuse("distance.enhanced_sigma", NO_GROWTH);
     }
-    match d.perona_malik {
-        Some(p) if p.scheme != Scheme::Explicit => {
-            refuse("distance.perona_malik", "distances take scheme explicit only: misses tear the rows of others")
-        }
-        _ => Ok(()),
+    match d.perona_malik.is_some_and(|p| p.scheme != Scheme::Explicit) {
+        true => refuse("distance.perona_malik", "distances take scheme explicit only: misses tear the rows of others"),
+        false => Ok(()),
     }
 }
 
@@ -294,17 +280,12 @@ fn check_smooth(smooth: Option<Smooth>, field: &'static str) -> Result<(), Scene
 }
 
 /// Checks the settings of planes as far as no geometry is needed.
-pub(super) fn check_planes(settings: &Settings) -> Result<(), SceneError> {
-    check_smooth(settings.planes.smooth, "planes.smooth.kernel")?;
-    check_curve(settings.planes.curve.as_ref())
-}
-
-fn check_curve(curve: Option<&Curve>) -> Result<(), SceneError> {
-    let Some(Curve { points, .. }) = curve else { return Ok(()) };
+pub(super) fn check_planes(planes: &Planes) -> Result<(), SceneError> {
+    check_smooth(planes.smooth, "planes.smooth.kernel")?;
+    let Some(Curve { points, .. }) = &planes.curve else { return Ok(()) };
     let (field, count) = ("planes.curve.points", points.len());
     if !(2..=MAX_CURVE_POINTS).contains(&count) {
-        let fault = format!("has {count} points, a line has 2 to {MAX_CURVE_POINTS}");
-        return refuse(field, fault);
+        return refuse(field, format!("has {count} points, a line has 2 to {MAX_CURVE_POINTS}"));
     }
     let apart = |pair: &[[f64; 2]]| (pair[1][0] - pair[0][0]).hypot(pair[1][1] - pair[0][1]);
     let extent = points.iter().map(|point| apart(&[points[0], *point])).fold(0.0, f64::max);

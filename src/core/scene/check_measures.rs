@@ -4,6 +4,7 @@ use super::{
     MAX_ALL_POINTS, MAX_CONTOURS, MAX_MADE, MAX_MEASURES, MAX_POINTS, MAX_TEXT, MeasureKind, Measurement, SceneError,
     refuse,
 };
+use std::ops::RangeInclusive;
 
 pub(super) fn check_measures(all: &[Measurement]) -> Result<(), SceneError> {
     if all.len() > MAX_MEASURES {
@@ -24,36 +25,32 @@ fn check(number: usize, measured: &Measurement) -> Result<(), SceneError> {
         (None, MeasureKind::Trace) => 3..=MAX_POINTS,
         (None, _) => 2..=MAX_POINTS,
     };
-    let limits = |what: &str, count: usize, [least, most]: [usize; 2]| {
-        let allowed = if least == most { format!("{least}") } else { format!("{least} to {most}") };
-        refuse("measure", format!("entry {number} ({}): has {count} {what}, must have {allowed}", kind.title()))
+    let limits = |what: &str, count: usize, allowed: RangeInclusive<usize>| match allowed.contains(&count) {
+        true => Ok(()),
+        false => {
+            let (least, most) = allowed.into_inner();
+            let allowed = if least == most { format!("{least}") } else { format!("{least} to {most}") };
+            refuse("measure", format!("entry {number} ({}): has {count} {what}, must have {allowed}", kind.title()))
+        }
     };
-    if !allowed.contains(&points.len()) {
-        return limits("points", points.len(), [*allowed.start(), *allowed.end()]);
-    }
-    let wanted = if *kind == MeasureKind::Volume { 2..=MAX_CONTOURS } else { 0..=0 };
-    if !wanted.contains(&contours.len()) {
-        return limits("contours", contours.len(), [*wanted.start(), *wanted.end()]);
-    }
-    if let Some(contour) = contours.iter().find(|contour| !(3..=MAX_POINTS).contains(&contour.len())) {
-        return limits("points in a contour", contour.len(), [3, MAX_POINTS]);
-    }
-    let letters = text.chars().count();
-    if letters > MAX_TEXT || text.chars().any(char::is_control) {
-        let fault = format!("entry {number}: must be one line of at most {MAX_TEXT} characters, has {letters}");
-        return refuse("measure.text", fault);
-    }
+    limits("points", points.len(), allowed)?;
+    limits("contours", contours.len(), if *kind == MeasureKind::Volume { 2..=MAX_CONTOURS } else { 0..=0 })?;
+    contours.iter().try_for_each(|contour| limits("points in a contour", contour.len(), 3..=MAX_POINTS))?;
+    let line = |field: &'static str, words: &str, most: usize| {
+        let letters = words.chars().count();
+        match letters > most || words.chars().any(char::is_control) {
+            true => {
+                refuse(field, format!("entry {number}: must be one line of at most {most} characters, has {letters}"))
+            }
+            false => Ok(()),
+        }
+    };
+    line("measure.text", text, MAX_TEXT)?;
     if measured.interval.is_some_and(|[low, high]| low > high) {
         return refuse("measure.interval", format!("entry {number}: the lower end is above the upper one"));
     }
-    for words in measured.made.iter().flat_map(|made| [&made.plane, &made.settings]) {
-        let letters = words.chars().count();
-        if letters > MAX_MADE || words.chars().any(char::is_control) {
-            let fault = format!("entry {number}: must be one line of at most {MAX_MADE} characters, has {letters}");
-            return refuse("measure.made", fault);
-        }
-    }
-    Ok(())
+    let mut made = measured.made.iter().flat_map(|made| [&made.plane, &made.settings]);
+    made.try_for_each(|words| line("measure.made", words, MAX_MADE))
 }
 
 #[cfg(test)]

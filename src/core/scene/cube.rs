@@ -17,9 +17,8 @@ impl HalfSpace {
     }
 }
 
-/// Names of the faces, the axis perpendicular to each, and the outward sign.
-const SIDES: [(&str, usize, f64); 6] =
-    [("left", 0, -1.0), ("right", 0, 1.0), ("near", 1, -1.0), ("far", 1, 1.0), ("bottom", 2, -1.0), ("top", 2, 1.0)];
+/// The axis perpendicular to each face (left, right, near, far, bottom and top), and the outward sign.
+const SIDES: [(usize, f64); 6] = [(0, -1.0), (0, 1.0), (1, -1.0), (1, 1.0), (2, -1.0), (2, 1.0)];
 
 impl Scene {
     /// The half-spaces whose intersection is the block of mode cube: its faces and the clip planes.
@@ -35,7 +34,7 @@ impl Scene {
         let insets = [inset.left, inset.right, inset.near, inset.far, inset.bottom, inset.top];
         let tilts = [tilt.left, tilt.right, tilt.near, tilt.far, tilt.bottom, tilt.top];
         let mut faces = Vec::new();
-        for ((_, axis, out), (inset, [first, second])) in SIDES.iter().zip(insets.iter().zip(tilts)) {
+        for ((axis, out), (inset, [first, second])) in SIDES.iter().zip(insets.iter().zip(tilts)) {
             let outwards = DVec3::AXES[*axis] * *out;
             let side = if *out > 0.0 { self.high } else { self.low };
             let in_face: Vec<DVec3> = (0..3).filter(|a| a != axis).map(|a| DVec3::AXES[a]).collect();
@@ -104,7 +103,7 @@ mod tests {
     use super::*;
 
     fn sides(low: DVec3, high: DVec3) -> Vec<HalfSpace> {
-        let side = |&(_, axis, out): &(&str, usize, f64)| {
+        let side = |&(axis, out): &(usize, f64)| {
             let normal = DVec3::AXES[axis] * out;
             HalfSpace { normal, limit: normal.dot(if out > 0.0 { high } else { low }) }
         };

@@ -84,9 +84,8 @@ impl Line {
             }
         }
         let mut line = Line { segments, starts, places: Vec::new() };
-        if !line.segments.is_empty() {
-            line.places = (0..line.starts.len()).map(|n| line.place_of(n)).collect();
-        }
+        let starts = (0..line.starts.len()).filter_map(|n| line.start_of(n));
+        line.places = starts.map(|(segment, t)| segment.at(t)).collect();
         line
     }
 
@@ -159,34 +158,27 @@ impl Line {
         (0..self.places.len().saturating_sub(1)).filter(may_hold).filter_map(within).collect()
     }
 
-    /// The place at the start of a piece, or at the end of the line.
-    fn place_of(&self, piece: usize) -> DVec2 {
-        match (self.segments.get(piece / PIECES), self.segments.last()) {
-            (Some(segment), _) => segment.at((piece % PIECES) as f64 / PIECES as f64),
-            (None, Some(last)) => last.to,
-            (None, None) => DVec2::ZERO,
+    /// The segment of a piece and its parameter at the start of the piece; behind the last piece the end of the line.
+    fn start_of(&self, piece: usize) -> Option<(&Segment, f64)> {
+        match self.segments.get(piece / PIECES) {
+            Some(segment) => Some((segment, (piece % PIECES) as f64 / PIECES as f64)),
+            None => self.segments.last().map(|last| (last, 1.0)),
         }
     }
 
     /// Points along the line, close enough to draw it by straight pieces. Empty for a line without length.
     pub fn outline(&self) -> Vec<DVec2> {
-        if self.segments.is_empty() {
-            return Vec::new();
-        }
         let straight = self.segments.len() == 1;
-        (0..self.starts.len()).filter(|n| !straight || n % PIECES == 0).map(|n| self.place_of(n)).collect()
+        self.places.iter().copied().step_by(if straight { PIECES } else { 1 }).collect()
     }
 
     /// The unit direction from the first point to the last, if the whole line deviates from it by at most 45 degrees; else None.
     pub fn heading(&self) -> Option<DVec2> {
         let (first, last) = (self.segments.first()?, self.segments.last()?);
         let chord = (last.to - first.from).try_normalize()?;
-        let directions = (0..self.starts.len()).map(|n| {
-            let segment = self.segments.get(n / PIECES).unwrap_or(last);
-            let t = if n / PIECES < self.segments.len() { (n % PIECES) as f64 / PIECES as f64 } else { 1.0 };
-            segment.velocity(t).normalize_or_zero()
-        });
-        directions.map(|d| d.dot(chord)).all(|along| along >= std::f64::consts::FRAC_1_SQRT_2).then_some(chord)
+        let mut starts = (0..self.starts.len()).filter_map(|n| self.start_of(n));
+        let along = |(segment, t): (&Segment, f64)| segment.velocity(t).normalize_or_zero().dot(chord);
+        starts.all(|start| along(start) >= std::f64::consts::FRAC_1_SQRT_2).then_some(chord)
     }
 }
 

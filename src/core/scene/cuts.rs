@@ -8,7 +8,7 @@ use super::{
     Brush, Cut, CutView, KeptSide, MAX_BRUSH_POINTS, MAX_CUT_POINTS, MAX_CUTS, Mode, Scene, SceneError, Sign, refuse,
     region, transfer,
 };
-use crate::probe::{Advance, Geometry, Motion};
+use crate::probe::{Geometry, Motion};
 use glam::{DVec2, DVec3};
 
 /// A cut, placed in space. Seen from where it was drawn, it removes what is within a contour (a prism, or in perspective a cone) or what is outside;
@@ -246,11 +246,7 @@ impl Scene {
     /// True if slices of a sweep are acquired while the motor moves.
     pub(crate) fn moves_in_frames(&self) -> bool {
         self.probe().is_some_and(|probe| {
-            let is_moving = match &probe.advance {
-                Advance::None => false,
-                Advance::Same(advance) => *advance != 0.0,
-                Advance::Each(table) => table.iter().any(|advance| *advance != 0.0),
-            };
+            let is_moving = (0..self.slices() as usize).any(|slice| probe.advance_of(slice) != 0.0);
             is_moving && !matches!(probe.motion, Motion::Still { .. })
         })
     }
@@ -350,34 +346,25 @@ fn check_brush(n: usize, cut: &Cut, brush: &Brush) -> Result<(), SceneError> {
     Ok(())
 }
 
-/// Checks whether cuts can remove anything.
+/// Checks whether the settings that remove parts of a rendering can remove anything.
 ///
 /// # Errors
 /// The rendering draws both dark and bright matter, so that no value of a texel is invisible.
 pub(super) fn check_drawn(scene: &Scene) -> Result<(), SceneError> {
-    check_removal(scene, scene.has_cuts(), "cuts", "remove the cuts")
-}
-
-/// Checks whether a setting can remove parts of a rendering. `removes`: it is set; `setting`: its key; `remedy`: what the message tells the user to
-/// do instead.
-///
-/// # Errors
-/// The rendering draws both dark and bright matter, so that no value of a texel is invisible.
-pub(super) fn check_removal(
-    scene: &Scene,
-    removes: bool,
-    setting: &'static str,
-    remedy: &str,
-) -> Result<(), SceneError> {
-    match removes && scene.removed_value().is_none() {
-        true => refuse(
+    let removals = [
+        (scene.has_cuts(), "cuts", "remove the cuts"),
+        (scene.unveils(), "unveil.enabled", "set unveil.enabled=false"),
+        (scene.starts_at_curve(), "region.start_curve", "set region.start_curve=none"),
+    ];
+    match removals.into_iter().find(|(removes, ..)| *removes) {
+        Some((_, setting, remedy)) if scene.removed_value().is_none() => refuse(
             setting,
             format!(
                 "the rendering draws both what is dark and what is bright, so nothing can be removed from it (surface.sign=dark or any, or a \
                  transfer function that is opaque at 0 and at 1): {remedy}"
             ),
         ),
-        false => Ok(()),
+        _ => Ok(()),
     }
 }
 

@@ -12,7 +12,7 @@
 //! default. No default makes a scene that is refused: it is cut, or left out, and one line says so.
 
 use super::echo_levels::EchoLevels;
-use super::load::{Layers, LoadError, preset_settings, rebase};
+use super::load::{Layers, LoadError, preset_settings, put, rebase};
 use super::region::{self, insonified_box, slice_grid};
 use super::{
     Compositing, EchoHistogram, Elevation, Input, Layout, MAX_DEVIATION, Mode, Scene, SceneError, Settings, Transfer,
@@ -431,13 +431,9 @@ impl Found<'_> {
         // The light belongs to the ramp. Of a preset's light only what nobody set.
         let is_lit = mode == Mode::Volume && has_ramp && !layers.gives("volume.shading");
         if is_lit && let Some(Value::Table(light)) = light_of_face() {
-            let refused = match self.chosen {
-                chosen if chosen.volume.compositing == Compositing::Exponential => {
-                    Some("volume.compositing=exponential")
-                }
-                chosen if chosen.light.position.is_some() => Some("light.position"),
-                _ => None,
-            };
+            let is_exponential = self.chosen.volume.compositing == Compositing::Exponential;
+            let refused = is_exponential.then_some("volume.compositing=exponential");
+            let refused = refused.or(self.chosen.light.position.map(|_| "light.position"));
             match refused {
                 Some(key) => said.push(format!("light: none in the volume, which {key} does not go with")),
                 None => {
@@ -514,19 +510,6 @@ fn fitting_ramp(from: f64, to: f64, volume: &Volume) -> (Vec<TransferPoint>, Opt
         over(&[*begin, *end], middle - half, middle + half),
         Some("; widened to an entry of the table, as volume.entries are few"),
     )
-}
-
-/// Sets `key.path` in a table.
-fn put(table: &mut Table, path: &str, value: Value) {
-    match path.split_once('.') {
-        None => drop(table.insert(path.into(), value)),
-        Some((key, rest)) => {
-            let inner = table.entry(key).or_insert_with(|| Value::Table(Table::new()));
-            if let Value::Table(inner) = inner {
-                put(inner, rest, value);
-            }
-        }
-    }
 }
 
 /// To four digits after the point: settings that are read by people.

@@ -177,9 +177,7 @@ impl EchoHistogram {
 
 fn count(bins: &mut [u64], value: f64) {
     let bin = (value * bins.len() as f64) as usize;
-    if let Some(bin) = bins.get_mut(bin.min(bins.len() - 1)) {
-        *bin += 1;
-    }
+    bins[bin.min(bins.len() - 1)] += 1;
 }
 
 /// The middle of a bin.

@@ -13,10 +13,9 @@ impl FileVersion {
 
 impl FromNode for FileVersion {
     fn from_node(node: Node) -> Result<FileVersion, NodeError> {
-        let wrong = |version: i64| format!("version {version}: this program reads version {}", FileVersion::NUMBER);
         match i64::from_node(node.clone())? {
             FileVersion::NUMBER => Ok(FileVersion),
-            other => Err(node.fault(wrong(other))),
+            other => Err(node.fault(format!("version {other}: this program reads version {}", FileVersion::NUMBER))),
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Floating parts: small parts of a volume that touch no other drawn part.
 
 use super::{Scene, SceneError, Sign, refuse, region, transfer};
-use crate::probe::{Geometry, Motion};
+use crate::probe::{Geometry, Motion, Probe};
 
 /// Sizes of parts are integers, so that their sums are exact: of so many a texel, of a fan one at its end. 16 billion of them fit.
 const PER_TEXEL: f64 = (1u64 << 30) as f64;
@@ -40,13 +40,7 @@ impl Scene {
         let [across, down] = self.grid.pitch;
         let along = match &self.geometry {
             Geometry::Cartesian(grid) => grid.spacing[2],
-            Geometry::Sweep(probe) => {
-                let radius = match probe.motion {
-                    Motion::Fan { .. } => probe.last_range() - probe.axis_depth(),
-                    Motion::Translated | Motion::Still { .. } => 1.0,
-                };
-                (probe.slices.pitch() * radius).abs()
-            }
+            Geometry::Sweep(probe) => (probe.slices.pitch() * arc(probe, probe.last_range())).abs(),
         };
         across * down * along / PER_TEXEL
     }
@@ -73,11 +67,7 @@ impl Scene {
             Geometry::Sweep(probe) => {
                 let at = f64::from(slice);
                 let pitch = probe.slices.at(at + 0.5) - probe.slices.at(at - 0.5);
-                let radius = match probe.motion {
-                    Motion::Fan { .. } => self.grid.place(0.0, f64::from(row)).1 - probe.axis_depth(),
-                    Motion::Translated | Motion::Still { .. } => 1.0,
-                };
-                size(pitch * radius)
+                size(pitch * arc(probe, self.grid.place(0.0, f64::from(row)).1))
             }
         };
         (0..self.slices()).flat_map(|slice| (0..rows).map(move |row| (slice, row))).map(|(s, r)| each(s, r)).collect()
@@ -86,6 +76,14 @@ impl Scene {
     /// A key of the settings that decide which parts float: scenes with equal keys find the same parts in the same volume.
     pub(crate) fn floating_basis(&self) -> impl PartialEq + use<> {
         (self.least_part(), self.floating_level(), self.part_reach())
+    }
+}
+
+/// Length across slices at a depth in the plane, mm, per unit of the slice's position.
+fn arc(probe: &Probe, depth: f64) -> f64 {
+    match probe.motion {
+        Motion::Fan { .. } => depth - probe.axis_depth(),
+        Motion::Translated | Motion::Still { .. } => 1.0,
     }
 }
 

@@ -21,13 +21,15 @@ const COLOURS: [u32; 10] =
 #[derive(PartialEq)]
 pub struct LabelVolume {
     /// Voxels of the box that holds all labels.
-    size: [usize; 3],
+    pub(crate) size: [usize; 3],
     /// From a place in space, mm, to the fractional index of a voxel of the box.
-    to_index: DAffine3,
-    ids: Vec<u8>,
-    cover: Vec<u8>,
+    pub(crate) to_index: DAffine3,
+    /// The label of each voxel of the box.
+    pub(crate) ids: Vec<u8>,
+    /// The share of the surroundings of each voxel that has a label, 255ths: above a half where the voxel has one.
+    pub(crate) cover: Vec<u8>,
     /// Of each label, 0..=1.
-    colours: Vec<[f64; 3]>,
+    pub(crate) colours: Vec<[f64; 3]>,
 }
 
 /// Labels that copies of settings share. Two are equal only if they share one [`LabelVolume`] in memory, whatever it holds.
@@ -110,28 +112,6 @@ impl LabelVolume {
         let first = DVec3::from(low.map(|n| n as f64));
         let to_index = DAffine3::from_translation(-first) * inverse;
         Ok(LabelVolume { size: kept, to_index, cover: covers(kept, &ids), ids, colours })
-    }
-
-    pub(crate) fn size(&self) -> [usize; 3] {
-        self.size
-    }
-
-    pub(crate) fn to_index(&self) -> &DAffine3 {
-        &self.to_index
-    }
-
-    /// The label of each voxel of the box.
-    pub(crate) fn ids(&self) -> &[u8] {
-        &self.ids
-    }
-
-    /// The share of the surroundings of each voxel that has a label, 255ths: above a half where the voxel has one.
-    pub(crate) fn cover(&self) -> &[u8] {
-        &self.cover
-    }
-
-    pub(crate) fn colours(&self) -> &[[f64; 3]] {
-        &self.colours
     }
 
     /// The edge of a voxel along its shortest axis, mm.

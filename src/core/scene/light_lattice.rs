@@ -95,13 +95,8 @@ impl Propagation {
     /// The propagation of a light in the direction `towards`, a unit vector in space that points from matter to the light.
     pub fn new(towards: DVec3) -> Propagation {
         let sizes = towards.abs();
-        let axis = if sizes.z >= sizes.x && sizes.z >= sizes.y {
-            2
-        } else if sizes.y >= sizes.x {
-            1
-        } else {
-            0
-        };
+        // The axis nearest to the direction; of equal ones the last, which `max_by` returns.
+        let axis = (0..3).max_by(|a, b| sizes[*a].total_cmp(&sizes[*b])).unwrap_or(2);
         let others = match axis {
             0 => [1, 2],
             1 => [0, 2],
@@ -186,7 +181,7 @@ impl Scene {
     }
 
     /// The smaller of the standard deviations that the volume is smoothed with within slices, mm.
-    fn least_smoothing(&self) -> f64 {
+    pub(super) fn least_smoothing(&self) -> f64 {
         let [lateral, depth, _] = self.smoothing();
         (lateral * self.grid.pitch[0]).min(depth * self.grid.pitch[1])
     }

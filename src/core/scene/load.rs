@@ -180,16 +180,7 @@ impl Layers {
             .and_then(|mut t| t.remove("v"))
             .unwrap_or_else(|| Value::String(text.trim().to_string()));
         let mut layer = Table::new();
-        let mut at = &mut layer;
-        let mut keys = path.trim().split('.').peekable();
-        while let Some(key) = keys.next() {
-            if keys.peek().is_none() {
-                at.insert(key.to_string(), value);
-                break;
-            }
-            let inner = at.entry(key).or_insert_with(|| Value::Table(Table::new()));
-            at = inner.as_table_mut().ok_or_else(|| fault("names a key twice"))?;
-        }
+        put(&mut layer, path.trim(), value);
         self.merge_checked(flag, layer, None)
     }
 
@@ -301,6 +292,19 @@ fn holds(table: &Table, path: &str) -> bool {
     }
 }
 
+/// Sets `key.path` in a table.
+pub(super) fn put(table: &mut Table, path: &str, value: Value) {
+    match path.split_once('.') {
+        None => drop(table.insert(path.into(), value)),
+        Some((key, rest)) => {
+            let inner = table.entry(key).or_insert_with(|| Value::Table(Table::new()));
+            if let Value::Table(inner) = inner {
+                put(inner, rest, value);
+            }
+        }
+    }
+}
+
 fn remove(table: &mut Table, path: &str) {
     match path.split_once('.') {
         None => drop(table.remove(path)),
@@ -378,13 +382,8 @@ fn may_be_absent(path: &[String]) -> bool {
         Err(e) if e.fault() == Fault::UnknownKey => false,
         // A value. Settings without a value are not written.
         Err(_) => {
-            let written = Settings::default().to_table().unwrap_or_default();
-            let written = Value::Table(written);
-            let mut at = Some(&written);
-            for key in path {
-                at = at.and_then(|value| value.get(key));
-            }
-            at.is_none()
+            let written = Value::Table(Settings::default().to_table().unwrap_or_default());
+            path.iter().try_fold(&written, |at, key| at.get(key)).is_none()
         }
     }
 }

@@ -71,10 +71,7 @@ impl Settings {
             cube: Cube { inset: kept.cube.inset, tilt: kept.cube.tilt, ..look.cube },
             slices: Slices { everything: kept.slices.everything, still: kept.slices.still, ..look.slices },
             labels: kept.labels,
-            marks: kept.marks,
-            measure: kept.measure,
-            body_marks: kept.body_marks,
-            cine: kept.cine,
+            drawn: kept.drawn,
             ..look
         }
     }

@@ -5,6 +5,7 @@ use super::areas::Area;
 use super::planes::{CURVE_COLOUR, Plane, colour};
 use super::region::depth_offset;
 use super::{Marks, Mode, PlaneName, ProbeMarker, Scene, Sides};
+use crate::tree::All;
 use glam::DVec3;
 
 /// Directions whose components differ by less are as far from one edge as from the other.
@@ -12,8 +13,8 @@ const SAME: f64 = 1e-6;
 /// The lengths that a scale bar can have, mm.
 pub const BAR_LENGTHS: [f64; 9] = [0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0];
 
-/// An axis of the volume.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// An axis of the volume; `sides` counts on their order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, All)]
 pub enum VolumeAxis {
     Lateral,
     Depth,
@@ -23,11 +24,7 @@ pub enum VolumeAxis {
 impl Marks {
     /// The sides of the patient at the low and the high end of an axis of the volume.
     pub fn sides(&self, axis: VolumeAxis) -> Sides {
-        match axis {
-            VolumeAxis::Lateral => self.lateral,
-            VolumeAxis::Depth => self.depth,
-            VolumeAxis::Elevation => self.elevation,
-        }
+        [self.lateral, self.depth, self.elevation][axis as usize]
     }
 
     fn sides_mut(&mut self, axis: VolumeAxis) -> &mut Sides {
@@ -74,10 +71,7 @@ impl Marks {
     /// [`Marks::with_sides`].
     pub fn left_and_right_exchanged(mut self) -> Marks {
         let is_across = |axis: &VolumeAxis| matches!(self.sides(*axis), Sides::LeftRight | Sides::RightLeft);
-        let Some(axis) = [VolumeAxis::Lateral, VolumeAxis::Depth, VolumeAxis::Elevation].into_iter().find(is_across)
-        else {
-            return self;
-        };
+        let Some(axis) = VolumeAxis::ALL.into_iter().find(is_across) else { return self };
         *self.sides_mut(axis) = self.sides(axis).exchanged();
         self.turned_with(axis)
     }
@@ -149,7 +143,7 @@ pub struct TileMarks {
 impl Scene {
     /// The marks of every tile, in the order of the tiles; the rendering is the last one.
     pub fn marks(&self) -> Vec<TileMarks> {
-        self.marks_with(&self.settings.marks)
+        self.marks_with(&self.settings.drawn.marks)
     }
 
     /// The marks of every tile like [`Scene::marks`], but from `marks` instead of the marks in the scene's settings, which a viewer may have changed

@@ -57,8 +57,7 @@ pub use views::View;
 pub(crate) use views::windowed;
 pub use visible_bounds::{Rectangle, Shared, VisibleBounds};
 
-use crate::probe::StoredType;
-use crate::probe::{Geometry, Probe};
+use crate::probe::{Geometry, Probe, StoredType};
 use crate::tree::{All, Defaults, FromNode, Name, ToNode};
 use glam::DVec3;
 use region::{framed_low, is_still, slice_grid, visible_box};
@@ -260,11 +259,11 @@ impl Settings {
     pub fn check(&self) -> Result<(), SceneError> {
         numbers().try_for_each(|number| number.check(self))?;
         check::check(self)?;
-        check_measures::check_measures(&self.measure)?;
+        check_measures::check_measures(&self.drawn.measure)?;
         still::check(self)?;
         cuts::check(&self.cuts)?;
         start_curve::check(self)?;
-        check::check_planes(self)
+        check::check_planes(&self.planes)
     }
 }
 
@@ -274,14 +273,11 @@ impl Scene {
     /// # Errors
     /// Names the first setting that cannot be rendered, and its limits.
     pub fn new(geometry: Geometry, input: Input, settings: Settings) -> Result<Scene, SceneError> {
-        match &geometry {
-            Geometry::Sweep(probe) => {
-                probe.check().map_err(|e| SceneError { field: e.field, fault: e.fault })?;
-            }
-            Geometry::Cartesian(grid) => {
-                grid.check().map_err(|e| SceneError { field: e.field, fault: e.fault })?;
-            }
-        }
+        let checked = match &geometry {
+            Geometry::Sweep(probe) => probe.check(),
+            Geometry::Cartesian(grid) => grid.check(),
+        };
+        checked.map_err(|e| SceneError { field: e.field, fault: e.fault })?;
         settings.check()?;
         check::check_conditioning(&settings.conditioning, &geometry)?;
         let [low, high] = input.range;
@@ -327,10 +323,7 @@ impl Scene {
             );
         }
         let is_longer = settings.ray.step.is_none() && step > pixel;
-        let longer: Vec<String> = is_longer
-            .then(|| format!("ray.step: {step} mm: {MAX_SAMPLES} are the most samples of a ray"))
-            .into_iter()
-            .collect();
+        let longer = is_longer.then(|| format!("ray.step: {step} mm: {MAX_SAMPLES} are the most samples of a ray"));
         let sampling = settings.ray.sampling;
         let pitches = Pitches::new(&geometry, &grid, &rays, settings.ray.subsampling, (low + high) / 2.0);
         let mut resolver = Resolver { pitches, resolved: Vec::new() };
@@ -360,23 +353,20 @@ impl Scene {
             section_smooth,
             distance,
             resolved_sizes: resolver.resolved,
-            found: longer,
+            found: Vec::from_iter(longer),
             visible_bounds: VisibleBounds::default(),
             kept_bounds: VisibleBounds::default(),
             shared: None,
         };
-        let fields = [
-            ["slices.smooth.lateral", "slices.smooth.depth", "slices.smooth.elevation"],
-            ["planes.smooth.lateral", "planes.smooth.depth", "planes.smooth.elevation"],
+        let deviations = [
+            (["slices.smooth.lateral", "slices.smooth.depth", "slices.smooth.elevation"], scene.smoothing()),
+            (["planes.smooth.lateral", "planes.smooth.depth", "planes.smooth.elevation"], scene.section_smoothing()),
         ];
-        let deviations = [scene.smoothing(), scene.section_smoothing()];
-        for (axis, field, deviation) in
-            (0..2).flat_map(|n| (0..3).map(move |axis| (axis, fields[n][axis], deviations[n][axis])))
-        {
-            if deviation > MAX_DEVIATION {
-                let unit = if axis < 2 { "slice pixels" } else { "slices" };
-                return refuse(field, format!("is {deviation:.1} {unit}, at most {MAX_DEVIATION} can be filtered"));
-            }
+        let mut each = deviations.into_iter().flat_map(|(fields, of)| fields.into_iter().zip(of)).enumerate();
+        if let Some((n, (field, deviation))) = each.find(|(_, (_, deviation))| *deviation > MAX_DEVIATION) {
+            let axis = n % 3;
+            let unit = if axis < 2 { "slice pixels" } else { "slices" };
+            return refuse(field, format!("is {deviation:.1} {unit}, at most {MAX_DEVIATION} can be filtered"));
         }
         if scene.settings.volume.compositing == Compositing::Exponential && scene.composites() && scene.spreads() {
             return refuse(
@@ -395,8 +385,6 @@ impl Scene {
         scene.apron = 2.0 + scene.filter_reach();
         floating::check_floating(&scene)?;
         cuts::check_drawn(&scene)?;
-        unveil::check_unveiled(&scene)?;
-        start_curve::check_drawn(&scene)?;
         check::check_planes_resolved(&scene)?;
         scene.visible_bounds = visible_bounds::of(&scene);
         Ok(scene)

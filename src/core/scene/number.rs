@@ -116,7 +116,6 @@ impl Slider {
         each: Each,
         put: fn(&mut Settings, f64),
     ) -> Slider {
-        let limits: fn(&Scene) -> [f64; 2] = |_| [f64::NEG_INFINITY, f64::INFINITY];
         Slider {
             key,
             name,
@@ -129,7 +128,7 @@ impl Slider {
             applies: |_| true,
             each,
             put,
-            limits,
+            limits: |_| [f64::NEG_INFINITY, f64::INFINITY],
         }
     }
 
@@ -215,32 +214,24 @@ impl Number {
         Number { slider: Some(slider.when(applies)), ..self }
     }
 
-    const fn with(self, slider: Slider) -> Number {
-        Number { slider: Some(slider), ..self }
+    /// The slider, which must have been given before a method changes it: a constant table without it does not compile.
+    const fn its_slider(self) -> Slider {
+        self.slider.expect("the row has no slider yet")
     }
 
     /// The same number, whose slider sets values below `least` to 0, or removes an optional value.
     pub(super) const fn off_below(self, least: f64) -> Number {
-        match self.slider {
-            Some(slider) => self.with(Slider { least, ..slider }),
-            None => self,
-        }
+        Number { slider: Some(Slider { least, ..self.its_slider() }), ..self }
     }
 
     /// The same number, whose slider is limited to what `limits` gives for a scene.
     pub(super) const fn within(self, limits: fn(&Scene) -> [f64; 2]) -> Number {
-        match self.slider {
-            Some(slider) => self.with(slider.within(limits)),
-            None => self,
-        }
+        Number { slider: Some(self.its_slider().within(limits)), ..self }
     }
 
     /// The same number, whose slider sets more than this number, by `put`.
     pub(super) const fn set_by(self, put: fn(&mut Settings, f64)) -> Number {
-        match self.slider {
-            Some(slider) => self.with(Slider { put, ..slider }),
-            None => self,
-        }
+        Number { slider: Some(Slider { put, ..self.its_slider() }), ..self }
     }
 
     /// The allowed values with their unit, for messages and docs; empty if all are allowed.
@@ -337,34 +328,25 @@ pub(super) trait Numeric: Sized {
     }
 }
 
-impl Numeric for f64 {
-    fn each(&self, take: &mut dyn FnMut(f64)) {
-        take(*self);
-    }
+/// Implements [`Numeric`] for types of one number, with the value for a number.
+macro_rules! numeric {
+    ($($of:ty: |$number:ident| $value:expr;)+) => {$(
+        impl Numeric for $of {
+            fn each(&self, take: &mut dyn FnMut(f64)) {
+                take(f64::from(*self));
+            }
 
-    fn of(number: f64) -> Option<f64> {
-        Some(number)
-    }
+            fn of($number: f64) -> Option<$of> {
+                Some($value)
+            }
+        }
+    )+};
 }
 
-impl Numeric for u32 {
-    fn each(&self, take: &mut dyn FnMut(f64)) {
-        take(f64::from(*self));
-    }
-
-    fn of(number: f64) -> Option<u32> {
-        Some(number.round() as u32)
-    }
-}
-
-impl Numeric for bool {
-    fn each(&self, take: &mut dyn FnMut(f64)) {
-        take(f64::from(u8::from(*self)));
-    }
-
-    fn of(number: f64) -> Option<bool> {
-        Some(number >= 0.5)
-    }
+numeric! {
+    f64: |number| number;
+    u32: |number| number.round() as u32;
+    bool: |number| number >= 0.5;
 }
 
 /// 0 stands for no value.
@@ -412,7 +394,7 @@ pub(super) fn put<T: Numeric>(value: &mut T, number: f64) {
 }
 
 /// Makes the [`Number`] of a setting from its path, its unit and the allowed values. In the path, `=>` follows a table that may be absent, or a list.
-/// After `;` follows its slider, if it has one: group, name, range, step, with which settings it affects pictures, and a hint.
+/// `[part]` before the path names a field of the settings whose keys stand beside theirs. After `;` follows its slider, if it has one: group, name, range, step, with which settings it affects pictures, and a hint.
 macro_rules! number {
     ($first:ident $(. $field:ident)* $(=> $table:ident $(. $below:ident)*)*, $unit:expr, $allowed:expr; $($slider:expr),+) => {
         number!($first $(. $field)* $(=> $table $(. $below)*)*, $unit, $allowed).slider($($slider),+)
@@ -429,12 +411,12 @@ macro_rules! number {
     (@put $of:expr, $value:expr, $($field:ident).+ => $($rest:tt)+) => {
         for inner in $of.$($field).+.iter_mut() { number!(@put inner, $value, $($rest)+) }
     };
-    ($first:ident $(. $field:ident)* $(=> $table:ident $(. $below:ident)*)*, $unit:expr, $allowed:expr) => {
+    ($([$part:ident])? $first:ident $(. $field:ident)* $(=> $table:ident $(. $below:ident)*)*, $unit:expr, $allowed:expr) => {
         $crate::scene::number::Number::new(
             [concat!(stringify!($first) $(, ".", stringify!($field))* $(, ".", stringify!($table) $(, ".", stringify!($below))*)*), $unit],
             $allowed,
-            |s, take| number!(@each s, take, $first $(. $field)* $(=> $table $(. $below)*)*),
-            |s, value| number!(@put s, value, $first $(. $field)* $(=> $table $(. $below)*)*),
+            |s, take| number!(@each s$(.$part)?, take, $first $(. $field)* $(=> $table $(. $below)*)*),
+            |s, value| number!(@put s$(.$part)?, value, $first $(. $field)* $(=> $table $(. $below)*)*),
         )
     };
 }
@@ -451,8 +433,8 @@ mod tests {
         let point = Measurement { points: vec![[0.0; 3], [2e6, 0.0, 0.0]], ..Measurement::default() };
         let filter = Bilateral { pixels: 2.0, mm: None, distance: -1.0, repeat: 1 };
         let mut all = [(); 6].map(|()| Settings::default());
-        all[0].body_marks = vec![BodyMark::default(), mark];
-        all[1].measure = vec![Measurement { points: vec![[0.0; 3]; 2], ..Measurement::default() }, point];
+        all[0].drawn.body_marks = vec![BodyMark::default(), mark];
+        all[1].drawn.measure = vec![Measurement { points: vec![[0.0; 3]; 2], ..Measurement::default() }, point];
         all[2].distance.bilateral = Some(filter);
         all[3].ray.sliding = 4;
         all[4].ray.brick = Some(3);

@@ -506,21 +506,13 @@ impl Tiling {
 
     /// The tile that contains a pixel. None in an empty cell of the grid.
     pub fn tile_at(&self, x: usize, y: usize) -> Option<&Tile> {
-        self.tiles.iter().find(|tile| {
-            let within = |at: usize, axis: usize| {
-                let low = tile.corner[axis] as usize;
-                at >= low && at < low + tile.size[axis] as usize
-            };
-            within(x, 0) && within(y, 1)
-        })
+        self.tiles.iter().find(|tile| tile.has([x, y].map(|n| n as f64)))
     }
 
     /// The place in space, mm, that a pixel's centre shows on the tile's plane; for a curved plane, on the plane through its chord.
     pub fn place(&self, tile: &Tile, x: usize, y: usize) -> DVec3 {
-        let from_middle = |at: usize, axis: usize| {
-            let middle = f64::from(tile.corner[axis]) + f64::from(tile.size[axis]) / 2.0;
-            (at as f64 + 0.5 - middle) * tile.pixel
-        };
+        let middle = tile.middle();
+        let from_middle = |at: usize, axis: usize| (at as f64 + 0.5 - middle[axis]) * tile.pixel;
         tile.plane.at + tile.plane.right * from_middle(x, 0) + tile.plane.down * from_middle(y, 1)
     }
 
@@ -607,11 +599,7 @@ impl Tiling {
 impl Slab {
     /// The value of the shaders' specialization constant SLAB.
     pub fn number(self) -> i32 {
-        match self {
-            Slab::Mean => 0,
-            Slab::Max => 1,
-            Slab::Min => 2,
-        }
+        self as i32
     }
 }
 

@@ -109,7 +109,7 @@ impl Scene {
 
     /// A line on whether rays skip bricks and why, for `--explain`. None if no ray takes samples.
     pub(crate) fn brick_choice(&self) -> Option<String> {
-        if !(self.composites() || self.detects_surface() || self.projects()) {
+        if !self.renders() {
             return None;
         }
         let [cost, saving] = self.brick_balance().map(|ns| ns * 1e-6);
@@ -140,9 +140,7 @@ impl Scene {
     /// True if rays sample packed neighbours, texels that hold four neighbours of one or two slices. Never for volumes of 32-bit floats, whose packed texels
     /// would take 16 bytes.
     pub fn packs(&self) -> bool {
-        let stored = self.volume_format() != VolumeFormat::R32f;
-        self.sampling == Sampling::PackedNeighbours
-            && stored
-            && (self.composites() || self.detects_surface() || self.projects())
+        let is_small = self.volume_format() != VolumeFormat::R32f;
+        self.sampling == Sampling::PackedNeighbours && is_small && self.renders()
     }
 }

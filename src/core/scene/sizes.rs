@@ -86,14 +86,6 @@ pub(super) struct Resolver {
 struct Unit(f64, &'static str);
 
 impl Resolver {
-    fn of_slices(&self) -> Unit {
-        Unit(self.pitches.slice_pixel, "slice pixels")
-    }
-
-    fn of_rays(&self) -> Unit {
-        Unit(self.pitches.ray, "rays")
-    }
-
     fn keep(&mut self, key: &'static str, mm: f64, Unit(pitch, unit): Unit, taken: f64, is_cut: bool) {
         self.resolved.push(ResolvedSize { key, mm, pitch, unit, asked: mm / pitch, taken, is_cut });
     }
@@ -174,7 +166,7 @@ impl Resolver {
     }
 
     pub fn slices(&mut self, s: &Slices) -> Slices {
-        let unit = self.of_slices();
+        let unit = Unit(self.pitches.slice_pixel, "slice pixels");
         let smooth = s.smooth.map(|smooth| self.smooth("slices.smooth.elevation_mm", smooth));
         Slices {
             sigma: self.sigma("slices.sigma.window_mm", s.sigma, unit),
@@ -191,15 +183,10 @@ impl Resolver {
 
     /// Converts sizes in mm of the filters of the distance map to pixels of that map, one ray each, for a picture with full resolution.
     pub fn distance(&mut self, d: &Distance) -> Distance {
-        let unit = self.of_rays();
+        let unit = Unit(self.pitches.ray, "rays");
         let median = match d.median_mm.map(|mm| self.window("distance.median_mm", mm, unit)) {
-            Some(window) => {
-                if window > 1 {
-                    window
-                } else {
-                    0
-                }
-            }
+            Some(1) => 0,
+            Some(window) => window,
             None => d.median,
         };
         let bilateral = d.bilateral.and_then(|b| match b.mm {

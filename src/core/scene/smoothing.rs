@@ -7,10 +7,8 @@ impl Scene {
     /// where interpolation between slices smooths more than linear interpolation does.
     pub fn smoothing(&self) -> [f64; 3] {
         let [lateral, depth, elevation] = self.deviations(self.slice_filters.smooth.unwrap_or_default());
-        if self.blurs() {
-            return [binomial_deviation(3), binomial_deviation(3), elevation];
-        }
-        [lateral, depth, elevation]
+        let blur = binomial_deviation(3);
+        if self.blurs() { [blur, blur, elevation] } else { [lateral, depth, elevation] }
     }
 
     /// Standard deviations of the 3D Gaussian of the section volume: slice pixels, slice pixels and slices.
@@ -55,20 +53,20 @@ impl Scene {
 
     /// Number of taps of the 3D Gaussian on each side of the middle, along columns, rows and slices.
     pub fn smoothing_radius(&self) -> [u32; 3] {
-        if let Some(taps) = self.slice_filters.smooth.and_then(|s| s.kernel) {
-            return [taps / 2; 3];
-        }
-        let [lateral, depth, elevation] = self.smoothing().map(gaussian_radius);
-        let elevation = if self.sharpens() { 1 } else { elevation };
+        let [lateral, depth, elevation] = self.radii(self.slice_filters.smooth, self.smoothing());
         if self.blurs() { [1, 1, elevation] } else { [lateral, depth, elevation] }
     }
 
     /// Number of taps of the 3D Gaussian of the section volume on each side of the middle, along columns, rows and slices.
     pub(crate) fn section_smoothing_radius(&self) -> [u32; 3] {
-        if let Some(taps) = self.section_smooth.and_then(|s| s.kernel) {
+        self.radii(self.section_smooth, self.section_smoothing())
+    }
+
+    fn radii(&self, smooth: Option<Smooth>, deviations: [f64; 3]) -> [u32; 3] {
+        if let Some(taps) = smooth.and_then(|s| s.kernel) {
             return [taps / 2; 3];
         }
-        let [lateral, depth, elevation] = self.section_smoothing().map(gaussian_radius);
+        let [lateral, depth, elevation] = deviations.map(gaussian_radius);
         [lateral, depth, if self.sharpens() { 1 } else { elevation }]
     }
 

@@ -4,7 +4,7 @@
 //! `PchipInterpolator` is the same). It has no corners at its points and never leaves the depths of the two points that it is between: where
 //! neighbours have the same depth it is level, and it turns at points only. Beyond its ends it stays at their depths.
 
-use super::{MAX_START_POINTS, MIN_START_POINTS, Scene, SceneError, Settings, cuts, refuse, region};
+use super::{MAX_START_POINTS, MIN_START_POINTS, Scene, SceneError, Settings, refuse, region};
 use glam::DVec3;
 
 /// Least lateral distance of neighbouring points, as a share of the distance from the first to the last: a micrometre of a curve over 100 mm.
@@ -143,14 +143,6 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
         }
     }
     Ok(())
-}
-
-/// Checks whether the start curve can remove anything.
-///
-/// # Errors
-/// The rendering draws both dark and bright matter, so that no value of a texel is invisible.
-pub(super) fn check_drawn(scene: &Scene) -> Result<(), SceneError> {
-    cuts::check_removal(scene, scene.starts_at_curve(), "region.start_curve", "set region.start_curve=none")
 }
 
 #[cfg(test)]

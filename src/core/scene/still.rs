@@ -38,24 +38,18 @@ impl StillLights {
 /// # Errors
 /// A setting that a still cannot show.
 pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
-    if settings.still.is_none() {
-        return Ok(());
+    let faults = [
+        (settings.mode != Mode::Volume, "set mode=volume, or leave it out"),
+        (settings.volume.shading != Shading::None, "leave volume.shading out"),
+        (settings.ray.sliding != 0, "leave ray.sliding out, which filters along rays"),
+        (settings.light.position.is_some(), "its lights are distant, leave light.position out"),
+    ];
+    match faults.into_iter().find(|(is_refused, _)| *is_refused && settings.still.is_some()) {
+        Some((_, what)) => {
+            refuse("still", format!("is for mode volume in the colours of its transfer function: {what}"))
+        }
+        None => Ok(()),
     }
-    let refused =
-        |what: &str| refuse("still", format!("is for mode volume in the colours of its transfer function: {what}"));
-    if settings.mode != Mode::Volume {
-        return refused("set mode=volume, or leave it out");
-    }
-    if settings.volume.shading != Shading::None {
-        return refused("leave volume.shading out");
-    }
-    if settings.ray.sliding != 0 {
-        return refused("leave ray.sliding out, which filters along rays");
-    }
-    if settings.light.position.is_some() {
-        return refused("its lights are distant, leave light.position out");
-    }
-    Ok(())
 }
 
 /// The albedo of scattering of a medium of which a half-space has this colour under even light (Kulla and Conty 2017, "Revisiting physically based

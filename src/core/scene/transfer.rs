@@ -169,13 +169,8 @@ pub fn pre_integrated(table: &[[f64; 4]]) -> Vec<[f64; 4]> {
         let absorbed = integrals[high][3] - integrals[low][3];
         // Without absorption the colour is that of the middle entry; it has no effect.
         if low == high || absorbed <= 0.0 {
-            let middle = table[(low + high) / 2];
-            return [
-                middle[0],
-                middle[1],
-                middle[2],
-                absorbed / (high - low).max(1) as f64 + if low == high { middle[3] } else { 0.0 },
-            ];
+            let [r, g, b, here] = table[(low + high) / 2];
+            return [r, g, b, absorbed / (high - low).max(1) as f64 + if low == high { here } else { 0.0 }];
         }
         let colour = |c: usize| (integrals[high][c] - integrals[low][c]) / absorbed;
         [colour(0), colour(1), colour(2), absorbed / (high - low) as f64]
@@ -217,45 +212,42 @@ pub fn at(points: &[TransferPoint], value: f64) -> [f64; 4] {
     }
 }
 
-fn points(table: &[(f64, [f64; 3], f64)]) -> Vec<TransferPoint> {
-    table.iter().map(|&(at, colour, opacity)| TransferPoint { at, colour, opacity }).collect()
-}
-
 fn named(name: TransferName) -> Vec<TransferPoint> {
-    match name {
-        TransferName::Grey => points(&[(0.0, [0.0; 3], 0.0), (0.1, [0.1; 3], 0.0), (1.0, [1.0; 3], 0.2)]),
-        TransferName::Sepia => points(&[
+    let points: &[(f64, [f64; 3], f64)] = match name {
+        TransferName::Grey => &[(0.0, [0.0; 3], 0.0), (0.1, [0.1; 3], 0.0), (1.0, [1.0; 3], 0.2)],
+        TransferName::Sepia => &[
             (0.0, [0.05, 0.02, 0.0], 0.0),
             (0.12, [0.25, 0.13, 0.05], 0.0),
             (0.5, [0.75, 0.5, 0.28], 0.05),
             (1.0, [1.0, 0.93, 0.78], 0.25),
-        ]),
-        TransferName::Skin => points(&[
+        ],
+        TransferName::Skin => &[
             (0.0, [0.15, 0.03, 0.01], 0.0),
             (0.2, [0.5, 0.2, 0.12], 0.0),
             (0.5, [0.85, 0.55, 0.42], 0.06),
             (1.0, [1.0, 0.9, 0.82], 0.35),
-        ]),
-        TransferName::Cool => points(&[
+        ],
+        TransferName::Cool => &[
             (0.0, [0.0, 0.02, 0.08], 0.0),
             (0.15, [0.05, 0.18, 0.4], 0.0),
             (0.5, [0.3, 0.6, 0.85], 0.06),
             (1.0, [0.95, 1.0, 1.0], 0.3),
-        ]),
-        TransferName::Warm => points(&[
+        ],
+        TransferName::Warm => &[
             (0.0, [0.08, 0.0, 0.0], 0.0),
             (0.15, [0.4, 0.08, 0.03], 0.0),
             (0.5, [0.9, 0.45, 0.12], 0.06),
             (1.0, [1.0, 0.97, 0.7], 0.3),
-        ]),
-        TransferName::Bone => points(&[
+        ],
+        TransferName::Bone => &[
             (0.0, [0.0, 0.0, 0.0], 0.0),
             (0.25, [0.25, 0.12, 0.08], 0.0),
             (0.5, [0.7, 0.6, 0.45], 0.05),
             (0.75, [0.95, 0.9, 0.8], 0.3),
             (1.0, [1.0, 1.0, 0.97], 0.6),
-        ]),
-    }
+        ],
+    };
+    points.iter().map(|&(at, colour, opacity)| TransferPoint { at, colour, opacity }).collect()
 }
 
 /// Control points of a colour map at equidistant brightness from dark to bright, red, green and blue in 0..1; between them it is linear.
@@ -272,6 +264,10 @@ pub fn colour_map(map: ColourMap) -> [[f64; 3]; 5] {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn points(table: &[(f64, [f64; 3], f64)]) -> Vec<TransferPoint> {
+        table.iter().map(|&(at, colour, opacity)| TransferPoint { at, colour, opacity }).collect()
+    }
 
     #[test]
     fn colours_and_opacities_are_chosen_apart() {

@@ -1,6 +1,6 @@
 //! Unveiling, resolved to the volume: the cells that fluid is looked for in, and which of their columns are in view.
 
-use super::{Scene, SceneError, cuts, region};
+use super::{Scene, region};
 use crate::probe::{Geometry, Motion};
 
 // What is looked for is a pocket of fluid in a body and what is averaged out are the grains of ultrasound, both of a size in mm whatever the
@@ -39,8 +39,7 @@ impl Scene {
         let middle = |slice: u32| self.texel_place([columns as u32 / 2, self.middle_row(), slice]);
         let half = self.slices() / 2;
         let across = middle(half).distance(middle(half - half.min(1)));
-        let [lateral, depth, _] = self.smoothing();
-        let already = (lateral * self.grid.pitch[0]).min(depth * self.grid.pitch[1]);
+        let already = self.least_smoothing();
         let side = cell[0] as f64 * self.grid.pitch[0];
         // The kernel 1 2 1 has a variance of half a cell.
         let smoothing = (2.0 * (SMOOTH * SMOOTH - already * already) / (side * side)).round().clamp(0.0, 8.0) as u32;
@@ -103,12 +102,4 @@ impl Scene {
         let in_view = lattice.as_ref().map(|lattice| self.columns_in_view(lattice));
         (self.settings.unveil, lattice, in_view)
     }
-}
-
-/// Checks whether the start surface can remove anything.
-///
-/// # Errors
-/// The rendering draws both dark and bright matter, so that no value of a texel is invisible.
-pub(super) fn check_unveiled(scene: &Scene) -> Result<(), SceneError> {
-    cuts::check_removal(scene, scene.unveils(), "unveil.enabled", "set unveil.enabled=false")
 }

@@ -111,11 +111,8 @@ pub fn all(from: &Settings) -> Vec<Variant> {
             variants.extend(modes_of(&sampled, &text));
         }
     }
-    for (preset, _) in PRESETS {
-        if let Some(variant) = preset_over(from, preset) {
-            variants.extend(modes_of(&variant.settings, &variant.name));
-        }
-    }
+    let presets = PRESETS.iter().filter_map(|(preset, _)| preset_over(from, preset));
+    variants.extend(presets.flat_map(|variant| modes_of(&variant.settings, &variant.name)));
     variants
         .extend(CHOICES.iter().filter_map(|text| Some(Variant::new(text.replace('\n', ", "), changed(from, text)?))));
     variants

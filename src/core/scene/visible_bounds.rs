@@ -305,23 +305,18 @@ fn touched(scene: &Scene, look: &Look) -> Option<VisibleBounds> {
         return None;
     }
     let along = |axis: usize| Span::of(corners.iter().map(|c| c[axis]));
-    let [column, row, slice] = match &scene.geometry {
-        Geometry::Cartesian(grid) => std::array::from_fn(|a| {
-            Span((along(a).0 - grid.origin[a]) / grid.spacing[a], (along(a).1 - grid.origin[a]) / grid.spacing[a])
-        }),
+    let index = |v: Span, origin: f64, pitch: f64| Span((v.0 - origin) / pitch, (v.1 - origin) / pitch);
+    let spans: [Span; 3] = match &scene.geometry {
+        Geometry::Cartesian(grid) => std::array::from_fn(|a| index(along(a), grid.origin[a], grid.spacing[a])),
         Geometry::Sweep(probe) => {
             let (x, y, position) = unswept(probe, &corners, along(0), along(1), along(2));
             let (x, y) = in_sector(probe, x, y);
-            let index = |v: Span, axis: usize| {
-                let (origin, pitch) = (scene.grid.origin[axis], scene.grid.pitch[axis]);
-                Span((v.0 - origin) / pitch, (v.1 - origin) / pitch)
-            };
-            [index(x, 0), index(y, 1), slices(scene, probe, position)]
+            let SliceGrid { origin, pitch, .. } = scene.grid;
+            [index(x, origin[0], pitch[0]), index(y, origin[1], pitch[1]), slices(scene, probe, position)]
         }
     };
     let size = scene.volume_size();
     let texel = |index: f64, axis: usize| index.floor().clamp(0.0, f64::from(size[axis] - 1)) as u32;
-    let spans = [column, row, slice];
     // The B-spline takes one slice more on each side.
     let more = [0.0, 0.0, f64::from(u8::from(scene.takes_bspline()))];
     let bounds = VisibleBounds {

@@ -17,8 +17,8 @@ pub fn remove_dead_code(words: &[u32]) -> Result<Vec<u32>, SpirvError> {
     let (head, code) = instructions.split_at(begin);
     let known: HashMap<u32, u32> = head.iter().filter_map(known).collect();
     let kept = without_unused(without_dead_blocks(code, &known)?);
-    let results = |of: &[Instruction]| of.iter().filter_map(result).collect::<HashSet<u32>>();
-    let removed = &results(code) - &kept.iter().filter_map(|(opcode, words)| result_of(*opcode, words)).collect();
+    let before: HashSet<u32> = code.iter().filter_map(|i| result_of(i.opcode, i.operands)).collect();
+    let removed = &before - &kept.iter().filter_map(|(opcode, words)| result_of(*opcode, words)).collect();
     let mut out = words[..HEADER_WORDS].to_vec();
     for i in head {
         let is_about = matches!(i.opcode, Op::Name | Op::Decorate);
@@ -64,26 +64,19 @@ struct Block<'a> {
 fn exit(code: &[Instruction], known: &HashMap<u32, u32>) -> Result<Exit, SpirvError> {
     let [.., last] = code else { return error("a block is empty") };
     let before = code.len().checked_sub(2).map(|n| &code[n]);
-    let (mut stubs, mut continues) = (Vec::new(), None);
-    let is_selection = match before.map(|i| (i.opcode, i.operands)) {
-        Some((Op::SelectionMerge, [merge, ..])) => {
-            stubs.push(*merge);
-            true
-        }
-        Some((Op::LoopMerge, [merge, next, ..])) => {
-            stubs.push(*merge);
-            continues = Some(*next);
-            false
-        }
-        _ => false,
+    let (merge, continues) = match before.map(|i| (i.opcode, i.operands)) {
+        Some((Op::SelectionMerge, [merge, ..])) => (Some(*merge), None),
+        Some((Op::LoopMerge, [merge, next, ..])) => (Some(*merge), Some(*next)),
+        _ => (None, None),
     };
+    let mut stubs = Vec::from_iter(merge);
     let mut written = (last.opcode, last.operands.to_vec());
     let targets = match (last.opcode, last.operands) {
         (Op::Branch, [to]) => vec![*to],
         (Op::BranchConditional, [condition, yes, no, ..]) => match known.get(condition) {
             Some(value) if continues.is_none() => {
                 let (taken, dead) = if *value == 1 { (*yes, *no) } else { (*no, *yes) };
-                if is_selection {
+                if merge.is_some() {
                     // The selection stays, and so does the form of the code around it.
                     stubs.push(dead);
                 } else {
@@ -127,12 +120,10 @@ fn blocks<'a>(code: &'a [Instruction<'a>], known: &HashMap<u32, u32>) -> Result<
 fn without_dead_blocks(code: &[Instruction], known: &HashMap<u32, u32>) -> Result<Vec<Code>, SpirvError> {
     let blocks = blocks(code, known)?;
     let by_label: HashMap<u32, &Block> = blocks.iter().map(|block| (block.label, block)).collect();
-    let entries = code.iter().scan(false, |in_function, i| {
-        let is_entry = i.opcode == Op::Label && !*in_function;
-        *in_function = (*in_function || is_entry) && i.opcode != Op::FunctionEnd;
-        Some((is_entry, i))
-    });
-    let mut ahead: Vec<u32> = entries.filter(|(is_entry, _)| *is_entry).map(|(_, i)| i.operands[0]).collect();
+    // The first label of each function.
+    let functions = code.split(|i| i.opcode == Op::FunctionEnd);
+    let entries = functions.filter_map(|function| function.iter().find(|i| i.opcode == Op::Label));
+    let mut ahead: Vec<u32> = entries.map(|i| i.operands[0]).collect();
     let (mut reached, mut stubs) = (HashSet::<u32>::new(), HashSet::<u32>::new());
     while let Some(label) = ahead.pop() {
         if !reached.insert(label) {
@@ -191,10 +182,6 @@ fn live(i: &Instruction, from: &HashSet<u32>) -> Code {
 }
 
 /// The value of an instruction within a function.
-fn result(i: &Instruction) -> Option<u32> {
-    result_of(i.opcode, i.operands)
-}
-
 fn result_of(opcode: Op, operands: &[u32]) -> Option<u32> {
     match opcode {
         Op::Label => operands.first().copied(),

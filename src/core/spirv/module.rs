@@ -1,7 +1,8 @@
 //! A SPIR-V module as words: the embedded shaders, and the decoding and encoding of instructions. Operations are those of the
 //! SPIR-V specification, whose registry the crate `spirv` is made from.
 
-pub(super) use ::spirv::Op;
+pub(super) use ::spirv::{Capability, ImageFormat, Op};
+use std::collections::HashMap;
 
 /// Every embedded shader: its path below glsl/ with its variant, and its words as bytes.
 pub const EMBEDDED: &[(&str, &[u8])] = include!("../../../spirv/embedded.rs");
@@ -16,14 +17,6 @@ pub(super) mod decoration {
     pub const BINDING: u32 = Decoration::Binding as u32;
     pub(crate) const OFFSET: u32 = Decoration::Offset as u32;
     pub(crate) const ARRAY_STRIDE: u32 = Decoration::ArrayStride as u32;
-}
-
-/// Numbers of SPIR-V capabilities.
-pub(super) mod capability {
-    use ::spirv::Capability;
-
-    pub(crate) const IMAGE_BUFFER: u32 = Capability::ImageBuffer as u32;
-    pub(crate) const STORAGE_IMAGE_EXTENDED_FORMATS: u32 = Capability::StorageImageExtendedFormats as u32;
 }
 
 /// Numbers of SPIR-V storage classes.
@@ -168,6 +161,33 @@ pub(super) fn decode(words: &[u32]) -> Result<Vec<Instruction<'_>>, SpirvError> 
 /// True for instructions on images: samples, fetches, reads, writes and queries.
 pub(super) fn is_of_images(opcode: Op) -> bool {
     (Op::SampledImage..=Op::ImageQuerySamples).contains(&opcode)
+}
+
+/// Declares a capability at the beginning of the module that is being written, unless `instructions` declare it.
+pub(super) fn require(capability: Capability, instructions: &[Instruction], out: &mut Vec<u32>) {
+    let operands = [capability as u32];
+    if !instructions.iter().any(|i| i.opcode == Op::Capability && i.operands == operands) {
+        out.extend(encode(Op::Capability, &operands));
+    }
+}
+
+/// The types of storage images that were declared, each with the type of its pointers.
+#[derive(Default)]
+pub(super) struct StorageImages(HashMap<Vec<u32>, [u32; 2]>);
+
+impl StorageImages {
+    /// The type of a storage image and that of pointers to it, which are declared once. `shape`: the operands of the image type after its identifier,
+    /// without usage and format.
+    pub(super) fn declare(&mut self, shape: &[u32], format: ImageFormat, out: &mut Vec<u32>) -> [u32; 2] {
+        // Used as storage (2).
+        let key = [shape, &[2, format as u32]].concat();
+        *self.0.entry(key).or_insert_with_key(|operands| {
+            let (image, pointer) = (next_id(out), next_id(out));
+            out.extend(encode(Op::TypeImage, &[&[image], operands.as_slice()].concat()));
+            out.extend(encode(Op::TypePointer, &[pointer, 0, image]));
+            [image, pointer]
+        })
+    }
 }
 
 /// Encodes one instruction.

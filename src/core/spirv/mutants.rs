@@ -44,6 +44,12 @@ fn paired(opcode: Op, pairs: &[(Op, Op)]) -> Option<Change> {
     pairs.iter().find_map(other).map(Change::Opcode)
 }
 
+impl Mutation {
+    const fn sparing_loops(self) -> Mutation {
+        Mutation { spares_loops: true, ..self }
+    }
+}
+
 const fn of(class: &'static str, what: &'static str, change: fn(Op, &[u32]) -> Option<Change>) -> Mutation {
     Mutation { class, what, spares_loops: false, change }
 }
@@ -111,21 +117,11 @@ pub const MUTATIONS: &[Mutation] = &[
         matches!(operands.get(3), Some(66..=71)).then_some(Change::Negated)
     }),
     of("products of vectors and matrices", "the product is negated", |_, _| Some(Change::Negated)),
-    Mutation {
-        class: "arithmetic of floats",
-        what: "a sum is a difference",
-        spares_loops: true,
-        change: |opcode, _| paired(opcode, &[(Op::FAdd, Op::FSub)]),
-    },
-    Mutation {
-        class: "arithmetic of integers",
-        what: "a sum is a difference",
-        spares_loops: true,
-        change: |opcode, _| paired(opcode, &[(Op::IAdd, Op::ISub)]),
-    },
-    of("quotients of floats", "a quotient is a product", |opcode, _| {
-        (opcode == Op::FDiv).then_some(Change::Opcode(Op::FMul))
-    }),
+    of("arithmetic of floats", "a sum is a difference", |opcode, _| paired(opcode, &[(Op::FAdd, Op::FSub)]))
+        .sparing_loops(),
+    of("arithmetic of integers", "a sum is a difference", |opcode, _| paired(opcode, &[(Op::IAdd, Op::ISub)]))
+        .sparing_loops(),
+    of("quotients of floats", "a quotient is a product", |opcode, _| paired(opcode, &[(Op::FDiv, Op::FMul)])),
     of("quotients of integers", "quotient and remainder are mixed up", |opcode, _| {
         paired(opcode, &[(Op::UDiv, Op::UMod), (Op::SDiv, Op::SRem)])
     }),

@@ -93,9 +93,8 @@ const LOCAL_SIZE_ID: u32 = 38;
 
 #[derive(Clone, Debug)]
 enum Type {
-    Int {
-        signed: bool,
-    },
+    /// Whether it is signed.
+    Int(bool),
     Float,
     Vector(u32, u32),
     /// Element type, the constant with its length.
@@ -109,7 +108,6 @@ enum Type {
     SampledImage(u32),
     Struct(Vec<u32>),
     Pointer(u32),
-    Other,
 }
 
 /// What the instructions of a module declare, by identifier.
@@ -129,7 +127,7 @@ struct Declarations {
     types: HashMap<u32, Type>,
     constants: HashMap<u32, u32>,
     /// Identifier, pointer type, storage class.
-    variables: Vec<(u32, u32, u32)>,
+    variables: Vec<[u32; 3]>,
     local_size: [u32; 3],
     local_size_ids: Option<[u32; 3]>,
 }
@@ -139,7 +137,10 @@ struct Declarations {
 /// # Errors
 /// The module is invalid, or declares a binding or a parameter that this program supports in no shader.
 pub fn reflect(words: &[u32]) -> Result<Module, SpirvError> {
-    let declared = scan(words)?;
+    let mut declared = Declarations { local_size: [1; 3], ..Declarations::default() };
+    for i in decode(words)? {
+        declared.add(i.opcode, i.operands);
+    }
     let mut module = Module { local_size: declared.local_size, ..Module::default() };
     if let Some(ids) = declared.local_size_ids {
         module.local_size = ids.map(|id| declared.constants.get(&id).copied().unwrap_or(1));
@@ -149,21 +150,13 @@ pub fn reflect(words: &[u32]) -> Result<Module, SpirvError> {
         module.constants.push(Constant { name, id: constant });
     }
     module.constants.sort_by_key(|c| c.id);
-    for &(id, pointer, storage) in &declared.variables {
-        if let Some(binding) = declared.bindings.get(&id) {
-            declared.add_binding(&mut module, id, pointer, storage, *binding)?;
+    for variable in &declared.variables {
+        if let Some(binding) = declared.bindings.get(&variable[0]) {
+            declared.add_binding(&mut module, *variable, *binding)?;
         }
     }
     module.bindings.sort_by_key(|b| b.binding);
     Ok(module)
-}
-
-fn scan(words: &[u32]) -> Result<Declarations, SpirvError> {
-    let mut declarations = Declarations { local_size: [1; 3], ..Declarations::default() };
-    for i in decode(words)? {
-        declarations.add(i.opcode, i.operands);
-    }
-    Ok(declarations)
 }
 
 impl Declarations {
@@ -175,7 +168,7 @@ impl Declarations {
             Op::ExecutionModeId if a[1] == LOCAL_SIZE_ID && a.len() >= 5 => {
                 self.local_size_ids = Some([a[2], a[3], a[4]]);
             }
-            Op::TypeInt => drop(self.types.insert(a[0], Type::Int { signed: a.get(2) == Some(&1) })),
+            Op::TypeInt => drop(self.types.insert(a[0], Type::Int(a.get(2) == Some(&1)))),
             Op::TypeFloat => drop(self.types.insert(a[0], Type::Float)),
             Op::TypeVector => drop(self.types.insert(a[0], Type::Vector(a[1], a[2]))),
             Op::TypeArray => drop(self.types.insert(a[0], Type::Array(a[1], a[2]))),
@@ -186,11 +179,8 @@ impl Declarations {
             Op::TypeSampledImage => drop(self.types.insert(a[0], Type::SampledImage(a[1]))),
             Op::TypeStruct => drop(self.types.insert(a[0], Type::Struct(a[1..].to_vec()))),
             Op::TypePointer => drop(self.types.insert(a[0], Type::Pointer(a[2]))),
-            Op::TypeVoid | Op::TypeBool | Op::TypeSampler | Op::TypeRuntimeArray if !a.is_empty() => {
-                self.types.insert(a[0], Type::Other);
-            }
             Op::Constant | Op::SpecConstant => drop(self.constants.insert(a[1], a[2])),
-            Op::Variable => self.variables.push((a[1], a[0], a[2])),
+            Op::Variable => self.variables.push([a[1], a[0], a[2]]),
             Op::Decorate => match (a[1], a.get(2)) {
                 (decoration::BINDING, Some(&binding)) => drop(self.bindings.insert(a[0], binding)),
                 (decoration::SPEC_ID, Some(&id)) => drop(self.constant_ids.insert(a[0], id)),
@@ -208,14 +198,9 @@ impl Declarations {
         }
     }
 
-    fn add_binding(
-        &self,
-        module: &mut Module,
-        id: u32,
-        pointer: u32,
-        storage: u32,
-        binding: u32,
-    ) -> Result<(), SpirvError> {
+    /// Adds a variable, whose identifier, pointer type and storage class are given, to the bindings of the module.
+    fn add_binding(&self, module: &mut Module, variable: [u32; 3], binding: u32) -> Result<(), SpirvError> {
+        let [id, pointer, storage] = variable;
         let Some(&Type::Pointer(pointee)) = self.types.get(&pointer) else {
             return error(format!("variable {id} is not a pointer"));
         };
@@ -279,7 +264,7 @@ impl Declarations {
             };
             let (is_float, is_signed) = match scalar {
                 Some(Type::Float) => (true, true),
-                Some(Type::Int { signed }) => (false, *signed),
+                Some(Type::Int(signed)) => (false, *signed),
                 _ => {
                     return error(format!(
                         "parameter '{name}' is neither a scalar nor a vector, nor an array of scalars without gaps"

@@ -3,10 +3,9 @@
 //! the pipeline is made, so that a shader needs no second variant.
 
 use super::module::{
-    BOUND, HEADER_WORDS, Instruction, Op, SpirvError, capability, decode, decoration, encode, error, next_id,
-    storage_class, text,
+    BOUND, Capability, HEADER_WORDS, ImageFormat, Instruction, Op, SpirvError, StorageImages, decode, decoration,
+    encode, error, next_id, require, storage_class, text,
 };
-use ::spirv::ImageFormat;
 use std::collections::HashMap;
 
 /// An entry of a table.
@@ -48,14 +47,9 @@ pub(crate) fn storage_to_texel_buffer(
     }
     let mut rewrite = Rewrite { tables, ..Rewrite::default() };
     let mut out = words[..HEADER_WORDS].to_vec();
-    let mut required = vec![capability::IMAGE_BUFFER];
+    require(Capability::ImageBuffer, &instructions, &mut out);
     if rewrite.tables.by_variable.values().any(|(_, entry)| entry.format() == ImageFormat::Rg32f) {
-        required.push(capability::STORAGE_IMAGE_EXTENDED_FORMATS);
-    }
-    for capability in required {
-        if !instructions.iter().any(|i| i.opcode == Op::Capability && i.operands == [capability]) {
-            out.extend(encode(Op::Capability, &[capability]));
-        }
+        require(Capability::StorageImageExtendedFormats, &instructions, &mut out);
     }
     for i in &instructions {
         rewrite.instruction(i.opcode, i.operands, &mut out)?;
@@ -126,8 +120,7 @@ struct Pointee {
 #[derive(Default)]
 struct Rewrite {
     tables: Tables,
-    /// By format: the new image type and the pointer type.
-    new_types: HashMap<ImageFormat, (u32, u32)>,
+    new_types: StorageImages,
     /// By pointer.
     pointees: HashMap<u32, Pointee>,
 }
@@ -138,7 +131,7 @@ impl Rewrite {
         let table = |at: usize| a.get(at).and_then(|id| self.tables.by_variable.get(id)).map(|(_, entry)| *entry);
         match opcode {
             Op::Variable if let Some(entry) = table(1) => {
-                let pointer = self.declare(entry.format(), out);
+                let [_, pointer] = self.declare(entry.format(), out);
                 out.extend(encode(opcode, &[pointer, a[1], 0]));
             }
             // Indices: the only member of the block, an entry, and possibly a component.
@@ -174,28 +167,20 @@ impl Rewrite {
         pointers.is_some_and(|p| p.iter().any(is_table))
     }
 
-    /// Declares the type of a texel buffer and its pointer type, once, and the vector of four floats that every texel is read
-    /// as. Returns the pointer type.
-    fn declare(&mut self, format: ImageFormat, out: &mut Vec<u32>) -> u32 {
-        if self.tables.vec4 == 0 {
-            self.tables.vec4 = next_id(out);
-            out.extend(encode(Op::TypeVector, &[self.tables.vec4, self.tables.float, 4]));
+    /// The type of a texel buffer and that of pointers to it. Declares them once, and the vector of four floats that every texel is read as.
+    fn declare(&mut self, format: ImageFormat, out: &mut Vec<u32>) -> [u32; 2] {
+        let Tables { float, vec4, .. } = &mut self.tables;
+        if *vec4 == 0 {
+            *vec4 = next_id(out);
+            out.extend(encode(Op::TypeVector, &[*vec4, *float, 4]));
         }
-        if let Some((_, pointer)) = self.new_types.get(&format) {
-            return *pointer;
-        }
-        let (image, pointer) = (next_id(out), next_id(out));
-        // Dimension Buffer (5), no depth, not arrayed, not multisampled, used as storage (2).
-        out.extend(encode(Op::TypeImage, &[image, self.tables.float, 5, 0, 0, 0, 2, format as u32]));
-        out.extend(encode(Op::TypePointer, &[pointer, 0, image]));
-        self.new_types.insert(format, (image, pointer));
-        pointer
+        // Dimension Buffer (5), no depth, not arrayed, not multisampled.
+        self.new_types.declare(&[*float, 5, 0, 0, 0], format, out)
     }
 
     /// Loads the texel buffer of a variable.
     fn image(&mut self, variable: u32, out: &mut Vec<u32>) -> u32 {
-        let format = self.tables.by_variable[&variable].1.format();
-        let image_type = self.new_types.get(&format).map_or(0, |types| types.0);
+        let [image_type, _] = self.declare(self.tables.by_variable[&variable].1.format(), out);
         let image = next_id(out);
         out.extend(encode(Op::Load, &[image_type, image, variable]));
         image

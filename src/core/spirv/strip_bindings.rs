@@ -31,8 +31,6 @@ struct Stripped {
     variables: HashSet<u32>,
     /// Images loaded from these variables, and pointers into them.
     parts: HashSet<u32>,
-    /// The pointers among them.
-    pointers: HashSet<u32>,
 }
 
 impl Stripped {
@@ -47,12 +45,10 @@ impl Stripped {
                 {
                     stripped.variables.insert(*id);
                 }
-                (Op::Load, [_, id, from, ..]) if stripped.variables.contains(from) => {
+                (Op::Load | Op::AccessChain | Op::InBoundsAccessChain, [_, id, from, ..])
+                    if stripped.variables.contains(from) =>
+                {
                     stripped.parts.insert(*id);
-                }
-                (Op::AccessChain | Op::InBoundsAccessChain, [_, id, from, ..]) if stripped.variables.contains(from) => {
-                    stripped.parts.insert(*id);
-                    stripped.pointers.insert(*id);
                 }
                 // The image of a texture that is also sampled.
                 (Op::Image, [_, id, from]) if stripped.parts.contains(from) => {
@@ -71,12 +67,7 @@ impl Stripped {
             (Op::Name | Op::Decorate, [id, ..])
             | (Op::Variable | Op::Load | Op::Image | Op::AccessChain | Op::InBoundsAccessChain, [_, id, ..])
                 if is_stripped(id) => {}
-            (Op::Load, [of, result, from, ..]) if self.pointers.contains(from) => {
-                out.extend(encode(Op::Undef, &[*of, *result]));
-            }
-            (Op::ArrayLength, [of, result, from, ..]) if self.variables.contains(from) => {
-                out.extend(encode(Op::Undef, &[*of, *result]));
-            }
+
             // Operands: execution model, function, name, and the variables of its interface.
             (Op::EntryPoint, [_, _, named @ ..]) => {
                 let ends = |word: &u32| word.to_le_bytes().contains(&0);
@@ -85,11 +76,10 @@ impl Stripped {
                 let used = used.iter().copied().filter(|id| !is_stripped(id));
                 out.extend(encode(Op::EntryPoint, &head.iter().copied().chain(used).collect::<Vec<_>>()));
             }
-            (Op::ImageFetch | Op::ImageQuerySizeLod | Op::ImageSampleExplicitLod, [of, result, image, ..])
-                if is_stripped(image) =>
-            {
-                out.extend(encode(Op::Undef, &[*of, *result]));
-            }
+            (
+                Op::Load | Op::ArrayLength | Op::ImageFetch | Op::ImageQuerySizeLod | Op::ImageSampleExplicitLod,
+                [of, result, from, ..],
+            ) if is_stripped(from) => out.extend(encode(Op::Undef, &[*of, *result])),
             (Op::ImageWrite, [image, ..]) if is_stripped(image) => {}
             _ => {
                 // Any other use: calls, stores, copies, samples, selections.

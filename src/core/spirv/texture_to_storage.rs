@@ -4,8 +4,8 @@
 //! rewritten when the pipeline is made: types, loads and fetches, one instruction for one.
 
 use super::module::{
-    BOUND, HEADER_WORDS, Instruction, MAX_BOUND, Op, SpirvError, capability, decode, decoration, encode, error,
-    is_of_images, next_id, text,
+    BOUND, Capability, HEADER_WORDS, Instruction, MAX_BOUND, Op, SpirvError, StorageImages, decode, decoration, encode,
+    error, is_of_images, require, text,
 };
 pub use ::spirv::ImageFormat;
 use std::collections::HashMap;
@@ -36,12 +36,8 @@ pub(crate) fn texture_to_storage(words: &[u32], textures: &[(&str, ImageFormat)]
     let mut rewrite = Rewrite::default();
     rewrite.find(&instructions, textures)?;
     let mut out = words[..HEADER_WORDS].to_vec();
-    if textures.iter().any(|(_, format)| is_extended(*format))
-        && !instructions
-            .iter()
-            .any(|i| i.opcode == Op::Capability && i.operands == [capability::STORAGE_IMAGE_EXTENDED_FORMATS])
-    {
-        out.extend(encode(Op::Capability, &[capability::STORAGE_IMAGE_EXTENDED_FORMATS]));
+    if textures.iter().any(|(_, format)| is_extended(*format)) {
+        require(Capability::StorageImageExtendedFormats, &instructions, &mut out);
     }
     for i in &instructions {
         rewrite.instruction(i.opcode, i.operands, &mut out)?;
@@ -51,12 +47,9 @@ pub(crate) fn texture_to_storage(words: &[u32], textures: &[(&str, ImageFormat)]
 
 #[derive(Default)]
 struct Rewrite {
-    /// The variables that become storage images.
-    formats: HashMap<u32, ImageFormat>,
-    /// By variable: the operands of its image type after the type's identifier, without usage and format.
-    shapes: HashMap<u32, Vec<u32>>,
-    /// By shape and format: the new image type and the pointer type.
-    new_types: HashMap<(Vec<u32>, ImageFormat), (u32, u32)>,
+    /// The variables that become storage images: the operands of the image type after its identifier, without usage and format, and the new format.
+    textures: HashMap<u32, (Vec<u32>, ImageFormat)>,
+    new_types: StorageImages,
     /// By variable: the new type of its image.
     types: HashMap<u32, u32>,
     /// By loaded image: its new type.
@@ -83,13 +76,12 @@ impl Rewrite {
                     if shape[5] != 1 {
                         return error(format!("'{name}' is not a texture"));
                     }
-                    self.formats.insert(i.operands[1], *format);
-                    self.shapes.insert(i.operands[1], shape[..5].to_vec());
+                    self.textures.insert(i.operands[1], (shape[..5].to_vec(), *format));
                 }
                 _ => {}
             }
         }
-        let found = |name: &str| self.formats.keys().any(|id| names.get(id).is_some_and(|called| called == name));
+        let found = |name: &str| self.textures.keys().any(|id| names.get(id).is_some_and(|called| called == name));
         match textures.iter().find(|(name, _)| !found(name)) {
             Some((name, _)) => error(format!("'{name}' is not a texture")),
             None => Ok(()),
@@ -101,12 +93,13 @@ impl Rewrite {
         let loaded = |at: usize| a.get(at).and_then(|id| self.loaded.get(id)).copied();
         let rewritten = match opcode {
             // Every variable has exactly one Binding decoration.
-            Op::Decorate if a.get(1) == Some(&decoration::BINDING) && self.formats.contains_key(&a[0]) => {
+            Op::Decorate if a.get(1) == Some(&decoration::BINDING) && self.textures.contains_key(&a[0]) => {
                 out.extend(encode(Op::Decorate, &[a[0], decoration::NON_WRITABLE]));
                 encode(opcode, a)
             }
-            Op::Variable if self.formats.contains_key(&a[1]) => {
-                let pointer = self.declare(a[1], out);
+            Op::Variable if let Some((shape, format)) = self.textures.get(&a[1]) => {
+                let [image, pointer] = self.new_types.declare(shape, *format, out);
+                self.types.insert(a[1], image);
                 encode(opcode, &[pointer, a[1], a[2]])
             }
             Op::Load if a.len() >= 3 && self.types.contains_key(&a[2]) => {
@@ -143,27 +136,6 @@ impl Rewrite {
         };
         out.extend(rewritten);
         Ok(())
-    }
-
-    /// Declares the storage image type of a variable and its pointer type, once. Returns the pointer type.
-    fn declare(&mut self, variable: u32, out: &mut Vec<u32>) -> u32 {
-        let (shape, format) = (self.shapes[&variable].clone(), self.formats[&variable]);
-        let key = (shape, format);
-        let (image, pointer) = match self.new_types.get(&key) {
-            Some(types) => *types,
-            None => {
-                let (image, pointer) = (next_id(out), next_id(out));
-                let mut operands = vec![image];
-                operands.extend(&key.0);
-                operands.extend([2, format as u32]);
-                out.extend(encode(Op::TypeImage, &operands));
-                out.extend(encode(Op::TypePointer, &[pointer, 0, image]));
-                self.new_types.insert(key, (image, pointer));
-                (image, pointer)
-            }
-        };
-        self.types.insert(variable, image);
-        pointer
     }
 }
 

@@ -107,27 +107,20 @@ impl CacheFile {
     }
 
     fn decode<'a>(&self, bytes: &'a [u8]) -> Result<&'a [u8], String> {
-        let refuse = |why: &str| Err(why.to_string());
-        let Some((header, data)) = bytes.split_at_checked(HEADER) else { return refuse("is cut off in its header") };
+        let (header, data) = bytes.split_at_checked(HEADER).ok_or("is cut off in its header")?;
         // The data is last, so that all before it is the header of this device, driver, program and data.
         let expected = self.encode(data);
-        let same = |range: std::ops::Range<usize>| header[range.clone()] == expected[range];
-        if !same(0..12) {
-            return refuse("is not a pipeline cache of this format");
+        let parts = [
+            (0..12, "is not a pipeline cache of this format"),
+            (12..40, "is of another device or driver"),
+            (40..48, "is of other shaders"),
+            (48..HEADER, "is damaged: its length or its checksum is wrong"),
+        ];
+        match parts.into_iter().find(|(range, _)| header[range.clone()] != expected[range.clone()]) {
+            Some((_, why)) => Err(why.into()),
+            None if !self.is_for_driver(data) => Err("has data of another device or driver".into()),
+            None => Ok(data),
         }
-        if !same(12..40) {
-            return refuse("is of another device or driver");
-        }
-        if !same(40..48) {
-            return refuse("is of other shaders");
-        }
-        if !same(48..HEADER) {
-            return refuse("is damaged: its length or its checksum is wrong");
-        }
-        if !self.is_for_driver(data) {
-            return refuse("has data of another device or driver");
-        }
-        Ok(data)
     }
 
     /// True if data begins with Vulkan's own header, and that is of this device and driver.

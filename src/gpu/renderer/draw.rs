@@ -88,19 +88,18 @@ impl Renderer {
         self.wait_drawn()?;
         let [width, height] = self.program.scene.picture_size();
         // A deep picture is rounded here, where a window shows more.
-        let in_8_bits = |bytes: &[u8], format| match format {
-            Format::Rgba8 => bytes.to_vec(),
-            Format::Bgra8 => bytes.chunks_exact(4).flat_map(|c| [c[2], c[1], c[0], c[3]]).collect(),
-            _ => Texels::decode([width as usize, height as usize, 1], format, bytes).encode(Format::Rgba8),
+        let in_8_bits = |readback: &Readback| {
+            Ok(match readback.image.1 {
+                Format::Rgba8 => readback.bytes()?.into_owned(),
+                Format::Bgra8 => readback.bytes()?.chunks_exact(4).flat_map(|c| [c[2], c[1], c[0], c[3]]).collect(),
+                _ => readback.texels()?.encode(Format::Rgba8),
+            })
         };
         let rgba = match &self.drawing.readback {
-            Some(readback) => in_8_bits(&readback.bytes()?, Slot::Screen.format(&self.program.scene)),
-            None => match self.bring_back(Slot::Screen)? {
-                Some((readback, _, format)) => in_8_bits(&readback.bytes()?, format),
-                None => Vec::new(),
-            },
+            Some(readback) => in_8_bits(readback),
+            None => self.bring_back(Slot::Screen)?.as_ref().map_or(Ok(Vec::new()), in_8_bits),
         };
-        Ok(Picture { width, height, rgba })
+        Ok(Picture { width, height, rgba: rgba? })
     }
 
     /// Waits for the picture in flight. Returns it, or `None` if pictures stay on the device.
@@ -182,8 +181,8 @@ impl Renderer {
         let Some(volume) = volume else { return Ok(()) };
         let (scene, bytes) = (&self.program.scene, volume.bytes()?);
         let found = self.queues.host(name, |_| (search.find)(scene, &bytes));
-        if let Some(unveiled) = found.unveiled {
-            self.volumes.set_unveiled(unveiled);
+        if found.unveiled.is_some() {
+            self.volumes.unveiled[shown as usize] = found.unveiled;
         }
         self.drawing.record_upload(&mut self.queues, &self.slots, name, (target, shown), &found.texels)
     }

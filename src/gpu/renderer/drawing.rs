@@ -3,7 +3,7 @@
 use super::RendererOptions;
 use crate::bands::BandLimit;
 use crate::buffers::{Readback, Upload};
-use crate::command_recorder::{CommandRecorder, Dispatch, SlotParts};
+use crate::command_recorder::{CommandRecorder, Dispatch};
 use crate::context::Context;
 use crate::device_queues::DeviceQueues;
 use crate::error::GpuError;
@@ -13,6 +13,7 @@ use crate::plan::Work;
 use crate::resources::{Image, SlotResources};
 use crate::scene::Scene;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
 /// The picture that is being drawn or was drawn last, and the buffers of its copies. Every method that returns a [`GpuError`] does so if the device
 /// fails.
@@ -54,7 +55,7 @@ impl Drawing {
         }
         Ok(Drawing {
             recorder: CommandRecorder::new(context, 0, "picture", options.time_stamps, options.spans)?,
-            readback: options.readback.then(|| readback(context, scene)).transpose()?,
+            readback: options.readback.then(|| Readback::new(context, "readback", picture_image(scene))).transpose()?,
             uploads: Vec::new(),
             unread: Vec::new(),
             context: context.clone(),
@@ -68,9 +69,9 @@ impl Drawing {
 
     /// Makes the readback buffer that of the scene's picture.
     pub fn fit(&mut self, scene: &Scene) -> Result<(), GpuError> {
-        let (shape, texel_bytes) = picture_image(scene);
-        if self.readback.as_ref().is_some_and(|readback| !readback.is_for(shape, texel_bytes)) {
-            self.readback = Some(readback(&self.context, scene)?);
+        let image = picture_image(scene);
+        if self.readback.as_ref().is_some_and(|readback| readback.image != image) {
+            self.readback = Some(Readback::new(&self.context, "readback", image)?);
         }
         Ok(())
     }
@@ -101,11 +102,11 @@ impl Drawing {
     ) -> Result<(), GpuError> {
         let Some(there) = slots.image(slot, 0) else { return Ok(()) };
         // Before the recording: what was begun has to be submitted.
-        let (upload, place) = self.staged("upload", there, (slot, 0), bytes)?;
+        let upload = Upload::new(&self.context, "upload", there.layout(), there.all_parts((slot, 0)), bytes)?;
         self.recorder.begin(queues)?;
         // A layer that tracks submissions of two threads forgets what was between this upload and the last one.
         self.recorder.show_layer_the_wait();
-        self.recorder.upload(queues, &upload, there, place);
+        self.recorder.upload(queues, &upload, there);
         self.uploads.push(upload);
         self.recorder.submit(queues)?;
         queues.timelines.wait_all()?;
@@ -113,21 +114,19 @@ impl Drawing {
         Ok(())
     }
 
-    /// Reads back an image slot; for a multibuffered slot, the copy of volume image `image`. Returns the buffers with its bytes, its number of texels
-    /// along x, y and z, and its format. None for a slot that is no image.
+    /// Reads back an image slot; for a multibuffered slot, the copy of the volume image of `place`. None for a slot that is no image.
     pub(crate) fn bring_back(
         &mut self,
         queues: &mut DeviceQueues,
         slots: &SlotResources,
-        (slot, image): (Slot, u32),
-    ) -> Result<Option<(Readback, [usize; 3], Format)>, GpuError> {
-        let Some(there) = slots.image(slot, image) else { return Ok(None) };
+        place: (Slot, u32),
+    ) -> Result<Option<Readback>, GpuError> {
+        let Some(there) = slots.image(place.0, place.1) else { return Ok(None) };
         // Before the recording: what was begun has to be submitted.
-        let buffer = Readback::new(&self.context, "read", there.shape, there.format.texel_bytes())?;
+        let buffer = Readback::new(&self.context, "read", there.layout())?;
         self.recorder.collect(queues)?;
         self.recorder.begin(queues)?;
-        let buffer = self.copy_out(queues, there, (slot, image), buffer, CommandRecorder::submit)?;
-        Ok(Some((buffer, there.shape.size(), there.format)))
+        self.copy_out(queues, there, place, buffer, CommandRecorder::submit).map(Some)
     }
 
     /// Begins the recording of a picture. `work`: the most expensive part of the rendering that it will run.
@@ -155,7 +154,7 @@ impl Drawing {
         place: (Slot, u32),
     ) -> Result<Option<Readback>, GpuError> {
         let Some(there) = slots.image(place.0, place.1) else { return Ok(None) };
-        let buffer = Readback::new(&self.context, name, there.shape, there.format.texel_bytes())?;
+        let buffer = Readback::new(&self.context, name, there.layout())?;
         self.copy_out(queues, there, place, buffer, CommandRecorder::cut).map(Some)
     }
 
@@ -164,11 +163,11 @@ impl Drawing {
         &mut self,
         queues: &mut DeviceQueues,
         there: &Image,
-        (slot, image): (Slot, u32),
+        place: (Slot, u32),
         buffer: Readback,
         submit: fn(&mut CommandRecorder, &mut DeviceQueues) -> Result<(), GpuError>,
     ) -> Result<Readback, GpuError> {
-        self.recorder.copy_out(queues, there, slot, if slot.is_multibuffered() { image } else { 0 }, &buffer);
+        self.recorder.copy_out(queues, there, place, &buffer);
         match submit(&mut self.recorder, queues).and_then(|()| queues.timelines.wait_all()) {
             Ok(()) => Ok(buffer),
             Err(error) => {
@@ -179,38 +178,26 @@ impl Drawing {
         }
     }
 
-    /// Records, as part of the picture, the upload of a slot; for a multibuffered slot, of the copy of volume image `image`.
+    /// Records, as part of the picture, the upload of a slot; for a multibuffered slot, of the copy of the volume image of `place`.
     pub(crate) fn record_upload(
         &mut self,
         queues: &mut DeviceQueues,
         slots: &SlotResources,
         name: &'static str,
-        (slot, image): (Slot, u32),
+        place: (Slot, u32),
         texels: &[u8],
     ) -> Result<(), GpuError> {
-        let Some(there) = slots.image(slot, image) else { return Ok(()) };
-        let (upload, place) = self.staged(name, there, (slot, image), texels)?;
-        self.recorder.upload(queues, &upload, there, place);
+        let Some(there) = slots.image(place.0, place.1) else { return Ok(()) };
+        let upload = Upload::new(&self.context, name, there.layout(), there.all_parts(place), texels)?;
+        self.recorder.upload(queues, &upload, there);
         self.uploads.push(upload);
         Ok(())
-    }
-
-    fn staged(
-        &self,
-        name: &'static str,
-        there: &Image,
-        (slot, image): (Slot, u32),
-        texels: &[u8],
-    ) -> Result<(Upload, SlotParts), GpuError> {
-        let copy = if slot.is_multibuffered() { image } else { 0 };
-        let place = SlotParts { slot, copy, parts: 0..there.shape.parts() };
-        Ok((Upload::new(&self.context, name, there.layout(), place.parts.clone(), texels)?, place))
     }
 
     /// Submits what was recorded of the picture since [`Drawing::begin`], and its readback if there is one, without waiting for it.
     pub fn submit(&mut self, queues: &mut DeviceQueues, slots: &SlotResources) -> Result<(), GpuError> {
         if let (Some(screen), Some(readback)) = (slots.image(Slot::Screen, 0), &self.readback) {
-            self.recorder.copy_out(queues, screen, Slot::Screen, 0, readback);
+            self.recorder.copy_out(queues, screen, (Slot::Screen, 0), readback);
             self.recorder.stamp(queues, "readback")?;
         }
         queues.host("submit", |queues| self.recorder.submit(queues))?;
@@ -220,7 +207,8 @@ impl Drawing {
 
     /// True if the device is at work on a picture. It also submits what is held back of the picture and due.
     pub fn is_drawing(&self, queues: &DeviceQueues) -> Result<bool, GpuError> {
-        Ok(self.is_in_flight && (!self.recorder.is_done(queues)? || self.context.faults.holds_pictures()))
+        let is_held = self.context.faults.holds_pictures.load(Ordering::Relaxed);
+        Ok(self.is_in_flight && (!self.recorder.is_done(queues)? || is_held))
     }
 
     /// Waits for the picture in flight.
@@ -249,12 +237,7 @@ impl Drawing {
     }
 }
 
-fn readback(context: &Arc<Context>, scene: &Scene) -> Result<Readback, GpuError> {
-    let (shape, texel_bytes) = picture_image(scene);
-    Readback::new(context, "readback", shape, texel_bytes)
-}
-
-/// Shape and bytes of a texel of the picture's image.
-fn picture_image(scene: &Scene) -> (Shape, usize) {
-    (Slot::Screen.shape(scene), Slot::Screen.format(scene).texel_bytes())
+/// Shape and format of the picture's image.
+fn picture_image(scene: &Scene) -> (Shape, Format) {
+    (Slot::Screen.shape(scene), Slot::Screen.format(scene))
 }

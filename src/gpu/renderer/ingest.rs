@@ -2,8 +2,8 @@
 //! one submission, and one dispatch of each pass. Frames that need no conversion are only copied.
 
 use super::Program;
-use crate::buffers::{Buffer, Purpose};
-use crate::command_recorder::{BufferLayout, CommandRecorder, SlotParts};
+use crate::buffers::{Buffer, Purpose, SlotParts};
+use crate::command_recorder::{BufferLayout, CommandRecorder};
 use crate::context::Context;
 use crate::device_queues::DeviceQueues;
 use crate::error::GpuError;

@@ -322,6 +322,11 @@ impl Renderer {
         self.compiler.prepare(scene)
     }
 
+    /// Frees the renderer but not its compiled pipelines: until what is returned is dropped, a new renderer of the context finds them.
+    pub fn into_pipelines(self) -> impl Sized {
+        self.compiler.pipelines.clone()
+    }
+
     /// Compiles the pipelines of further scenes in the background while no other pipeline is needed, in this order. They replace the scenes
     /// of an earlier call. Scenes that this device cannot draw are left out.
     ///
@@ -411,8 +416,6 @@ impl Renderer {
         if let Some(fault) = &self.broken {
             return Err(GpuError::Broken(fault.clone()));
         }
-        // Its thread may be compiling the previous source.
-        self.compiler.stop();
         self.drawing.wait_presented(&self.queues)?;
         self.collect()?;
         let Program { scene, plan, pipelines } = &mut self.program;
@@ -458,14 +461,13 @@ impl Renderer {
     /// # Errors
     /// The device fails, or the last change of the scene failed.
     pub fn read(&mut self, slot: Slot) -> Result<Option<Texels>, GpuError> {
-        let Some((readback, size, format)) = self.bring_back(slot)? else { return Ok(None) };
-        let part = Texels::decode(size, format, &readback.bytes()?);
+        let Some(readback) = self.bring_back(slot)? else { return Ok(None) };
         // What is not stored of a volume is what no pass would have written.
-        Ok(Some(part.with_outside(slot, &self.program.scene, 0.0)))
+        Ok(Some(readback.texels()?.with_outside(slot, &self.program.scene, 0.0)))
     }
 
-    /// The current bytes of an image slot, its texels along x, y, z, and their format.
-    fn bring_back(&mut self, slot: Slot) -> Result<Option<(Readback, [usize; 3], Format)>, GpuError> {
+    /// The current texels of an image slot.
+    fn bring_back(&mut self, slot: Slot) -> Result<Option<Readback>, GpuError> {
         let shown = self.volumes.shown;
         self.check(shown)?;
         self.flush()?;
@@ -485,7 +487,7 @@ impl Renderer {
     /// Number of passes and copies since the last call that could not be timed, because too many frames arrived while a picture was drawn, or because
     /// one recording needed more time stamps than its queries hold.
     pub fn take_untimed(&mut self) -> u64 {
-        self.queues.timings.take_untimed()
+        std::mem::take(&mut self.queues.timings.untimed)
     }
 
     /// The times, ns, that were read since the last call of this or of [`Renderer::take_times`]. It does not wait: work in flight appears in a later

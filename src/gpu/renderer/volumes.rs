@@ -20,7 +20,7 @@ pub(super) struct Volumes {
     /// What the CPU found and the device has: the slot that holds it, and the volume image that it was found in.
     found: Vec<(Slot, u32)>,
     /// By volume image: what the CPU found of its volume, where the render start follows the fluid.
-    unveiled: Vec<Option<Unveiled>>,
+    pub unveiled: Vec<Option<Unveiled>>,
 }
 
 impl Volumes {
@@ -100,9 +100,5 @@ impl Volumes {
     /// The start surface that the CPU last found in the shown volume image. None if there is none.
     pub fn unveiled(&self) -> Option<&Unveiled> {
         self.unveiled[self.shown as usize].as_ref()
-    }
-
-    pub(crate) fn set_unveiled(&mut self, unveiled: Unveiled) {
-        self.unveiled[self.shown as usize] = Some(unveiled);
     }
 }

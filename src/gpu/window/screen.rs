@@ -4,7 +4,7 @@
 use super::PresentMode;
 use super::composition::{self, Composition};
 use super::panel_textures::{PanelTextures, failed};
-use super::swapchain::Swapchain;
+use super::swapchain::{Swapchain, SwapchainImage};
 use super::target::{Target, choose_monitor};
 use crate::barriers::{Access, PipelineStage};
 use crate::context::Context;
@@ -174,9 +174,10 @@ impl Screen {
         if let Content::Picture(drawn) = &content {
             // What is held back of the picture comes before its copy.
             drawn.queues.timelines.release()?;
-            if drawn.is_kept && self.kept.as_ref().is_none_or(|kept| !kept.is_like(drawn.image)) {
+            let (shape, format) = drawn.image.layout();
+            if drawn.is_kept && self.kept.as_ref().is_none_or(|kept| kept.layout() != (shape, format)) {
                 self.kept = None;
-                self.kept = Some(drawn.image.another(&self.context, Slot::Screen)?);
+                self.kept = Some(Image::new(&self.context, Slot::Screen, shape, format)?);
             }
         }
         if let Some(panels) = &mut panels {
@@ -306,10 +307,7 @@ impl Screen {
         let (device, commands) = (self.context.device.clone(), self.commands);
         let (size, format) = (self.chain.size, self.chain.format);
         let last = self.fit_composition(panels.is_some())?;
-        let (shown, after) = {
-            let shown = &self.chain.images[image as usize];
-            (shown.handle, shown.drawn)
-        };
+        let SwapchainImage { handle: shown, drawn: after } = self.chain.images[image as usize];
         let target = self.composition.as_ref().map_or(shown, |composition| composition.image.handle);
         let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
         // SAFETY: the last drawing is done, so the pool's only command buffer is free.
@@ -330,16 +328,13 @@ impl Screen {
             at = to;
         };
         go(Stage::Copied);
-        let mut queued = None;
-        let region = match (&*content, &self.kept) {
-            (Content::Picture(drawn), _) => Some(region(drawn.image, drawn.at, size)),
-            (Content::Kept(at), Some(kept)) => Some(region(kept, *at, size)),
+        let picture = match (&*content, &self.kept) {
+            (Content::Picture(drawn), _) => Some((drawn.image, drawn.at)),
+            (Content::Kept(at), Some(kept)) => Some((kept, *at)),
             (Content::Kept(_), None) | (Content::Nothing, _) => None,
         };
-        let place = region.map(|(copy, covered)| {
-            let corner = copy.dst_offset;
-            [[corner.x as u32, corner.y as u32], covered]
-        });
+        let region = picture.map(|(from, at)| region(from, at, size));
+        let place = picture.zip(region).map(|((_, at), (_, covered))| [at, covered]);
         // Where the panels beside the picture stay, they are not drawn.
         let damage = match (last, place, panels) {
             (Some(last), Some(place), Some(panels)) => last.damage(&panels.shapes, panels.scale, place, size),
@@ -352,31 +347,23 @@ impl Screen {
             unsafe { device.cmd_clear_color_image(commands, target, layout, &colour, &[WHOLE]) };
             go(Stage::Copied);
         }
+        if let Content::Picture(drawn) = content {
+            drawn.queues.begin(0);
+            let read = Access::of_slot(Slot::Screen, 0, 0..drawn.image.shape.parts(), false, PipelineStage::Copy);
+            drawn.queues.before(&self.context, 0, commands, &[read]);
+        }
         let mut is_converted = false;
-        let mut place_picture = |from: &Image, region: vk::ImageCopy| {
+        let visible = region.filter(|(_, [w, h])| *w > 0 && *h > 0);
+        if let (Some((from, _)), Some((region, _))) = (picture, visible) {
             is_converted = formats::vulkan(from.format) != format;
             put(&device, commands, from, target, region, is_converted);
-        };
-        let visible = region.filter(|(_, [w, h])| *w > 0 && *h > 0).map(|(region, _)| region);
-        match content {
-            Content::Picture(drawn) => {
-                drawn.queues.begin(0);
-                let read = Access::of_slot(Slot::Screen, 0, 0..drawn.image.shape.parts(), false, PipelineStage::Copy);
-                drawn.queues.before(&self.context, 0, commands, &[read]);
-                if let Some(region) = visible {
-                    place_picture(drawn.image, region);
-                }
-                if let Some(kept) = self.kept.as_ref().filter(|_| drawn.is_kept) {
-                    drawn.image.copy_to(&device, commands, kept);
-                }
-                queued = Some(&mut *drawn.queues);
+        }
+        let mut queued = None;
+        if let Content::Picture(drawn) = content {
+            if let Some(kept) = self.kept.as_ref().filter(|_| drawn.is_kept) {
+                drawn.image.copy_to(&device, commands, kept);
             }
-            Content::Kept(_) => {
-                if let (Some(kept), Some(region)) = (&self.kept, visible) {
-                    place_picture(kept, region);
-                }
-            }
-            Content::Nothing => {}
+            queued = Some(&mut *drawn.queues);
         }
         if let (Some(panels), Some(overlay), Some(composition)) = (panels, &mut self.overlay, &self.composition) {
             overlay.textures.record(commands);
@@ -454,22 +441,16 @@ impl Screen {
         unsafe { self.context.device.reset_fences(&[self.done]) }.context(|| "reset a fence".into())?;
         self.submitted = Instant::now();
         let sent = self.context.submit(0, &submit, self.done, || "submit 'window'".into());
-        if let Err(error) = sent {
-            // No submission in flight would signal the fence.
-            self.signal();
-            return Err(error);
-        }
+        sent.inspect_err(|_| {
+            // No submission in flight would signal the fence: an empty one does. If that fails too, the device is lost and nothing waits for it.
+            // SAFETY: the fence is not in use.
+            let _ = self.context.on_queue(|queue| unsafe { self.context.device.queue_submit2(queue, &[], self.done) });
+        })?;
         if let Some(queues) = queued {
             queues.timelines.0[0].advance("window");
             queues.submitted(0, &after, queues.timelines.0[0].submitted);
         }
         Ok(())
-    }
-
-    /// Signals the fence by an empty submission. If that fails too, the device is lost and nothing waits for the fence.
-    fn signal(&self) {
-        // SAFETY: the fence is not in use.
-        let _ = self.context.on_queue(|queue| unsafe { self.context.device.queue_submit2(queue, &[], self.done) });
     }
 }
 

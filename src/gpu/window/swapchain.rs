@@ -54,14 +54,13 @@ impl Swapchain {
     /// The device cannot present on the target.
     pub fn new(context: &Arc<Context>, target: Target, present_mode: PresentMode) -> Result<Swapchain, GpuError> {
         let surface = target.surface(&context.entry, &context.instance, context.candidate.handle)?;
-        let (handle, images, format) = (vk::SwapchainKHR::null(), Vec::new(), vk::Format::UNDEFINED);
         let mut made = Swapchain {
             context: context.clone(),
             target,
             surface,
-            handle,
-            images,
-            format,
+            handle: vk::SwapchainKHR::null(),
+            images: Vec::new(),
+            format: vk::Format::UNDEFINED,
             size: [0; 2],
             present_mode,
             waiter: None,
@@ -79,29 +78,22 @@ impl Swapchain {
 
     fn choose_format(&self) -> Result<vk::Format, GpuError> {
         let (device, family) = (self.context.candidate.handle, self.context.queue(0).family);
+        let surfaces = &self.presentation()?.surfaces;
         // SAFETY: surface and device belong to this instance; the call only reads.
-        let is_supported =
-            unsafe { self.presentation()?.surfaces.get_physical_device_surface_support(device, family, self.surface) };
+        let is_supported = unsafe { surfaces.get_physical_device_surface_support(device, family, self.surface) };
         if is_supported != Ok(true) {
             // No other query is allowed for such a surface.
             return Err(GpuError::Window("the surface is gone, or the device cannot present on it".into()));
         }
         // SAFETY: surface and device belong to this instance; the call only reads.
-        let there = unsafe {
-            self.presentation()?
-                .surfaces
-                .get_physical_device_surface_formats(self.context.candidate.handle, self.surface)
-        }
-        .context(|| "list the formats of the surface".into())?;
+        let there = unsafe { surfaces.get_physical_device_surface_formats(device, self.surface) }
+            .context(|| "list the formats of the surface".into())?;
         let needed = vk::FormatFeatureFlags::BLIT_DST
             | vk::FormatFeatureFlags::TRANSFER_SRC
             | vk::FormatFeatureFlags::COLOR_ATTACHMENT_BLEND;
         let found = choose(&there, |format| self.context.format_features(format).contains(needed));
-        let found = found.ok_or_else(|| {
-            GpuError::Window(
-                "the surface supports no UNORM format of 8 or 10 bits that pictures can be copied to".into(),
-            )
-        })?;
+        let none = "the surface supports no UNORM format of 8 or 10 bits that pictures can be copied to";
+        let found = found.ok_or_else(|| GpuError::Window(none.into()))?;
         // Pictures are made so from the next change of the scene on.
         let of_pictures = match found {
             deep if DEEP.contains(&deep) => WindowTexels::Deep,

@@ -195,13 +195,9 @@ fn plane(
     for (number, plane) in (0..).zip(&planes) {
         let is_free = plane.current_display == vk::DisplayKHR::null() || plane.current_display == display;
         // SAFETY: as above; the plane's number is one of those listed.
-        let (reaches, can) = unsafe {
-            (
-                displays.get_display_plane_supported_displays(device, number).unwrap_or_default(),
-                displays.get_display_plane_capabilities(device, mode, number),
-            )
-        };
-        let Ok(can) = can else { continue };
+        let reaches = unsafe { displays.get_display_plane_supported_displays(device, number) }.unwrap_or_default();
+        // SAFETY: as above.
+        let Ok(can) = (unsafe { displays.get_display_plane_capabilities(device, mode, number) }) else { continue };
         if is_free && reaches.contains(&display) {
             let alphas = [
                 vk::DisplayPlaneAlphaFlagsKHR::OPAQUE,

@@ -39,7 +39,7 @@ pub struct Dial {
 impl Dial {
     /// True if its settings are ways to take samples along rays, so that exact rays can be its reference.
     pub(crate) fn samples_rays(&self) -> bool {
-        [
+        let names = [
             "step",
             "tolerance",
             "compositing",
@@ -50,8 +50,8 @@ impl Dial {
             "brick",
             "transfer",
             "pipeline",
-        ]
-        .contains(&self.name)
+        ];
+        names.contains(&self.name)
     }
 }
 
@@ -66,13 +66,7 @@ fn fineness(scene: &Scene) -> [f64; 2] {
     let rays = scene.ray_size().iter().map(|n| f64::from(*n)).product::<f64>();
     let each = if scene.lit_by_volume().is_some() { 6.0 } else { 1.0 };
     let samples = rays * (scene.high - scene.low).length() / scene.step * each;
-    let most = if samples * 32.0 <= MOST_SAMPLES {
-        32.0
-    } else if samples * 16.0 <= MOST_SAMPLES {
-        16.0
-    } else {
-        8.0
-    };
+    let most = [32.0, 16.0].into_iter().find(|factor| samples * factor <= MOST_SAMPLES).unwrap_or(8.0);
     [most, most / 2.0]
 }
 
@@ -247,34 +241,18 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
             made("light left", is(format!("{now:.4}"), now), others.collect(), &fine("0.0"), &fine("0.0001"))
         }
         "sigma" => {
+            let (unfixed, ungrown) = ("slices.sigma=none".to_string(), "slices.enhanced_sigma=none".to_string());
             let fixed = |n: u32| {
-                at(
-                    format!("fixed {n}"),
-                    &["slices.enhanced_sigma=none".into(), format!("slices.sigma={{window={n},sigma=0.1}}")],
-                    f64::from(n),
-                )
+                let set = [ungrown.clone(), format!("slices.sigma={{window={n},sigma=0.1}}")];
+                at(format!("fixed {n}"), &set, f64::from(n))
             };
-            let grown = |n: u32, most: u32| {
-                at(
-                    format!("growing {n}"),
-                    &[
-                        "slices.sigma=none".into(),
-                        format!("slices.enhanced_sigma={{window={n},largest={most},sigma=0.1}}"),
-                    ],
-                    f64::from(n),
-                )
+            let grown = |[n, most]: [u32; 2]| {
+                let enhanced = format!("slices.enhanced_sigma={{window={n},largest={most},sigma=0.1}}");
+                at(format!("growing {n}"), &[unfixed.clone(), enhanced], f64::from(n))
             };
-            let others = vec![
-                at("none".into(), &["slices.sigma=none".into(), "slices.enhanced_sigma=none".into()], 1.0),
-                fixed(3),
-                fixed(5),
-                fixed(7),
-                fixed(9),
-                fixed(11),
-                grown(3, 17),
-                grown(5, 19),
-                grown(7, 19),
-            ];
+            let mut others = vec![at("none".into(), &[unfixed.clone(), ungrown.clone()], 1.0)];
+            others.extend([3, 5, 7, 9, 11].map(fixed));
+            others.extend([[3, 17], [5, 19], [7, 19]].map(grown));
             look("pixels", others)
         }
         "perona-malik" => {
@@ -285,20 +263,18 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
             let time = p.step * f64::from(p.repeat);
             let diffused = |scheme: Scheme, n: u32| {
                 let (scheme, conductance, step) = (word(&scheme), word(&p.conductance), time / f64::from(n));
-                let edge = p.edge;
-                vec![format!(
-                    "slices.perona_malik={{scheme='{scheme}',edge={edge:?},conductance='{conductance}',step={step:?},repeat={n}}}"
-                )]
+                let steps = format!("edge={:?},conductance='{conductance}',step={step:?},repeat={n}", p.edge);
+                [format!("slices.perona_malik={{scheme='{scheme}',{steps}}}")]
             };
             let place = |scheme: Scheme, n: u32| {
                 at(format!("{} {n}", word(&scheme)), &diffused(scheme, n), time / f64::from(n))
             };
             // The explicit scheme is stable up to steps of 1/4.
             let least = (4.0 * time).ceil().clamp(1.0, 100.0) as u32;
-            let others = [1.0, 1.25, 2.5, 5.0].map(|f| place(Scheme::Explicit, (f64::from(least) * f).ceil() as u32));
-            let mut others = Vec::from(others);
-            others.extend([1, 2, 4, 8, 16].into_iter().map(|n| place(Scheme::Aos, n)));
-            others.extend([1, 2, 4, 8].into_iter().map(|n| place(Scheme::AosRichardson, n)));
+            let explicit = |f: f64| place(Scheme::Explicit, (f64::from(least) * f).ceil() as u32);
+            let mut others = Vec::from([1.0, 1.25, 2.5, 5.0].map(explicit));
+            others.extend([1, 2, 4, 8, 16].map(|n| place(Scheme::Aos, n)));
+            others.extend([1, 2, 4, 8].map(|n| place(Scheme::AosRichardson, n)));
             // A step of RKL1 has about sqrt(8 step) stages.
             let stepped = [1, 2, 4, 8].into_iter().filter(|n| time / f64::from(*n) <= 200.0);
             others.extend(stepped.map(|n| place(Scheme::Rkl1, n)));
@@ -403,13 +379,8 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
         "light-cell" => {
             need(scene.lit_by_volume().is_some(), "has no light volume")?;
             let lattice = scene.light_lattice();
-            let (now, [total, along]) = (
-                lattice.cell,
-                [
-                    lattice.count.iter().map(|n| f64::from(*n)).product(),
-                    f64::from(lattice.count.into_iter().max().unwrap_or(1)),
-                ],
-            );
+            let (now, counts) = (lattice.cell, lattice.count.map(f64::from));
+            let (total, along) = (counts.iter().product::<f64>(), counts.into_iter().fold(1.0, f64::max));
             // The finest lattice that a device is asked for, at most four times as fine as the scene's. Every point is coarser than it and the next one.
             let finest = now * (f64::max(total / MOST_LIGHT_CELLS, 1.0 / 64.0)).cbrt().max(along / 1000.0);
             let finest = finest.max(light_volume::least_cell(scene));

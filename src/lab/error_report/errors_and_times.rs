@@ -219,26 +219,23 @@ impl ErrorMeasurement<'_> {
             true => OwnError::default(),
             false => OwnError::of(&compare(dial, &[], &self.rendered(&others)?, &rendering)?),
         };
-        let both = |light: OwnError| OwnError {
-            rmse: light.rmse.hypot(others.rmse),
-            levels: light.levels.hypot(others.levels),
-        };
-        match richardson::extrapolated([&coarse.picture, &middle.picture, &rendering.picture], edges) {
+        let found = richardson::extrapolated([&coarse.picture, &middle.picture, &rendering.picture], edges);
+        let (before, order) = match found {
             Ok(found) if found.order.is_finite() => {
-                let before = Rendering { picture: found.coarser, ..middle };
                 rendering.picture = found.picture;
-                let error = both(OwnError::of(&compare(dial, &[], &before, &rendering)?));
-                let set = finest.to_vec();
-                let reference = Reference::Extrapolated { set, cells: edges, order: found.order, rmse: error.rmse };
-                Ok(Finest { rendering, reference, error })
+                (Rendering { picture: found.coarser, ..middle }, Some(found.order))
             }
             // The same light in both, or differences that are no power of the cell: the last of them bounds what is left.
-            _ => {
-                let error = both(OwnError::of(&compare(dial, &[], &middle, &rendering)?));
-                let reference = Reference::Converged { set: finest.to_vec(), rmse: error.rmse };
-                Ok(Finest { rendering, reference, error })
-            }
-        }
+            _ => (middle, None),
+        };
+        let light = OwnError::of(&compare(dial, &[], &before, &rendering)?);
+        let (rmse, levels) = (light.rmse.hypot(others.rmse), light.levels.hypot(others.levels));
+        let set = finest.to_vec();
+        let reference = match order {
+            Some(order) => Reference::Extrapolated { set, cells: edges, order, rmse },
+            None => Reference::Converged { set, rmse },
+        };
+        Ok(Finest { rendering, reference, error: OwnError { rmse, levels } })
     }
 
     /// What each source adds to the error of the scene, and all of them.
@@ -549,9 +546,8 @@ fn compare(
     let (channels, all) = (picture.channels.max(1), picture.values.len() / picture.channels.max(1));
     for (n, _) in changed.iter().enumerate().filter(|(_, is_changed)| **is_changed) {
         let texel = n * channels..(n + 1) * channels;
-        if let (Some(own), Some(expected)) =
-            (picture.values.get_mut(texel.clone()), reference.picture.values.get(texel))
-        {
+        let expected = reference.picture.values.get(texel.clone());
+        if let Some((own, expected)) = picture.values.get_mut(texel).zip(expected) {
             own.copy_from_slice(expected);
         }
     }

@@ -1,5 +1,6 @@
 //! An error report as text: CSV for other programs, and a summary table for a terminal.
 
+use super::convergence::Fit;
 use super::metrics::SurfaceError;
 use super::{Errors, Measure, Reference, Report, Time, Times, choose};
 use crate::text::csv_field;
@@ -82,21 +83,10 @@ fn held(reference: &Reference) -> String {
 fn errors_head(measure: Measure, has_surface: bool) -> String {
     // The columns of the picture are always there; those of other measures are of the surface.
     let first = if measure == Measure::Levels { Measure::Rmse } else { measure };
-    let mut text = format!(
-        "{:>10} {:>9} {:>9} {:>9} {:>8} {:>8} {:>7} {:>7}",
-        first.name().split(" of").next().unwrap_or_default(),
-        "largest",
-        "median lv",
-        "p95 lv",
-        "> 1 lv",
-        "> 8 lv",
-        "PSNR",
-        "SSIM",
-    );
-    if has_surface {
-        let _ = write!(text, " {:>9} {:>8} {:>8} {:>8} {:>8}", "median mm", "lost", "gained", "jumps", "deg RMS");
-    }
-    text
+    let first = first.name().split(" of").next().unwrap_or_default();
+    // The columns are as wide as those of `errors_row`.
+    let surface = if has_surface { " median mm     lost   gained    jumps  deg RMS" } else { "" };
+    format!("{first:>10}   largest median lv    p95 lv   > 1 lv   > 8 lv    PSNR    SSIM{surface}")
 }
 
 /// The errors of a picture as columns of a table: before tone, in levels of 255 after it, and of the surface.
@@ -146,18 +136,11 @@ pub fn summary_table(report: &Report, measure: Measure) -> String {
         "sizes    volume {w} x {h} x {k}, picture {x} x {y}; {} runs a place in turn with the scene as it is, {interval}, {}",
         report.repeats, report.date
     );
+    let head = errors_head(measure, has_surface);
     for dial in &report.dials {
         let unit = if dial.unit.is_empty() { String::new() } else { format!(", {}", dial.unit) };
         let _ = writeln!(text, "\n{}{unit}: {}", dial.name, held(&dial.reference));
-        let _ = writeln!(
-            text,
-            "  {:<16} {}   {:>9} {:>9} {:>18}",
-            "",
-            errors_head(measure, has_surface),
-            "volume ms",
-            "picture",
-            "ratio"
-        );
+        let _ = writeln!(text, "  {:<16} {head}   {:>9} {:>9} {:>18}", "", "volume ms", "picture", "ratio");
         for point in &dial.points {
             let time = match (point.times, point.ratios.map(|r| r.total)) {
                 (Some(t), Some(r)) => {
@@ -167,23 +150,15 @@ pub fn summary_table(report: &Report, measure: Measure) -> String {
                 }
                 _ => format!("{:>9}", "no stamps"),
             };
-            let _ = writeln!(
-                text,
-                "{} {:<16} {}   {time}",
-                if point.is_default { "*" } else { " " },
-                point.label,
-                errors_row(&point.errors, measure, has_surface),
-            );
+            let mark = if point.is_default { "*" } else { " " };
+            let errors = errors_row(&point.errors, measure, has_surface);
+            let _ = writeln!(text, "{mark} {:<16} {errors}   {time}", point.label);
         }
         if let Some(note) = &dial.note {
             let _ = writeln!(text, "  {note}");
         }
-        if let Some(order) = &dial.order {
-            let _ = writeln!(
-                text,
-                "  order {:.2} +- {:.2} over {} places",
-                order.order, order.standard_error, order.points
-            );
+        if let Some(Fit { order, standard_error, points, .. }) = &dial.order {
+            let _ = writeln!(text, "  order {order:.2} +- {standard_error:.2} over {points} places");
         }
         if let Some(floor) = dial.floor {
             let _ = writeln!(text, "  the device's own floor, its arithmetic and formats alone: RMSE {floor:.1e}");
@@ -212,21 +187,14 @@ pub fn summary_table(report: &Report, measure: Measure) -> String {
 /// What each approximation adds to the error of the scene.
 fn budget_table(text: &mut String, report: &Report, measure: Measure, has_surface: bool) {
     let budget = &report.budget;
-    let _ = writeln!(
-        text,
-        "\nerror budget: each approximation alone, the others as fine as they get; {}",
-        held(&budget.reference)
-    );
+    let against = held(&budget.reference);
+    let _ = writeln!(text, "\nerror budget: each approximation alone, the others as fine as they get; {against}");
     let _ = writeln!(text, "  {:<16} {}", "", errors_head(measure, has_surface));
     for share in &budget.shares {
         let name = format!("{} {}", share.source, if share.source == super::budget::FLOOR { "" } else { &share.label });
         let _ = writeln!(text, "  {:<16} {}", name.trim(), errors_row(&share.errors, measure, has_surface));
     }
     let _ = writeln!(text, "* {:<16} {}", "together", errors_row(&budget.total, measure, has_surface));
-    let _ = writeln!(
-        text,
-        "  root of the sum of their squares: RMSE {:.2e}; measured together: {:.2e}",
-        budget.sum(),
-        budget.total.rmse
-    );
+    let (sum, together) = (budget.sum(), budget.total.rmse);
+    let _ = writeln!(text, "  root of the sum of their squares: RMSE {sum:.2e}; measured together: {together:.2e}");
 }

@@ -429,10 +429,7 @@ fn ticks([low, high]: [f64; 2]) -> Vec<(f64, bool)> {
         return (first..=last).map(|i| (i as f64 * step, true)).collect();
     }
     let decades = (high / low).log10();
-    let named: &[u32] = match decades {
-        d if d < 2.0 => &[1, 2, 5],
-        _ => &[1],
-    };
+    let named: &[u32] = if decades < 2.0 { &[1, 2, 5] } else { &[1] };
     let (first, last) = (low.log10().floor() as i32, high.log10().ceil() as i32);
     let all = (first..=last).flat_map(|d| (1..=9).map(move |m| (f64::from(m) * 10f64.powi(d), m)));
     // Of many decades every second or third one.

@@ -60,7 +60,7 @@ pub fn phantom(
     let mut bare = Middle::new(context, &mut source(Speckle::Mean)?, PHANTOM, options.pixels)?;
     let clean = bare.filtered(context, &Candidate::none())?.0;
     for row in &mut subject.rows {
-        row.quality = quality(&row.pixels, Some(&clean), subject.size, bare.levels());
+        row.quality = quality(&row.pixels, Some(&clean), subject.size, bare.levels.each_ref());
     }
     subject.clean = Some(clean);
     Ok(subject)
@@ -93,7 +93,7 @@ pub fn recording(
             }
             pixels = values;
         }
-        let quality = quality(&pixels, None, middle.size(), middle.levels());
+        let quality = quality(&pixels, None, middle.size(), middle.levels.each_ref());
         rows.push(Row { candidate, quality, time: Spread::new(&times), pixels });
         after_each();
     }
@@ -171,11 +171,6 @@ impl Middle {
 
     fn size(&self) -> [usize; 2] {
         self.crop.size.map(|n| n as usize)
-    }
-
-    fn levels(&self) -> [&Region; 2] {
-        let [tissue, behind] = &self.levels;
-        [tissue, behind]
     }
 
     /// The crop after the filters of a candidate, and the times of all passes.

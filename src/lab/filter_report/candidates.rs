@@ -49,28 +49,24 @@ fn candidates_of_all(pitch: [f64; 2]) -> Vec<Candidate> {
     add("Nagao-Matsuyama", "5x5".into(), &["slices.estimator=nagao-matsuyama".into()]);
     for deviation in DEVIATIONS {
         let [lateral, depth] = pitch.map(|p| p * deviation);
-        add(
-            "Gaussian",
-            format!("sd {deviation} px"),
-            &[format!("slices.smooth={{lateral={lateral:?},depth={depth:?}}}")],
-        );
+        let set = [format!("slices.smooth={{lateral={lateral:?},depth={depth:?}}}")];
+        add("Gaussian", format!("sd {deviation} px"), &set);
     }
     for (window, sigma) in pairs(&WINDOWS, &SIGMAS) {
-        add(
-            "sigma",
-            format!("{window}x{window}, sigma {sigma}"),
-            &[format!("slices.sigma={{window={window},sigma={sigma:?}}}")],
-        );
+        let set = [format!("slices.sigma={{window={window},sigma={sigma:?}}}")];
+        add("sigma", format!("{window}x{window}, sigma {sigma}"), &set);
     }
+    let enhanced = |[window, largest]: [u32; 2], sigma: f64, centre: &str| {
+        let growth = if largest == window { String::new() } else { format!(" to {largest}x{largest}") };
+        let keys = format!("window={window},largest={largest},sigma={sigma:?},centre='{centre}'");
+        let label = format!("{window}x{window}{growth}, sigma {sigma}");
+        (label, [format!("slices.enhanced_sigma={{{keys}}}")])
+    };
     for (filter, centre) in [("enhanced sigma, median centre", "median"), ("enhanced sigma, PM centre", "perona-malik")]
     {
-        for ([window, largest], sigma) in pairs(&GROWING, &SIGMAS) {
-            let keys = format!("window={window},largest={largest},sigma={sigma:?},centre='{centre}'");
-            add(
-                filter,
-                format!("{window}x{window} to {largest}x{largest}, sigma {sigma}"),
-                &[format!("slices.enhanced_sigma={{{keys}}}")],
-            );
+        for (windows, sigma) in pairs(&GROWING, &SIGMAS) {
+            let (label, set) = enhanced(windows, sigma, centre);
+            add(filter, label, &set);
         }
     }
     for (filter, centre, is_fixed) in [
@@ -80,11 +76,9 @@ fn candidates_of_all(pitch: [f64; 2]) -> Vec<Candidate> {
         ("thesis Figs. 51-53, PM centre", "perona-malik", true),
     ] {
         for [window, largest] in FIGURES {
-            let largest = if is_fixed { window } else { largest };
-            let keys = format!("window={window},largest={largest},sigma={FIGURE_SIGMA:?},centre='{centre}'");
-            let growth = if is_fixed { String::new() } else { format!(" to {largest}x{largest}") };
-            let label = format!("{window}x{window}{growth}, sigma {FIGURE_SIGMA}");
-            add(filter, label, &[format!("slices.enhanced_sigma={{{keys}}}")]);
+            let windows = [window, if is_fixed { window } else { largest }];
+            let (label, set) = enhanced(windows, FIGURE_SIGMA, centre);
+            add(filter, label, &set);
         }
     }
     for (edge, time) in pairs(&EDGES, &TIMES) {
@@ -97,15 +91,9 @@ fn candidates_of_all(pitch: [f64; 2]) -> Vec<Candidate> {
         add("Perona-Malik by AOS", format!("edge {edge}, time {time}"), &[format!("slices.perona_malik={{{keys}}}")]);
     }
     // What the presets filter slices with, but for smoothing across frames.
-    add(
-        "preset face-classic",
-        "median, sigma 9x9 0.15, Gaussian 0.9 and 0.7 mm".into(),
-        &[
-            "slices.median=true".into(),
-            "slices.sigma={window=9,sigma=0.15}".into(),
-            "slices.smooth={lateral=0.9,depth=0.7}".into(),
-        ],
-    );
+    let classic = ["median=true", "sigma={window=9,sigma=0.15}", "smooth={lateral=0.9,depth=0.7}"];
+    let classic = classic.map(|set| format!("slices.{set}"));
+    add("preset face-classic", "median, sigma 9x9 0.15, Gaussian 0.9 and 0.7 mm".into(), &classic);
     add("preset fetal", "Gaussian 1.4 and 0.8 mm".into(), &["slices.smooth={lateral=1.4,depth=0.8}".into()]);
     add("preset bone", "Gaussian 0.5 mm".into(), &["slices.smooth={lateral=0.5,depth=0.5}".into()]);
     all

@@ -102,19 +102,9 @@ fn bell(pixels: &[f64], [width, height]: [usize; 2]) -> Vec<f64> {
         let tap = |k: isize| source[index((n as isize + k).clamp(0, count as isize - 1) as usize)];
         (-reach..=reach).zip(&weights).map(|(k, w)| w * tap(k)).sum::<f64>() / all
     };
-    let place = |i: usize| (i % width, i / width);
-    let rows: Vec<f64> = (0..pixels.len())
-        .map(|i| {
-            let (x, y) = place(i);
-            along(pixels, width, &|x| y * width + x, x)
-        })
-        .collect();
-    (0..pixels.len())
-        .map(|i| {
-            let (x, y) = place(i);
-            along(&rows, height, &|y| y * width + x, y)
-        })
-        .collect()
+    let places = || (0..pixels.len()).map(|i| (i % width, i / width));
+    let rows: Vec<f64> = places().map(|(x, y)| along(pixels, width, &|x| y * width + x, x)).collect();
+    places().map(|(x, y)| along(&rows, height, &|y| y * width + x, y)).collect()
 }
 
 /// Squared distance of every pixel to the nearest of `marked`, pixels^2; infinite without any. Separable: the nearest in each

@@ -1,9 +1,9 @@
 //! Writes profiles, comparisons and pass times: CSV, tables for a terminal, and a run as Chrome trace events (Trace Event Format, JSON
 //! object form), which Perfetto and chrome://tracing open.
 
-use super::compare::{Comparison, Kind, Line, Verdict};
+use super::compare::{Comparison, Kind, Line, Ratio, Verdict};
 use super::statistics::{Interval, Sample, drift};
-use super::{Ceiling, LEVEL, PassProfile, Profile};
+use super::{Ceiling, LEVEL, PassProfile, Profile, Sizes};
 use crate::passes::Span;
 use crate::passes::times::acquisition_floor;
 use crate::text::csv_field;
@@ -29,10 +29,8 @@ pub fn csv(profile: &Profile) -> String {
             fields.extend(time_fields(sample.as_ref()));
             fields.extend([span.bytes_read, span.bytes_written].map(|n| n.to_string()));
             fields.push(optional(span.bytes_per_second()));
-            fields.extend(
-                [span.fetches, span.filtered, span.invocations].map(|n| n.map_or_else(String::new, |n| n.to_string())),
-            );
-            fields.push(roof.map_or_else(String::new, |r| r.bound.into()));
+            fields.extend([span.fetches, span.filtered, span.invocations].map(optional));
+            fields.push(optional(roof.map(|r| r.bound)));
             fields.extend([roof.map(|r| r.share), share].map(optional));
             let _ = writeln!(text, "{}", fields.join(","));
         }
@@ -83,7 +81,7 @@ fn time_fields(sample: Option<&Sample>) -> Vec<String> {
     numbers.map(|n| n.to_string()).into()
 }
 
-fn optional(value: Option<f64>) -> String {
+fn optional(value: Option<impl ToString>) -> String {
     value.map_or_else(String::new, |v| v.to_string())
 }
 
@@ -143,7 +141,7 @@ pub fn profile_table(profile: &Profile) -> String {
 }
 
 fn conditions(profile: &Profile) -> String {
-    let (device, sizes) = (&profile.device, &profile.sizes);
+    let device = &profile.device;
     let software = if device.is_software { " (software: computes on the CPU)" } else { "" };
     let clock = match (profile.has_time_stamps(), device.calibrated) {
         (false, _) => "none".into(),
@@ -156,16 +154,9 @@ fn conditions(profile: &Profile) -> String {
         ),
     };
     let clocks = device.clocks.as_deref().unwrap_or("not known: runs at other clocks or power states do not compare");
+    let Sizes { frame: [w, h], slices, volume: [x, y, z], picture: [across, down] } = profile.sizes;
     let sizes = format!(
-        "frames of {} x {}, {} slices, volume {} x {} x {}, picture {} x {}; settings {}",
-        sizes.frame[0],
-        sizes.frame[1],
-        sizes.slices,
-        sizes.volume[0],
-        sizes.volume[1],
-        sizes.volume[2],
-        sizes.picture[0],
-        sizes.picture[1],
+        "frames of {w} x {h}, {slices} slices, volume {x} x {y} x {z}, picture {across} x {down}; settings {}",
         profile.settings_hash
     );
     let turned =
@@ -320,15 +311,12 @@ fn comparison_row(line: &Line) -> Vec<String> {
     };
     let [old, new] = [line.old_ns, line.new_ns].map(|ns| ns.map_or_else(String::new, ms));
     let mut row = vec![group.into(), line.name.clone(), old, new];
-    row.extend(match &line.ratio {
-        None => vec![String::new(); 4],
-        Some(r) => vec![
-            format!("{:.3}", r.estimate),
-            format!("{:.3}..{:.3}", r.low, r.high),
-            format!("{:.4}", r.p_holm),
-            format!("{:.1} %", 100.0 * (r.floor - 1.0)),
-        ],
-    });
+    let ratio = |r: Ratio| {
+        let interval = format!("{:.3}..{:.3}", r.low, r.high);
+        let noise = format!("{:.1} %", 100.0 * (r.floor - 1.0));
+        [format!("{:.3}", r.estimate), interval, format!("{:.4}", r.p_holm), noise]
+    };
+    row.extend(line.ratio.map(ratio).unwrap_or_default());
     row.push(line.limit.map_or_else(String::new, |limit| format!("{:.1} %", 100.0 * (limit - 1.0))));
     row.extend([verdict.to_string(), line.note.clone().unwrap_or_default()]);
     row

@@ -90,30 +90,30 @@ impl Sample {
         let n = self.0.len();
         // P(fewer than k samples are below), by its logarithm: 2^-n underflows from 1075 samples on.
         let (mut log_share, mut below) = (-(n as f64) * std::f64::consts::LN_2, 0.0);
-        // Beyond the middle the two order statistics would swap.
-        let (k, tail) = covering(n.div_ceil(2), level, |k| {
+        self.covering(level, |k| {
             if k > 1 {
                 log_share += ((n + 2 - k) as f64 / (k - 1) as f64).ln();
             }
             below += log_share.exp();
             below
-        });
+        })
+    }
+
+    /// From the k-th sample from below to the k-th from above, for the largest k for which what lies between two tails of P(fewer than k), `below`,
+    /// is at least `level`. If none is, k is 1. `below` is called for every k from 1 on.
+    fn covering(&self, level: f64, mut below: impl FnMut(usize) -> f64) -> Interval {
+        let n = self.0.len();
+        let (mut k, mut tail) = (1, below(1));
+        // Beyond the middle the two order statistics would swap.
+        for next in 2..=n.div_ceil(2) {
+            let next_tail = below(next);
+            if 1.0 - 2.0 * next_tail < level {
+                break;
+            }
+            (k, tail) = (next, next_tail);
+        }
         Interval { low: self.0[k - 1], high: self.0[n - k], coverage: (1.0 - 2.0 * tail).max(0.0) }
     }
-}
-
-/// The largest k up to `most` for which what lies between two tails of P(fewer than k), `below`, is at least `level`, and that tail. If none is, k
-/// is 1. `below` is called for every k from 1 on.
-fn covering(most: usize, level: f64, mut below: impl FnMut(usize) -> f64) -> (usize, f64) {
-    let (mut k, mut tail) = (1, below(1));
-    for next in 2..=most {
-        let next_tail = below(next);
-        if 1.0 - 2.0 * next_tail < level {
-            break;
-        }
-        (k, tail) = (next, next_tail);
-    }
-    (k, tail)
 }
 
 /// Drift of a series: the median of its second half divided by that of the first; 1 is steady. None if there is only one value, or the median of a
@@ -240,25 +240,22 @@ pub fn hodges_lehmann(a: &[f64], b: &[f64], level: f64) -> Result<Shift, SampleE
     let (n, m) = (first.count(), second.count());
     let pairs: Vec<f64> = second.sorted().iter().flat_map(|y| first.sorted().iter().map(move |x| y - x)).collect();
     let differences = Sample::new(&pairs)?;
-    let sorted = differences.sorted();
-    // The k-th difference from below and from above, by P(U < k).
-    let (k, tail) = if n + m <= MAX_EXACT {
-        let ranks: Vec<usize> = (1..=n + m).collect();
-        let subsets = rank_sums(&ranks, n);
+    // By P(U < k).
+    let Interval { low, high, coverage } = if n + m <= MAX_EXACT {
+        let subsets = rank_sums(&(1..=n + m).collect::<Vec<_>>(), n);
         let total: f64 = subsets.iter().sum();
         let least = n * (n + 1) / 2;
         let mut below = 0.0;
-        covering((n * m).div_ceil(2), level, |k| {
+        differences.covering(level, |k| {
             below += subsets[least + k - 1] / total;
             below
         })
     } else {
         let (n, m) = (n as f64, m as f64);
         let deviation = (n * m * (n + m + 1.0) / 12.0).sqrt();
-        covering(sorted.len().div_ceil(2), level, |k| normal_tail((n * m / 2.0 - (k as f64 - 0.5)) / deviation))
+        differences.covering(level, |k| normal_tail((n * m / 2.0 - (k as f64 - 0.5)) / deviation))
     };
-    let coverage = (1.0 - 2.0 * tail).max(0.0);
-    Ok(Shift { estimate: differences.median(), low: sorted[k - 1], high: sorted[sorted.len() - k], coverage })
+    Ok(Shift { estimate: differences.median(), low, high, coverage })
 }
 
 /// Number of subsets of some ranks for each rank sum, whatever their count.
@@ -311,12 +308,11 @@ pub fn paired_shift(differences: &[f64], level: f64) -> Result<Shift, SampleErro
     let counts = all_rank_sums(&(1..=each.len()).collect::<Vec<_>>());
     let total: f64 = counts.iter().sum();
     let mut below = 0.0;
-    let (k, tail) = covering(means.count().div_ceil(2), level, |k| {
+    let Interval { low, high, coverage } = means.covering(level, |k| {
         below += counts[k - 1] / total;
         below
     });
-    let (low, high) = (means.sorted()[k - 1], means.sorted()[means.count() - k]);
-    Ok(Shift { estimate: means.median(), low, high, coverage: (1.0 - 2.0 * tail).max(0.0) })
+    Ok(Shift { estimate: means.median(), low, high, coverage })
 }
 
 /// Adjusted p values by Holm's correction (S. Holm, A simple sequentially rejective multiple test procedure, 1979), in the order of `p`. Rejecting

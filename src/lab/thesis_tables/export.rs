@@ -97,16 +97,9 @@ fn conditions(text: &mut String, report: &Report) {
     let clocks = device.clocks.as_deref().map_or(String::new(), |c| format!("; {c}"));
     let usual = Conditions::usual(report.quick);
     let n = usual.volume;
-    let _ = writeln!(
-        text,
-        "- device: {}{software}, {}, Vulkan {}{}; {}; {}",
-        markdown_text(&device.name),
-        markdown_text(&device.driver),
-        markdown_text(&device.api),
-        markdown_text(&clocks),
-        markdown_text(&report.program),
-        markdown_text(&report.date)
-    );
+    let [name, driver, api, clocks, program, date] =
+        [&device.name, &device.driver, &device.api, &clocks, &report.program, &report.date].map(|t| markdown_text(t));
+    let _ = writeln!(text, "- device: {name}{software}, {driver}, Vulkan {api}{clocks}; {program}; {date}");
     if report.quick {
         let _ = writeln!(
             text,
@@ -234,11 +227,8 @@ fn hardware(report: &Report) -> Option<String> {
 }
 
 fn growth(text: &mut String, grown: &Grown) {
-    let _ = writeln!(
-        text,
-        "\n## Tables 7-9: growth of the enhanced sigma filter's windows, {}",
-        markdown_text(&grown.picture)
-    );
+    let picture = markdown_text(&grown.picture);
+    let _ = writeln!(text, "\n## Tables 7-9: growth of the enhanced sigma filter's windows, {picture}");
     let mut tables: Vec<(Estimator, f64)> = grown.rows.iter().map(|r| (r.centre, r.sigma)).collect();
     tables.dedup();
     for (centre, sigma) in tables {

@@ -46,19 +46,16 @@ impl Drive {
     /// Any [`Fault`] of the port, [`Fault::WrongModule`], and [`Fault::Interrupted`]; a motor that is already moving is then stopped if possible.
     pub fn open(settings: &PortSettings, table: &MotorTable) -> Result<Drive, MotorError> {
         let mut drive = Drive::connect("open", settings, table)?;
-        let module = drive.identify();
-        drive.module = drive.done("open", module)?;
+        drive.module = drive.act("open", Drive::identify)?;
         Ok(drive)
     }
 
     fn connect(operation: &'static str, settings: &PortSettings, table: &MotorTable) -> Result<Drive, MotorError> {
-        let path = settings.path.clone();
-        let port = Port::open(settings);
-        let port = port.map_err(|fault| {
+        let port = Port::open(settings).map_err(|fault| {
             // Another process may have left it moving.
             let is_asked = operation == "stop";
             let stopped = if is_asked { Stopped::Failed("the port was not opened".into()) } else { Stopped::NotMoved };
-            MotorError { port: path, operation, fault, stopped }
+            MotorError { port: settings.path.clone(), operation, fault, stopped }
         })?;
         Ok(Drive { guard: Guard::new(port, table), table: table.clone(), module: String::new() })
     }
@@ -68,8 +65,18 @@ impl Drive {
     /// # Errors
     /// Any [`Fault`] of the port, and [`Fault::Interrupted`]; a motor that is moving is then stopped if possible.
     pub fn status(&mut self) -> Result<MotorStatus, MotorError> {
-        let status = self.read_status();
-        self.done("status", status)
+        self.act("status", |drive| {
+            let (position, velocity) = (drive.get(axis::POSITION)?, drive.get(axis::SPEED)?);
+            Ok(MotorStatus {
+                module: drive.module.clone(),
+                angle: drive.table.angle(position),
+                speed: drive.table.speed(velocity),
+                home_switch: drive.at_home_switch()?,
+                left_limit: drive.limit_closed(Side::Left)?,
+                right_limit: drive.limit_closed(Side::Right)?,
+                watchdog: drive.watchdog()?,
+            })
+        })
     }
 
     /// Moves the motor until it has found home, the position from which all others are counted.
@@ -77,10 +84,10 @@ impl Drive {
     /// # Errors
     /// Any [`Fault`]; the motor is then stopped if possible.
     pub fn home(&mut self) -> Result<(), MotorError> {
-        let watchdog = self.set_watchdog();
-        self.done("home", watchdog)?;
-        let found = self.find_home();
-        self.done("home", found)
+        self.act("home", |drive| {
+            drive.set_watchdog()?;
+            drive.find_home()
+        })
     }
 
     /// Moves to the start of the sweep and then back and forth over it. [`Drive::home`] has to be called before. Each position that the first request
@@ -94,8 +101,7 @@ impl Drive {
         start: Instant,
         on_position: &mut dyn FnMut(Position),
     ) -> Result<usize, MotorError> {
-        let swept = self.sweep_all(sweep, start, on_position);
-        self.done("sweep", swept)
+        self.act("sweep", |drive| drive.sweep_all(sweep, start, on_position))
     }
 
     /// A handle that stops the motor from another thread, within one request and its reply.
@@ -119,17 +125,21 @@ impl Drive {
     /// ([`Fault::Interrupted`]).
     pub fn stop(&mut self) -> Result<(), MotorError> {
         let stopped = self.guard.stop();
-        let path = self.guard.port().settings().path.clone();
         if stopped != Stopped::Confirmed {
-            let fault = Fault::NoReply { request: "MST".into(), timeout: self.guard.port().settings().timeout };
+            let PortSettings { path, timeout, .. } = self.guard.port().settings().clone();
+            let fault = Fault::NoReply { request: "MST".into(), timeout };
             return Err(MotorError { port: path, operation: "stop", fault, stopped });
         }
-        let stopped = self.wait_still();
-        self.done("stop", stopped)
+        self.act("stop", Drive::wait_still)
     }
 
-    fn done<T>(&mut self, operation: &'static str, result: Result<T, Fault>) -> Result<T, MotorError> {
-        result.map_err(|fault| self.guard.fail(operation, fault))
+    /// Carries out an operation. After a fault the motor is stopped.
+    fn act<T>(
+        &mut self,
+        operation: &'static str,
+        act: impl FnOnce(&mut Drive) -> Result<T, Fault>,
+    ) -> Result<T, MotorError> {
+        act(self).map_err(|fault| self.guard.fail(operation, fault))
     }
 
     fn ask(&mut self, request: impl Fn(u8, u8) -> Request) -> Result<Answer, Fault> {
@@ -152,26 +162,13 @@ impl Drive {
             let bytes = self.guard.ask_raw(&Request::version_text(self.table.address))?;
             (module, version) = tmcl::version_text(&bytes).unwrap_or((0, version));
         }
-        match self.table.module {
-            Some(expected) if expected != module => Err(Fault::WrongModule {
-                found: format!("module {module}, firmware {version}"),
-                wanted: format!("module {expected}"),
-            }),
-            _ => Ok(format!("TMCM-{module} firmware {version}")),
+        match self.table.module.filter(|expected| *expected != module) {
+            Some(expected) => {
+                let found = format!("module {module}, firmware {version}");
+                Err(Fault::WrongModule { found, wanted: format!("module {expected}") })
+            }
+            None => Ok(format!("TMCM-{module} firmware {version}")),
         }
-    }
-
-    fn read_status(&mut self) -> Result<MotorStatus, Fault> {
-        let (position, velocity) = (self.get(axis::POSITION)?, self.get(axis::SPEED)?);
-        Ok(MotorStatus {
-            module: self.module.clone(),
-            angle: self.table.angle(position),
-            speed: self.table.speed(velocity),
-            home_switch: self.at_home_switch()?,
-            left_limit: self.get(axis::LEFT_LIMIT)? != 0,
-            right_limit: self.get(axis::RIGHT_LIMIT)? != 0,
-            watchdog: self.watchdog()?,
-        })
     }
 
     fn watchdog(&mut self) -> Result<Option<Duration>, Fault> {

@@ -58,41 +58,30 @@ pub enum Fault {
     OutOfRange(String),
 }
 
-/// Whether the motor was stopped after a fault.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// Whether the motor was stopped after a fault. Its message is what follows that of the fault.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Stopped {
     /// The failed operation did not move the motor and sent no command to stop it.
+    #[error("")]
     NotMoved,
     /// The module confirmed the command to stop.
+    #[error(". The motor was stopped")]
     Confirmed,
     /// The command to stop was sent, but the module did not confirm it for the given reason.
+    #[error(". The motor was told to stop but has not confirmed it ({0}): if it turns, cut its power")]
     Unconfirmed(String),
     /// The port failed while the command to stop was sent or confirmed, for the given reason.
+    #[error(". The motor could not be stopped: {0}: cut its power")]
     Failed(String),
 }
 
 /// A fault, the port and the operation at which it occurred, and whether the motor was stopped.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{port}: {operation}: {fault}{stopped}")]
 pub struct MotorError {
     pub port: String,
     /// The operation that failed: "sweep", "home" ...
     pub operation: &'static str,
     pub fault: Fault,
     pub stopped: Stopped,
-}
-
-impl std::error::Error for MotorError {}
-
-impl std::fmt::Display for MotorError {
-    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        write!(f, "{}: {}: {}", self.port, self.operation, self.fault)?;
-        match &self.stopped {
-            Stopped::NotMoved => Ok(()),
-            Stopped::Confirmed => write!(f, ". The motor was stopped"),
-            Stopped::Unconfirmed(why) => {
-                write!(f, ". The motor was told to stop but has not confirmed it ({why}): if it turns, cut its power")
-            }
-            Stopped::Failed(why) => write!(f, ". The motor could not be stopped: {why}: cut its power"),
-        }
-    }
 }

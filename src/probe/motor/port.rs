@@ -63,10 +63,8 @@ impl Port {
     /// # Errors
     /// [`Fault::NotOpened`].
     pub fn open(settings: &PortSettings) -> Result<Port, Fault> {
-        let builder = serialport::new(&settings.path, settings.baud)
-            .parity(settings.parity)
-            .stop_bits(settings.stop_bits)
-            .timeout(settings.timeout);
+        let builder = serialport::new(&settings.path, settings.baud).parity(settings.parity);
+        let builder = builder.stop_bits(settings.stop_bits).timeout(settings.timeout);
         let serial = builder.open().map_err(|e| Fault::NotOpened(e.to_string()))?;
         Ok(Port { serial, settings: settings.clone(), late: false })
     }
@@ -126,8 +124,7 @@ impl Port {
         let until = Instant::now() + self.settings.timeout;
         loop {
             if let Some(reply) = Reply::find(&received, request) {
-                let answered = Instant::now();
-                return Ok((reply, sent + (answered - sent) / 2));
+                return Ok((reply, sent + sent.elapsed() / 2));
             }
             // Noise may precede the reply, but only so much.
             if received.len() > 64 * LENGTH || !self.receive(&mut received, until)? {
@@ -135,10 +132,10 @@ impl Port {
             }
         }
         self.late = true;
-        if received.len() < LENGTH {
-            return Err(Fault::NoReply { request: request.to_string(), timeout: self.settings.timeout });
+        match received.len() < LENGTH {
+            true => Err(Fault::NoReply { request: request.to_string(), timeout: self.settings.timeout }),
+            false => Err(Fault::Checksum { request: request.to_string() }),
         }
-        Err(Fault::Checksum { request: request.to_string() })
     }
 
     /// Discards pending input, then sends a request.
@@ -164,28 +161,18 @@ impl Port {
         let pause = (self.settings.round_trip() + Duration::from_millis(40)).min(self.settings.timeout);
         let until = if received.len() < LENGTH { until } else { until.min(Instant::now() + pause) };
         let mut bytes = [0; 64];
-        match self.timed(until, |port| port.read(&mut bytes))? {
-            Some(0) => Err(Fault::Unplugged("end of file".into())),
-            Some(n) => {
-                received.extend_from_slice(&bytes[..n]);
-                Ok(true)
-            }
-            None => Ok(false),
+        let count = self.timed(until, |port| port.read(&mut bytes))?;
+        if count == Some(0) {
+            return Err(Fault::Unplugged("end of file".into()));
         }
+        received.extend_from_slice(&bytes[..count.unwrap_or(0)]);
+        Ok(count.is_some())
     }
 
     /// Discards what still arrives until nothing did for one time-out, for at most three.
     fn drain(&mut self) -> Result<(), Fault> {
-        let start = Instant::now();
-        let mut bytes = [0; 64];
-        while start.elapsed() < 3 * self.settings.timeout {
-            let until = Instant::now() + self.settings.timeout;
-            match self.timed(until, |port| port.read(&mut bytes))? {
-                Some(0) => return Err(Fault::Unplugged("end of file".into())),
-                Some(_) => {}
-                None => break,
-            }
-        }
+        let (start, timeout) = (Instant::now(), self.settings.timeout);
+        while start.elapsed() < 3 * timeout && self.receive(&mut Vec::new(), Instant::now() + timeout)? {}
         self.late = false;
         Ok(())
     }

@@ -8,10 +8,13 @@
 use super::table::{MotorTable, Side};
 use super::tmcl::{self, LENGTH, Reply, Request, SUCCESS, WRONG_CHECKSUM, axis, command};
 use crate::sync::locked;
+use crate::tree::{All, Name};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::pty::{OpenptFlags, grantpt, ioctl_tiocgptpeer, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, ioctl_tiocnxcl, tcgetattr, tcsetattr};
 use std::collections::{BTreeMap, VecDeque};
+use std::fs::File;
+use std::io::{Read, Write};
 use std::os::fd::OwnedFd;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -21,7 +24,8 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 /// The faults of a motor's module that can be simulated.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, All, Name)]
+#[tree(rename_all = "kebab-case")]
 pub enum FaultKind {
     /// Carries out requests but does not reply.
     Mute,
@@ -41,20 +45,6 @@ pub enum FaultKind {
     Slow,
 }
 
-impl FaultKind {
-    /// All kinds, with their names on the command line.
-    pub const ALL: [(&'static str, FaultKind); 8] = [
-        ("mute", FaultKind::Mute),
-        ("checksum", FaultKind::Checksum),
-        ("limit-switch", FaultKind::LimitSwitch),
-        ("stall", FaultKind::Stall),
-        ("unplugged", FaultKind::Unplugged),
-        ("wrong-module", FaultKind::WrongModule),
-        ("noise", FaultKind::Noise),
-        ("slow", FaultKind::Slow),
-    ];
-}
-
 /// A simulated fault and when it begins. As text, `NAME` begins at once, and `NAME@SECONDS` that many seconds after the first request to move to a
 /// position; a sweep begins with one. `after` is None for a fault that begins at once.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,15 +58,14 @@ impl FromStr for SimulatedFault {
 
     fn from_str(text: &str) -> Result<SimulatedFault, String> {
         let (name, after) = text.split_once('@').map_or((text, None), |(name, after)| (name, Some(after)));
-        let kind = FaultKind::ALL.iter().find(|(known, _)| *known == name).map(|(_, kind)| *kind);
-        let names = FaultKind::ALL.map(|(name, _)| name).join(", ");
+        let kind = FaultKind::ALL.into_iter().find(|kind| kind.name() == name);
+        let names = FaultKind::ALL.map(FaultKind::name).join(", ");
         let kind = kind.ok_or_else(|| format!("'{name}' is not a fault; the faults are {names}"))?;
-        let seconds = |text: &str| text.parse::<f64>().ok().filter(|s| (0.0..=3600.0).contains(s));
-        let after = match after {
-            None => None,
-            Some(text) => Some(seconds(text).ok_or_else(|| format!("'{text}' must be 0 to 3600 seconds"))?),
+        let time = |text: &str| {
+            let seconds = text.parse().ok().filter(|s| (0.0..=3600.0).contains(s));
+            seconds.map(Duration::from_secs_f64).ok_or_else(|| format!("'{text}' must be 0 to 3600 seconds"))
         };
-        Ok(SimulatedFault { kind, after: after.map(Duration::from_secs_f64) })
+        Ok(SimulatedFault { kind, after: after.map(time).transpose()? })
     }
 }
 
@@ -118,11 +107,10 @@ impl Simulator {
         settings.make_raw();
         tcsetattr(&slave, OptionalActions::Now, &settings)?;
 
-        let mut module = Module::new(&options.table);
-        module.watchdog = !options.no_watchdog;
-        let (module, received) = (Mutex::new(module), Mutex::new(Vec::new()));
-        let shared = Arc::new(Shared { module, received, end: AtomicBool::new(false) });
-        let line = Line { master, slave, shared: shared.clone(), address: options.table.address, fault: options.fault };
+        let module = Mutex::new(Module { watchdog: !options.no_watchdog, ..Module::new(&options.table) });
+        let shared = Arc::new(Shared { module, received: Mutex::default(), end: AtomicBool::new(false) });
+        let (master, address) = (master.into(), options.table.address);
+        let line = Line { master, slave, shared: shared.clone(), address, fault: options.fault };
         let thread = std::thread::Builder::new().name("simulated module".into()).spawn(move || line.run())?;
         Ok(Simulator { path, shared, thread: Some(thread) })
     }
@@ -164,7 +152,7 @@ impl Drop for Simulator {
 
 /// The thread between the pseudo-terminal and the module.
 struct Line {
-    master: OwnedFd,
+    master: File,
     slave: OwnedFd,
     shared: Arc<Shared>,
     address: u8,
@@ -178,7 +166,7 @@ impl Line {
         }
     }
 
-    fn serve(&self) -> rustix::io::Result<()> {
+    fn serve(&self) -> std::io::Result<()> {
         let (mut pending, mut bytes, mut outgoing) = (Vec::new(), [0; 256], VecDeque::new());
         let (mut last, mut positioned, mut answers) = (Instant::now(), None, 0_usize);
         let pause = Timespec { tv_sec: 0, tv_nsec: 5_000_000 };
@@ -189,7 +177,7 @@ impl Line {
                 ready => ready? > 0,
             };
             if ready {
-                let count = rustix::io::read(&self.master, &mut bytes)?;
+                let count = (&self.master).read(&mut bytes)?;
                 pending.extend_from_slice(&bytes[..count]);
             } else {
                 // A user that was killed left the port in exclusive mode; the next one must be able to open it.
@@ -237,9 +225,8 @@ impl Line {
                 let wait = Duration::from_secs(if due == Some(FaultKind::Slow) { 3 } else { 0 });
                 outgoing.push_back((now + wait, with_fault(reply, due, answers)));
             }
-            while outgoing.front().is_some_and(|(at, _)| *at <= now) {
-                let (_, bytes) = outgoing.pop_front().unwrap_or((now, Vec::new()));
-                self.write(&bytes)?;
+            while let Some((_, bytes)) = outgoing.pop_front_if(|(at, _)| *at <= now) {
+                (&self.master).write_all(&bytes)?;
             }
         }
         Ok(())
@@ -248,20 +235,8 @@ impl Line {
     /// The fault that is present.
     fn due(&self, positioned: Option<Instant>) -> Option<FaultKind> {
         let fault = self.fault?;
-        let begun = match (fault.after, positioned) {
-            (None, _) => true,
-            (Some(after), Some(since)) => since.elapsed() >= after,
-            (Some(_), None) => false,
-        };
-        begun.then_some(fault.kind)
-    }
-
-    fn write(&self, mut left: &[u8]) -> rustix::io::Result<()> {
-        while !left.is_empty() {
-            let written = rustix::io::write(&self.master, left)?;
-            left = &left[written..];
-        }
-        Ok(())
+        let is_begun = fault.after.is_none_or(|after| positioned.is_some_and(|since| since.elapsed() >= after));
+        is_begun.then_some(fault.kind)
     }
 }
 
@@ -469,7 +444,7 @@ impl Module {
     /// Stops at once. A search does not continue.
     fn halt(&mut self) {
         self.speed = 0.0;
-        if let Activity::Velocity(_) | Activity::Position(_) = self.activity {
+        if self.activity != Activity::Search {
             self.activity = Activity::Velocity(0.0);
         }
     }

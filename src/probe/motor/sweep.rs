@@ -3,6 +3,7 @@
 use super::Fault;
 use super::port::PERIOD;
 use super::table::MotorTable;
+use crate::tree::{FromNode, Name};
 use std::time::Duration;
 
 /// Fewest passes a second. Slower ones would exceed every time-out.
@@ -30,16 +31,12 @@ impl Sweep {
         let Sweep { angle, rate, volumes } = *self;
         let refuse = |fault: String| Err(Fault::OutOfRange(fault));
         if !(MIN_ANGLE..=table.largest_angle_deg).contains(&angle) {
-            return refuse(format!(
-                "--angle {angle}: must be {MIN_ANGLE} to {} deg, the probe's widest",
-                table.largest_angle_deg
-            ));
+            let widest = table.largest_angle_deg;
+            return refuse(format!("--angle {angle}: must be {MIN_ANGLE} to {widest} deg, the probe's widest"));
         }
         if !(MIN_RATE..=table.largest_rate).contains(&rate) {
-            return refuse(format!(
-                "--rate {rate}: must be {MIN_RATE} to {} volumes/s, the probe's most",
-                table.largest_rate
-            ));
+            let most = table.largest_rate;
+            return refuse(format!("--rate {rate}: must be {MIN_RATE} to {most} volumes/s, the probe's most"));
         }
         if volumes == Some(0) {
             return refuse("--volumes 0: must be at least 1".into());
@@ -50,27 +47,25 @@ impl Sweep {
         // Ramps of a trapezoid over `angle` in `time`: v = (a t - sqrt((a t)^2 - 4 a angle)) / 2, written without cancellation.
         let least = (4.0 * angle / acceleration).sqrt();
         if time < least {
-            return refuse(format!(
-                "--rate {rate}: over {angle} deg at {acceleration} deg/s2 at most {:.2} volumes/s can be done",
-                1.0 / (least + pause)
-            ));
+            let (pass, most) = (format!("over {angle} deg at {acceleration} deg/s2"), 1.0 / (least + pause));
+            return refuse(format!("--rate {rate}: {pass} at most {most:.2} volumes/s can be done"));
         }
         let at = acceleration * time;
         let speed = 2.0 * acceleration * angle / (at + (at * at - 4.0 * acceleration * angle).max(0.0).sqrt());
         if speed > table.largest_speed_deg_per_s {
-            let most = table.largest_speed_deg_per_s;
-            return refuse(format!(
-                "--rate {rate}: over {angle} deg takes {speed:.1} deg/s, and the probe's largest is {most}"
-            ));
+            let (takes, most) = (format!("takes {speed:.1} deg/s"), table.largest_speed_deg_per_s);
+            return refuse(format!("--rate {rate}: over {angle} deg {takes}, and the probe's largest is {most}"));
         }
         Ok(speed)
     }
 }
 
 /// The direction of a pass.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode, Name)]
+#[tree(rename_all = "lowercase")]
 pub enum Direction {
     /// Towards larger angles.
+    #[default]
     Forward,
     /// Towards smaller angles.
     Backward,
@@ -80,10 +75,6 @@ impl Direction {
     /// 1 for forward, -1 for backward.
     pub fn sign(self) -> f64 {
         if self == Direction::Forward { 1.0 } else { -1.0 }
-    }
-
-    pub fn name(self) -> &'static str {
-        if self == Direction::Forward { "forward" } else { "backward" }
     }
 }
 

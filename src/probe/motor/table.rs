@@ -1,7 +1,7 @@
 //! The `[motor]` table of a probe file, and conversions between degrees and the units of the module. Angles are those of the sweep, in
 //! degrees: 0 in the middle, increasing forwards.
 
-use crate::tree::FromNode;
+use crate::tree::{Defaults, FromNode, Name};
 
 /// Clock of the motion controllers whose velocities are not in microsteps a second, Hz.
 const TMC429_CLOCK: f64 = 16e6;
@@ -18,7 +18,7 @@ pub enum Home {
 }
 
 /// A direction of rotation of the motor.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromNode, Name)]
 #[tree(rename_all = "lowercase")]
 pub enum Side {
     /// Towards smaller position counts of the module.
@@ -31,10 +31,6 @@ pub enum Side {
 impl Side {
     pub fn other(self) -> Side {
         if self == Side::Left { Side::Right } else { Side::Left }
-    }
-
-    pub fn name(self) -> &'static str {
-        if self == Side::Left { "left" } else { "right" }
     }
 }
 
@@ -49,26 +45,32 @@ pub enum Units {
     Tmc429,
 }
 
-/// The `[motor]` table of a probe file. `tests/data/motor/probe.toml` is a commented example.
-#[derive(Clone, Debug, PartialEq, FromNode)]
+/// The `[motor]` table of a probe file. `tests/data/motor/probe.toml` is a commented example. Its `Default`, the values below, is the table of the
+/// simulated module; keys that a file may leave out have values of their own.
+#[derive(Clone, Debug, PartialEq, Defaults, FromNode)]
 #[tree(deny_unknown_fields)]
 pub struct MotorTable {
     /// Full steps in one revolution of the motor, 4 to 10000.
+    #[value(200)]
     pub steps_per_turn: u32,
     /// Microsteps in a full step, as set in the module: a power of 2 from 1 to 256.
+    #[value(16)]
     pub microsteps: u32,
     /// Revolutions of the motor for one revolution of the array, 0.001 to 10000.
+    #[value(12.0)]
     pub gear: f64,
     /// True if increasing positions of the motor move the array towards smaller angles.
     #[tree(default)]
     pub reversed: bool,
     /// Address of the module in TMCL requests, 1 to 255.
     #[tree(default = "one")]
+    #[value(1)]
     pub address: u8,
     /// Number of the motor's axis in its module, 0 to 5.
     #[tree(default)]
     pub motor: u8,
     /// Type of the module that the firmware has to report (1140 for a TMCM-1140); None: any TMCL module.
+    #[value(Some(1140))]
     pub module: Option<u16>,
     #[tree(default)]
     pub home: Home,
@@ -83,14 +85,19 @@ pub struct MotorTable {
     pub home_angle_deg: f64,
     /// Speed of the array while home is searched, deg/s. None: the module's own speed for its reference search; for a search by the switch 10, or the
     /// largest speed if that is lower.
+    #[value(Some(30.0))]
     pub search_speed_deg_per_s: Option<f64>,
     /// Largest angle of a sweep from end to end, degrees, up to 360.
+    #[value(85.0)]
     pub largest_angle_deg: f64,
     /// Largest number of passes (volumes) a second, up to 100.
+    #[value(5.0)]
     pub largest_rate: f64,
     /// Largest speed of the array, deg/s.
+    #[value(600.0)]
     pub largest_speed_deg_per_s: f64,
     /// Acceleration of the array at both ends of a pass, deg/s2. The motor must be able to follow it under its load.
+    #[value(8000.0)]
     pub acceleration_deg_per_s2: f64,
     #[tree(default)]
     pub units: Units,
@@ -101,39 +108,12 @@ pub struct MotorTable {
     pub ramp_divisor: u8,
     /// Time-out of the module's own watchdog, 100 to 65535 ms: the module stops the motor if no command arrives for this time. 0 switches
     /// the watchdog off. None leaves the setting of the module unchanged.
+    #[value(Some(2000))]
     pub watchdog_ms: Option<u16>,
 }
 
 fn one() -> u8 {
     1
-}
-
-impl Default for MotorTable {
-    /// The table of the simulated module: 200 steps, 16 microsteps, gear ratio 12.
-    fn default() -> MotorTable {
-        MotorTable {
-            steps_per_turn: 200,
-            microsteps: 16,
-            gear: 12.0,
-            reversed: false,
-            address: 1,
-            motor: 0,
-            module: Some(1140),
-            home: Home::ReferenceSearch,
-            home_direction: Side::Left,
-            home_inverted: false,
-            home_angle_deg: 0.0,
-            search_speed_deg_per_s: Some(30.0),
-            largest_angle_deg: 85.0,
-            largest_rate: 5.0,
-            largest_speed_deg_per_s: 600.0,
-            acceleration_deg_per_s2: 8000.0,
-            units: Units::Pps,
-            pulse_divisor: 0,
-            ramp_divisor: 0,
-            watchdog_ms: Some(2000),
-        }
-    }
 }
 
 impl MotorTable {

@@ -11,7 +11,7 @@ use crate::sync::locked;
 use std::collections::VecDeque;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -72,10 +72,6 @@ struct Shared {
     /// Signalled when an event is added or removed.
     changed: Condvar,
     stop: AtomicBool,
-    lost: AtomicU64,
-    unrecorded: AtomicU64,
-    disconnections: AtomicU64,
-    left_out: AtomicU64,
     wake: Option<Wake>,
 }
 
@@ -89,11 +85,12 @@ struct Queue {
     lost_volume: Option<u32>,
     /// Why the source is not connected at the moment.
     disconnected: Option<String>,
+    counts: FeedCounts,
 }
 
 impl Queue {
     /// Loses the oldest volume that is queued, if a newer one has come before `volume`: it would not be shown. False if there is none.
-    fn discard_before(&mut self, volume: u32, lost: &AtomicU64) -> bool {
+    fn discard_before(&mut self, volume: u32) -> bool {
         let volume_of = |arrived: &Arrived| match &arrived.event {
             Event::Frame(frame) => Some(frame.volume),
             _ => None,
@@ -103,7 +100,7 @@ impl Queue {
         let before = self.events.len();
         self.events.retain(|arrived| volume_of(arrived) != Some(oldest));
         self.bytes = self.events.iter().map(|arrived| bytes_of(&arrived.event)).sum();
-        lost.fetch_add((before - self.events.len()) as u64, Ordering::Relaxed);
+        self.counts.lost += (before - self.events.len()) as u64;
         true
     }
 }
@@ -119,9 +116,7 @@ impl Shared {
     fn set_disconnected(&self, why: Option<String>) {
         let mut queue = locked(&self.queue);
         if queue.disconnected != why {
-            if queue.disconnected.is_none() {
-                self.disconnections.fetch_add(1, Ordering::Relaxed);
-            }
+            queue.counts.disconnected += u64::from(queue.disconnected.is_none());
             queue.disconnected = why;
             drop(queue);
             self.wake.iter().for_each(|wake| wake());
@@ -139,12 +134,12 @@ impl Shared {
                 queue = self.changed.wait_timeout(queue, PATIENCE).map_or_else(|e| e.into_inner().0, |w| w.0);
             }
             queue.newest = Some(frame.volume);
-            while !can_wait && is_full(&queue) && queue.discard_before(frame.volume, &self.lost) {}
+            while !can_wait && is_full(&queue) && queue.discard_before(frame.volume) {}
             if is_full(&queue) {
                 queue.lost_volume = Some(frame.volume);
             }
             if queue.lost_volume == Some(frame.volume) {
-                self.lost.fetch_add(1, Ordering::Relaxed);
+                queue.counts.lost += 1;
                 return;
             }
         }
@@ -152,9 +147,12 @@ impl Shared {
         queue.events.push_back(arrived);
         drop(queue);
         self.changed.notify_all();
-        if let Some(wake) = &self.wake {
-            wake();
-        }
+        self.wake.iter().for_each(|wake| wake());
+    }
+
+    /// Changes the counts. It takes the lock of the queue.
+    fn count(&self, by: impl FnOnce(&mut FeedCounts)) {
+        by(&mut locked(&self.queue).counts);
     }
 }
 
@@ -236,10 +234,7 @@ impl Feed {
 
     /// The counts so far.
     pub fn counts(&self) -> FeedCounts {
-        let Shared { lost, unrecorded, disconnections, left_out, .. } = &*self.shared;
-        let [lost, unrecorded, disconnected, left_out] =
-            [lost, unrecorded, disconnections, left_out].map(|count| count.load(Ordering::Relaxed));
-        FeedCounts { lost, unrecorded, disconnected, left_out }
+        locked(&self.shared.queue).counts
     }
 }
 
@@ -260,18 +255,19 @@ fn listen(source: Box<dyn Live>, mut tap: Option<RecordingTap>, mut observer: Op
     // After the recording: that has the pictures themselves.
     let mut posed = source.compounding().map(Posed::new);
     let _guard = EndOnPanic(shared);
+    let mut left_out_before = 0;
     while !shared.stop.load(Ordering::Relaxed) {
         let event = source.next(PATIENCE);
         let at = Instant::now();
         shared.set_disconnected(source.disconnected());
         let is_frame = matches!(event, Event::Frame(_));
         if records && is_frame && tap.is_none() {
-            shared.unrecorded.fetch_add(1, Ordering::Relaxed);
+            shared.count(|counts| counts.unrecorded += 1);
         }
         if let Some(Err(fault)) = tap.as_mut().map(|tap| tap.write(&event, at)) {
             // Without a file the recording ends. A frame that cannot be written does not prevent the next; failures in a row are
             // reported once.
-            shared.unrecorded.fetch_add(1, Ordering::Relaxed);
+            shared.count(|counts| counts.unrecorded += 1);
             let ends = matches!(event, Event::Begin(_));
             let is_reported = tap.as_mut().is_some_and(|tap| std::mem::replace(&mut tap.is_failing, true));
             tap = tap.filter(|_| !ends);
@@ -283,7 +279,7 @@ fn listen(source: Box<dyn Live>, mut tap: Option<RecordingTap>, mut observer: Op
             tap.is_failing = false;
         }
         let ends = matches!(event, Event::End(_));
-        if ends && let Some(Err(fault)) = tap.take().map(RecordingTap::finish) {
+        if ends && let Some(Err(fault)) = tap.take().map(|mut tap| tap.finish()) {
             shared.put(Arrived { event: Event::Fault(format!("the recording has no index: {fault}")), at }, can_wait);
         }
         let events = match &mut posed {
@@ -291,7 +287,10 @@ fn listen(source: Box<dyn Live>, mut tap: Option<RecordingTap>, mut observer: Op
             None => vec![event],
         };
         let left_out = source.left_out() + posed.as_ref().map_or(0, Posed::lost);
-        shared.left_out.store(left_out, Ordering::Relaxed);
+        if left_out != left_out_before {
+            shared.count(|counts| counts.left_out = left_out);
+            left_out_before = left_out;
+        }
         for event in events.into_iter().filter(|event| !matches!(event, Event::Idle)) {
             observer.iter_mut().for_each(|observer| observer(&event));
             shared.put(Arrived { event, at }, can_wait);
@@ -300,7 +299,7 @@ fn listen(source: Box<dyn Live>, mut tap: Option<RecordingTap>, mut observer: Op
             return;
         }
     }
-    if let Some(Err(fault)) = tap.map(RecordingTap::finish) {
+    if let Some(Err(fault)) = tap.map(|mut tap| tap.finish()) {
         tracing::warn!("the recording has no index: {fault}");
     }
 }
@@ -343,7 +342,7 @@ impl RecordingTap {
         let seconds = at.saturating_duration_since(*BEGAN.get_or_init(|| at)).as_secs_f64();
         match event {
             Event::Begin(header) if self.header.as_ref() != Some(header) => {
-                self.finish_file()?;
+                self.finish()?;
                 let path = self.free_name();
                 self.writer = Some(Writer::create(&path, (**header).clone()).map_err(|e| e.to_string())?);
                 self.header = Some((**header).clone());
@@ -371,13 +370,9 @@ impl RecordingTap {
         }
     }
 
-    fn finish_file(&mut self) -> Result<(), String> {
+    /// Ends the current file, if there is one, with its index.
+    fn finish(&mut self) -> Result<(), String> {
         self.writer.take().map_or(Ok(()), Writer::finish).map_err(|e| e.to_string())
-    }
-
-    /// Ends the current file with its index.
-    fn finish(mut self) -> Result<(), String> {
-        self.finish_file()
     }
 }
 

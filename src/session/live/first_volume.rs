@@ -31,12 +31,10 @@ impl FirstVolume {
     /// Notes a new header. Returns what the default settings are derived from before any frame has arrived. None if the header is the previous
     /// one, whose settings stay.
     pub fn begin(&mut self, header: &Header) -> Option<Defaults> {
-        if self.header.as_ref() == Some(header) {
-            return None;
-        }
+        let begun = self.at_begin(header)?;
         self.collected = self.layers.needs_levels().then(|| Collected::new(header));
         self.header = Some(header.clone());
-        Some(self.defaults(header, None))
+        Some(begun)
     }
 
     /// What the default settings for this header are derived from before any frame has arrived. None if the header is the previous one. Unlike

@@ -344,10 +344,7 @@ impl Session {
 
     /// Starts to send a volume of the cine loop to the device, in place of one that is being sent. Does nothing if no volume image is free.
     pub(crate) fn start_replay(&mut self, volume: CineVolume) {
-        let image = match &self.replay {
-            Some(replay) => Some(replay.image),
-            None => self.pool.spare(),
-        };
+        let image = self.replay.as_ref().map(|replay| replay.image).or_else(|| self.pool.spare());
         if let Some(image) = image {
             self.replay = Some(Replay { volume, sent: 0, image });
         }

@@ -53,10 +53,10 @@ pub fn as_set<'a>(
     demo: Option<Demo>,
 ) -> Result<Cow<'a, Picture>, String> {
     let has_lines = scene.has_reference() || scene.has_curve() || start.is_some();
-    let is_annotated = !scene.settings.measure.is_empty() || !scene.settings.body_marks.is_empty();
+    let is_annotated = !scene.settings.drawn.measure.is_empty() || !scene.settings.drawn.body_marks.is_empty();
     let is_drawn_on = is_annotated || has_lines || demo == Some(Demo::Always);
     let origin = demo.map(|_| DEMO_DATA);
-    match scene.settings.marks.bar {
+    match scene.settings.drawn.marks.bar {
         false if !is_drawn_on => Ok(Cow::Borrowed(picture)),
         false => measured(picture, scene, volume, start, origin).map(Cow::Owned),
         true => marked(picture, scene, volume, start, &time_line(SystemTime::now()), origin).map(Cow::Owned),

@@ -34,7 +34,7 @@ const WIDEST: f64 = 600.0;
 /// # Errors
 /// One line: the drawing of a label failed.
 pub(super) fn draw(picture: &mut Picture, scene: &Scene, volume: Option<u32>) -> Result<(), String> {
-    for drawn in overlay::drawn(scene, volume, &scene.settings.measure) {
+    for drawn in overlay::drawn(scene, volume, &scene.settings.drawn.measure) {
         let mut strokes: Vec<[[f64; 2]; 2]> = Vec::new();
         for line in &drawn.lines {
             strokes.extend(line.windows(2).map(|ends| [ends[0], ends[1]]));
@@ -109,7 +109,7 @@ pub(super) fn curve(picture: &mut Picture, scene: &Scene) -> Result<(), String> 
 /// Draws the body marks: the outline of the body as a thin line, the probe as a bar with a dot at its marked end.
 pub(super) fn body_marks(picture: &mut Picture, scene: &Scene) {
     let size = [picture.width, picture.height].map(f64::from);
-    for mark in bodies::drawn(&scene.settings.body_marks, size) {
+    for mark in bodies::drawn(&scene.settings.drawn.body_marks, size) {
         // Thinner where the mark is small: its lines must not run into each other.
         let half = (mark.edge / 130.0).clamp(0.5, 1.5);
         let lines = mark.outline.iter().flat_map(|line| line.windows(2).map(|ends| [ends[0], ends[1]]));

@@ -5,14 +5,6 @@ use crate::segment::sections::{Arrangement, Plane, SAME_ANGLE, SAME_PLANE, arran
 use glam::DVec3;
 use std::f64::consts::PI;
 
-/// How the planes of contours are arranged.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stack {
-    Parallel,
-    /// The planes contain a common axis, about which they are rotated.
-    Rotated,
-}
-
 /// The volume that contours (in mm) enclose, mm^3, and the arrangement of their planes.
 ///
 /// In parallel planes each area counts from halfway to the previous plane to halfway to the next one; the outermost areas extend as far outwards
@@ -20,23 +12,17 @@ pub enum Stack {
 ///
 /// # Errors
 /// One line: there are fewer than two planes, a contour has no area, or the planes are neither parallel nor share an axis.
-pub fn volume(contours: &[Vec<DVec3>]) -> Result<(f64, Stack), &'static str> {
+pub fn volume(contours: &[Vec<DVec3>]) -> Result<(f64, Arrangement), &'static str> {
     let (planes, arrangement) = arranged(contours)?;
-    match arrangement {
-        Arrangement::Parallel { normal } => parallel(&planes, normal).map(|mm3| (mm3, Stack::Parallel)),
-        Arrangement::Rotated { axis, through } => Ok((rotated(contours, &planes, axis, through), Stack::Rotated)),
-    }
+    let mm3 = match arrangement {
+        Arrangement::Parallel { normal } => parallel(&planes, normal)?,
+        Arrangement::Rotated { axis, through } => rotated(contours, &planes, axis, through),
+    };
+    Ok((mm3, arrangement))
 }
 
 fn parallel(planes: &[Plane], normal: DVec3) -> Result<f64, &'static str> {
-    let mut sections: Vec<(f64, f64)> = planes.iter().map(|plane| (plane.at.dot(normal), plane.area)).collect();
-    sections.sort_by(|a, b| a.0.total_cmp(&b.0));
-    // Several parts in one plane are one section.
-    sections.dedup_by(|later, earlier| {
-        let is_same = later.0 - earlier.0 < SAME_PLANE;
-        earlier.1 += if is_same { later.1 } else { 0.0 };
-        is_same
-    });
+    let sections = sections(planes.iter().map(|plane| (plane.at.dot(normal), plane.area)), SAME_PLANE);
     let [(low, first), .., (high, last)] = sections[..] else {
         return Err("all contours lie in one plane: step the plane between them");
     };
@@ -47,29 +33,33 @@ fn parallel(planes: &[Plane], normal: DVec3) -> Result<f64, &'static str> {
 
 fn rotated(contours: &[Vec<DVec3>], planes: &[Plane], axis: DVec3, through: DVec3) -> f64 {
     let reference = planes[0].normal;
-    let mut sections: Vec<(f64, f64)> = contours
-        .iter()
-        .zip(planes)
-        .map(|(contour, plane)| {
-            let outwards = plane.normal.cross(axis).normalize();
-            let turned = plane.normal.cross(reference).dot(axis).atan2(plane.normal.dot(reference)).rem_euclid(PI);
-            // A plane at the angle 0 may be a rounding below half a turn.
-            let turned = if turned > PI - SAME_ANGLE { turned - PI } else { turned };
-            (turned, moment(contour, through, outwards, axis))
-        })
-        .collect();
-    sections.sort_by(|a, b| a.0.total_cmp(&b.0));
-    sections.dedup_by(|later, earlier| {
-        let is_same = later.0 - earlier.0 < SAME_ANGLE;
-        earlier.1 += if is_same { later.1 } else { 0.0 };
-        is_same
-    });
+    let of = |(contour, plane): (&Vec<DVec3>, &Plane)| {
+        let outwards = plane.normal.cross(axis).normalize();
+        let turned = plane.normal.cross(reference).dot(axis).atan2(plane.normal.dot(reference)).rem_euclid(PI);
+        // A plane at the angle 0 may be a rounding below half a turn.
+        let turned = if turned > PI - SAME_ANGLE { turned - PI } else { turned };
+        (turned, moment(contour, through, outwards, axis))
+    };
+    let sections = sections(contours.iter().zip(planes).map(of), SAME_ANGLE);
     let count = sections.len();
     let gap = |n: usize| match n + 1 == count {
         true => sections[0].0 + PI - sections[n].0,
         false => sections[n + 1].0 - sections[n].0,
     };
     (0..count).map(|n| sections[n].1 * (gap(n) + gap((n + count - 1) % count)) / 2.0).sum()
+}
+
+/// Adds up parts, each a place (mm or radians) and an amount: those less than `reach` beyond the first of a section, as in one plane, belong to it. In
+/// rising order of places.
+fn sections(parts: impl Iterator<Item = (f64, f64)>, reach: f64) -> Vec<(f64, f64)> {
+    let mut sections: Vec<(f64, f64)> = parts.collect();
+    sections.sort_by(|a, b| a.0.total_cmp(&b.0));
+    sections.dedup_by(|later, earlier| {
+        let is_same = later.0 - earlier.0 < reach;
+        earlier.1 += if is_same { later.1 } else { 0.0 };
+        is_same
+    });
+    sections
 }
 
 /// The integral of the distance from the axis over the area of a contour, mm^3: what it sweeps in a turn of one radian, of both sides.
@@ -127,7 +117,8 @@ mod tests {
             let stack: Vec<_> =
                 (0..count).filter_map(|n| section(normal, (f64::from(n) + 0.5) * step - 20.0)).collect();
             let (found, how) = volume(&stack).expect("a volume");
-            assert!(how == Stack::Parallel && (found / BALL - 1.0).abs() < 0.01, "{count}: {found} of {BALL}");
+            let is_parallel = matches!(how, Arrangement::Parallel { .. });
+            assert!(is_parallel && (found / BALL - 1.0).abs() < 0.01, "{count}: {found} of {BALL}");
             // In any order, and whatever the sense of a contour.
             let mut mixed = stack.clone();
             mixed.reverse();
@@ -147,7 +138,8 @@ mod tests {
             });
             let turned: Vec<_> = planes.filter_map(|normal| section(normal, 0.0)).collect();
             let (found, how) = volume(&turned).expect("a volume");
-            assert!(how == Stack::Rotated && (found / BALL - 1.0).abs() < 0.002, "{count}: {found} of {BALL}");
+            let is_rotated = matches!(how, Arrangement::Rotated { .. });
+            assert!(is_rotated && (found / BALL - 1.0).abs() < 0.002, "{count}: {found} of {BALL}");
         }
     }
 

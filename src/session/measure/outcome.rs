@@ -1,8 +1,9 @@
 //! The results of measurements: their quantities with units, a label, and all of them as CSV.
 
-use super::contours::{self, Stack};
+use super::contours;
 use super::shapes::{self, Ellipse};
 use crate::scene::{MeasureKind, Measurement};
+use crate::segment::sections::Arrangement;
 use crate::text::csv_quoted;
 use crate::tree::ToNode;
 use glam::DVec3;
@@ -74,8 +75,8 @@ pub fn quantities(measured: &Measurement) -> Result<Vec<Quantity>, &'static str>
             let contours: Vec<Vec<DVec3>> = measured.contours.iter().map(|contour| places(contour)).collect();
             let (mm3, how) = contours::volume(&contours)?;
             let name = match how {
-                Stack::Parallel => "volume by parallel contours",
-                Stack::Rotated => "volume by rotated contours",
+                Arrangement::Parallel { .. } => "volume by parallel contours",
+                Arrangement::Rotated { .. } => "volume by rotated contours",
             };
             vec![Quantity::of(name, mm3 / 1000.0, "cm3")]
         }

@@ -198,34 +198,22 @@ fn of(
         }
         MeasureKind::Volume => {
             let shown: Vec<_> = measured.contours.iter().filter_map(|contour| path(contour)).map(closed).collect();
-            if shown.is_empty() {
-                return None;
-            }
-            shown
+            Some(shown).filter(|shown| !shown.is_empty())?
         }
         MeasureKind::Trace => vec![closed(path(&measured.points)?)],
         MeasureKind::Ellipse => {
             let places: Vec<DVec3> = measured.points.iter().map(|point| scene.place_of(*point)).collect();
-            let outline = <[DVec3; 3]>::try_from(&places[..]).ok().and_then(Ellipse::of);
-            let outline: Option<Vec<_>> =
-                outline.map(|ellipse| ellipse.outline(OUTLINE).map(&project).collect::<Option<Vec<_>>>())?;
+            let ellipse = <[DVec3; 3]>::try_from(&places[..]).ok().and_then(Ellipse::of)?;
             points = path(&measured.points)?;
-            vec![closed(outline?)]
+            vec![closed(ellipse.outline(OUTLINE).map(&project).collect::<Option<_>>()?)]
         }
-        MeasureKind::Distance | MeasureKind::Angle | MeasureKind::Surface => {
+        MeasureKind::Distance | MeasureKind::Angle | MeasureKind::Surface | MeasureKind::Arrow => {
             let line = path(&measured.points)?;
             points = match (measured.kind, &line[..]) {
                 (MeasureKind::Surface, [first, .., last]) => vec![*first, *last],
                 _ => line.clone(),
             };
-            vec![line]
-        }
-        MeasureKind::Arrow => {
-            let line = path(&measured.points)?;
-            if let [tip, tail] = line[..] {
-                head = Some([tip, tail]);
-            }
-            points = line.clone();
+            head = line[..].try_into().ok().filter(|_| measured.kind == MeasureKind::Arrow);
             vec![line]
         }
         MeasureKind::Text => {

@@ -6,11 +6,12 @@ pub mod pdf;
 mod view;
 
 use crate::digest::sha256;
-use crate::measure::contours::{self, Stack};
+use crate::measure::contours;
 use crate::measure::made;
 use crate::measure::outcome::{self, Quantity};
 use crate::picture::Picture;
 use crate::scene::{Made, MeasureKind, Measurement, Scene, Settings};
+use crate::segment::sections::Arrangement;
 use crate::text::{csv_quoted, printable};
 use crate::tree::{self, FromNode, Node, NodeError, ToNode};
 use toml::{Table, Value};
@@ -144,7 +145,7 @@ impl Block {
     /// The entry with this picture. `time`: time stamp of the volume, s.
     pub fn entry(&self, picture: &Picture, time: Option<f64>) -> Entry {
         let scene = self.scene();
-        let measured = &scene.settings.measure[self.index];
+        let measured = &scene.settings.drawn.measure[self.index];
         let quantities = outcome::quantities(measured);
         let fault = quantities.as_ref().err().map(|why| why.to_string());
         let plane = made::plane(scene, view::shown_points(measured), measured.on_surface);
@@ -193,8 +194,8 @@ fn method(measured: &Measurement) -> Option<String> {
             let places = |contour: &Vec<[f64; 3]>| contour.iter().map(|point| (*point).into()).collect();
             let contours: Vec<_> = measured.contours.iter().map(places).collect();
             Some(match contours::volume(&contours).ok()?.1 {
-                Stack::Parallel => format!("{count} contours in parallel planes: area times distance"),
-                Stack::Rotated => format!("{count} contours in planes through one axis, turned about it"),
+                Arrangement::Parallel { .. } => format!("{count} contours in parallel planes: area times distance"),
+                Arrangement::Rotated { .. } => format!("{count} contours in planes through one axis, turned about it"),
             })
         }
         MeasureKind::Threshold => {
@@ -246,8 +247,7 @@ impl Entry {
 
 /// The rows of which something is known, safe to print.
 fn rows_of<const N: usize>(all: [(&str, Option<String>); N]) -> impl Iterator<Item = Row> {
-    let known = all.into_iter().filter_map(|(label, words)| Some((label.to_string(), printable(&words?))));
-    known.collect::<Vec<_>>().into_iter()
+    all.into_iter().filter_map(|(label, words)| Some((label.to_string(), printable(&words?))))
 }
 
 fn capitalised(words: &str) -> String {
@@ -282,7 +282,7 @@ impl Sheet {
     /// The results as CSV, a line for each quantity: the columns that the viewer saves, and digests, the program's version and the device.
     /// `settings`: those of the workspace, with the measurements.
     pub fn csv(&self, settings: &Settings) -> String {
-        let mut all = settings.measure.clone();
+        let mut all = settings.drawn.measure.clone();
         for entry in &self.measurements {
             let Entry { volume, time, plane, settings, .. } = entry.clone();
             if let Some(measured) = entry.number.checked_sub(1).and_then(|index| all.get_mut(index)) {

@@ -28,7 +28,7 @@ pub(super) struct View {
 /// # Errors
 /// One line: the scene allows none of the views.
 pub(super) fn of(scene: &Scene, index: usize, volume: u32) -> Result<View, String> {
-    let measured = &scene.settings.measure[index];
+    let measured = &scene.settings.drawn.measure[index];
     let (moved, own) = match measured.on_surface {
         true => {
             let turned = turned(scene, measured);
@@ -60,7 +60,7 @@ pub(super) fn with(scene: &Scene, set: Vec<String>, index: usize, volume: u32) -
         true => scene.clone(),
         false => Scene::new(scene.geometry.clone(), scene.input, settings).map_err(|e| e.to_string())?,
     };
-    let drawn = overlay::drawn(&scene, Some(volume), &scene.settings.measure);
+    let drawn = overlay::drawn(&scene, Some(volume), &scene.settings.drawn.measure);
     let is_within = |drawn: &overlay::Drawn| {
         let [corner, size] = drawn.tile;
         let all = drawn.lines.iter().flatten().chain(drawn.points.iter().map(|(_, at)| at));

@@ -9,6 +9,8 @@ use std::path::Path;
 
 /// What is read of DICOM, for messages.
 const READ: &str = "of DICOM, ultrasound is read: images, enhanced volumes, Kretz and Philips' Cartesian volumes";
+/// The fault of Philips' files that state no number of slices.
+const PRIVATE: &str = "holds Philips' private 3D data (1.2.840.113543.6.6.1.3.10002), whose form is not public: export Cartesian DICOM from QLAB";
 /// Longest name of a scanner, characters.
 const MAX_NAME: usize = 64;
 
@@ -20,29 +22,22 @@ pub(super) fn accept(path: &Path, elements: &Elements) -> Result<Class, InputErr
     let uid = class_uid(elements);
     let (class, name) = class(&uid);
     let modality = elements.root.text(tags::MODALITY);
-    let is_philips =
-        elements.root.text(tags::PHILIPS) == "Philips3D" && elements.root.long(tags::PHILIPS_SLICES).is_some();
-    match class {
-        _ if is_philips => Ok(Class::Philips),
-        Class::Philips if elements.root.long(tags::PHILIPS_SLICES).is_some() => Ok(Class::Philips),
-        Class::Philips => {
-            let fault = "holds Philips' private 3D data (1.2.840.113543.6.6.1.3.10002), whose form is not public: export Cartesian DICOM from QLAB";
-            Err(InputError::new(path, "file", fault))
-        }
+    let is_philips = elements.root.text(tags::PHILIPS) == "Philips3D" || class == Class::Philips;
+    if is_philips && elements.root.long(tags::PHILIPS_SLICES).is_some() {
+        return Ok(Class::Philips);
+    }
+    let shown_modality = escaped(&modality, 16);
+    let fault = match class {
+        Class::Philips => PRIVATE.into(),
         Class::Other => {
             let shown = if name.contains("not known") { format!(" ({})", quoted(&uid)) } else { String::new() };
-            let modality = match modality.is_empty() {
-                true => String::new(),
-                false => format!(", modality {}", escaped(&modality, 16)),
-            };
-            Err(InputError::new(path, "file", format!("is a DICOM {name}{shown}{modality}; {READ}")))
+            let of_modality = if modality.is_empty() { String::new() } else { format!(", modality {shown_modality}") };
+            format!("is a DICOM {name}{shown}{of_modality}; {READ}")
         }
-        Class::Capture if modality != "US" => {
-            let modality = escaped(&modality, 16);
-            Err(InputError::new(path, "file", format!("is a DICOM {name} of modality '{modality}'; {READ}")))
-        }
-        other => Ok(other),
-    }
+        Class::Capture if modality != "US" => format!("is a DICOM {name} of modality '{shown_modality}'; {READ}"),
+        other => return Ok(other),
+    };
+    Err(InputError::new(path, "file", fault))
 }
 
 fn class_uid(elements: &Elements) -> String {

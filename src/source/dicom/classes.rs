@@ -48,7 +48,8 @@ const CLASSES: [(&str, Class, &str); 30] = [
     ("481.1", Class::Other, "RT image"),
     ("481.3", Class::Other, "RT structure set"),
 ];
-const DIRECTORY: &str = "1.2.840.10008.1.3.10";
+/// A file that lists others, in the folders of exported discs.
+pub(super) const DIRECTORY: &str = "1.2.840.10008.1.3.10";
 const PHILIPS: &str = "1.2.840.113543.6.6.1.3.10002";
 
 /// The kind of object that the UID of a SOP class stands for, and its name for users.

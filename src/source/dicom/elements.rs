@@ -253,6 +253,10 @@ impl Walk<'_> {
         Err(InputError::new(self.file.path, field, fault))
     }
 
+    fn cut<T>(&self, field: &str) -> Result<T, InputError> {
+        self.fault(field, format!("cut short after {} bytes", self.at))
+    }
+
     /// Exactly so many bytes; None at the end of the file if there is not even one.
     fn take<const N: usize>(&mut self, field: &str) -> Result<Option<[u8; N]>, InputError> {
         let mut bytes = [0; N];
@@ -270,15 +274,12 @@ impl Walk<'_> {
         match got {
             0 => Ok(None),
             _ if got == N => Ok(Some(bytes)),
-            _ => self.fault(field, format!("cut short after {} bytes", self.at)),
+            _ => self.cut(field),
         }
     }
 
     fn need<const N: usize>(&mut self, field: &str) -> Result<[u8; N], InputError> {
-        match self.take(field)? {
-            Some(bytes) => Ok(bytes),
-            None => self.fault(field, format!("cut short after {} bytes", self.at)),
-        }
+        self.take(field)?.map_or_else(|| self.cut(field), Ok)
     }
 
     /// Checks that a value lies in the file.
@@ -290,12 +291,21 @@ impl Walk<'_> {
         }
     }
 
+    /// The end of a value of this length, which lies in the file; None if the length is not stated.
+    fn end_of(&self, length: u32, field: &str) -> Result<Option<u64>, InputError> {
+        if length == UNDEFINED {
+            return Ok(None);
+        }
+        self.check(length.into(), field)?;
+        Ok(Some(self.at + u64::from(length)))
+    }
+
     fn skip(&mut self, bytes: u64, field: &str) -> Result<(), InputError> {
         self.check(bytes, field)?;
-        match self.input.skip(bytes) {
-            Ok(()) => self.at += bytes,
-            Err(_) => return self.fault(field, format!("cut short, {bytes} bytes after {} are not there", self.at)),
+        if self.input.skip(bytes).is_err() {
+            return self.fault(field, format!("cut short, {bytes} bytes after {} are not there", self.at));
         }
+        self.at += bytes;
         Ok(())
     }
 
@@ -338,6 +348,11 @@ impl Walk<'_> {
         Ok(Some(Head { tag, vr, length }))
     }
 
+    /// The head of the next element, which must be there.
+    fn next_head(&mut self, field: &str) -> Result<Head, InputError> {
+        self.head()?.map_or_else(|| self.cut(field), Ok)
+    }
+
     /// The file meta information: group 0002, always little-endian with types.
     fn meta(&mut self) -> Result<Item, InputError> {
         let mut meta = Item::default();
@@ -359,19 +374,20 @@ impl Walk<'_> {
         }
         while end.is_none_or(|end| self.at < end) {
             let Some(head) = self.head()? else {
-                return match depth == 0 && end.is_none() {
-                    true => Ok(()),
-                    false => self.fault("elements", format!("cut short after {} bytes", self.at)),
-                };
+                return if depth == 0 && end.is_none() { Ok(()) } else { self.cut("elements") };
             };
             if head.tag == ITEM_END && end.is_none() && depth > 0 {
                 return Ok(());
             }
-            self.element(&head, depth, keep, item)?;
+            let is_known = WANTED.iter().any(|wanted| wanted.tag == head.tag);
+            match depth == 0 && keep && !is_known && head.tag != PIXEL_DATA && head.tag & 0xffff != 0 {
+                true => self.not_kept(&head)?,
+                false => self.value_of(&head, depth, keep, item)?,
+            }
         }
-        match end.is_some_and(|end| self.at > end) {
-            true => self.fault("items", format!("end {} bytes after where they should", self.at - end.unwrap_or(0))),
-            false => Ok(()),
+        match end.filter(|end| self.at > *end) {
+            Some(end) => self.fault("items", format!("end {} bytes after where they should", self.at - end)),
+            None => Ok(()),
         }
     }
 
@@ -392,15 +408,6 @@ impl Walk<'_> {
             self.skipped.known.push((key, "stated".into()));
         }
         self.value_of(head, 0, false, &mut Item::default())
-    }
-
-    fn element(&mut self, head: &Head, depth: usize, keep: bool, item: &mut Item) -> Result<(), InputError> {
-        let tag = head.tag;
-        let is_known = WANTED.iter().any(|wanted| wanted.tag == tag);
-        if depth == 0 && keep && !is_known && tag != PIXEL_DATA && tag & 0xffff != 0 {
-            return self.not_kept(head);
-        }
-        self.value_of(head, depth, keep, item)
     }
 
     /// Reads or skips the value of an element.
@@ -458,32 +465,22 @@ impl Walk<'_> {
     }
 
     fn sequence(&mut self, tag: Tag, length: u32, depth: usize, keep: bool) -> Result<Vec<Item>, InputError> {
-        let end = match length {
-            UNDEFINED => None,
-            _ => {
-                self.check(length.into(), &name(tag))?;
-                Some(self.at + u64::from(length))
-            }
-        };
+        let field = name(tag);
+        let end = self.end_of(length, &field)?;
         let mut items = Vec::new();
         while end.is_none_or(|end| self.at < end) {
-            let Some(head) = self.head()? else {
-                return self.fault(&name(tag), format!("cut short after {} bytes", self.at));
-            };
-            match (head.tag, head.length) {
-                (SEQUENCE_END, _) => return Ok(items),
-                (ITEM, length) => {
-                    let end = (length != UNDEFINED).then(|| self.at + u64::from(length));
-                    if length != UNDEFINED {
-                        self.check(length.into(), &name(tag))?;
-                    }
+            let head = self.next_head(&field)?;
+            match head.tag {
+                SEQUENCE_END => return Ok(items),
+                ITEM => {
+                    let end = self.end_of(head.length, &field)?;
                     let mut item = Item::default();
                     self.elements(end, depth + 1, keep, &mut item)?;
                     if keep {
                         items.push(item);
                     }
                 }
-                (other, _) => return self.fault(&name(tag), format!("has {} where an item begins", name(other))),
+                other => return self.fault(&field, format!("has {} where an item begins", name(other))),
             }
         }
         Ok(items)
@@ -496,29 +493,25 @@ impl Walk<'_> {
             self.pixels = Some(found);
             return Ok(());
         }
-        let (mut table, mut fragments, mut is_first) = (Vec::new(), Vec::new(), true);
+        let (mut table, mut fragments) = (None, Vec::new());
         loop {
-            let Some(head) = self.head()? else {
-                return self.fault(FIELD, format!("cut short after {} bytes", self.at));
-            };
-            match (head.tag, head.length) {
-                (SEQUENCE_END, _) => break,
-                (ITEM, length) if length != UNDEFINED => {
-                    if std::mem::take(&mut is_first) {
-                        self.check(length.into(), FIELD)?;
-                        if u64::from(length) > MAX_VALUE {
-                            return self.fault(FIELD, format!("has a table of {length} bytes"));
-                        }
-                        let bytes = self.value(PIXEL_DATA, length.into())?;
-                        table = bytes.as_chunks::<4>().0.iter().map(|b| u32::from_le_bytes(*b)).collect();
-                        continue;
+            let head = self.next_head(FIELD)?;
+            let length = u64::from(head.length);
+            match head.tag {
+                SEQUENCE_END => break,
+                ITEM if head.length != UNDEFINED && table.is_some() => fragments.push(self.fragment(length)?),
+                ITEM if head.length != UNDEFINED => {
+                    self.check(length, FIELD)?;
+                    if length > MAX_VALUE {
+                        return self.fault(FIELD, format!("has a table of {length} bytes"));
                     }
-                    fragments.push(self.fragment(length.into())?);
+                    let bytes = self.value(PIXEL_DATA, length)?;
+                    table = Some(bytes.as_chunks::<4>().0.iter().map(|b| u32::from_le_bytes(*b)).collect());
                 }
-                (other, _) => return self.fault(FIELD, format!("has {} where a fragment begins", name(other))),
+                other => return self.fault(FIELD, format!("has {} where a fragment begins", name(other))),
             }
         }
-        self.pixels = Some(PixelData::Encapsulated(table, fragments));
+        self.pixels = Some(PixelData::Encapsulated(table.unwrap_or_default(), fragments));
         Ok(())
     }
 

@@ -4,11 +4,9 @@ use super::super::layout::Layout;
 use super::super::packed::InputFile;
 use super::super::{OpenOptions, kretz};
 use super::about::{about, accept};
-use super::classes::Class;
-use super::classes::Coding;
+use super::classes::{Class, Coding};
 use super::elements::Elements;
-use super::image::Arrangement;
-use super::image::Image;
+use super::image::{Arrangement, Image};
 use super::placed::{Placed, layout};
 use super::tags;
 use super::{regions, volume};
@@ -20,7 +18,6 @@ use crate::files::InputError;
 /// The file is cut short or damaged, holds no ultrasound, or has pixels of a kind that is not read.
 pub(in super::super) fn read(file: &InputFile, options: &OpenOptions) -> Result<Layout, InputError> {
     let elements = Elements::read(file)?;
-    let fault = |field: &str, fault: String| Err(InputError::new(file.path, field, fault));
     if let Some((offset, length)) = elements.kretz {
         let mut layout = kretz::read(&file.window(offset, length))?;
         layout.format = "Kretz volume in DICOM";
@@ -45,12 +42,10 @@ pub(in super::super) fn read(file: &InputFile, options: &OpenOptions) -> Result<
     let is_in_order = placed.order.iter().copied().eq(0..image.places.len());
     let is_direct = is_plain && is_whole && is_in_order;
     if file.is_packed() && !is_direct {
-        let what = if image.coding == Coding::Native {
-            "parts of frames, or pixels in another order"
-        } else {
-            "compressed frames"
-        };
-        return fault("file", format!("is packed by gzip, which is not read for {what}: unpack it"));
+        let is_native = image.coding == Coding::Native;
+        let what = if is_native { "parts of frames, or pixels in another order" } else { "compressed frames" };
+        let fault = format!("is packed by gzip, which is not read for {what}: unpack it");
+        return Err(InputError::new(file.path, "file", fault));
     }
     let direct = image.parts.first().filter(|_| is_direct).map(|(offset, _)| file.pixels(*offset));
     let mut remarks = about(&elements);

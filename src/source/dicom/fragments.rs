@@ -53,12 +53,10 @@ pub(super) fn divided(
         let frames = stated.first().copied().unwrap_or(1);
         return Err(format!("has {all} fragments for {frames} frames, and no table that divides them"));
     };
-    let mut warnings = warnings(stated, table, &firsts)?;
-    if most > firsts.len() {
-        warnings.push(format!(
-            "{most} fragments begin like frames, but not all behind an end mark: {} are read",
-            firsts.len()
-        ));
+    let (mut warnings, there) = (warnings(stated, table, &firsts)?, firsts.len());
+    if most > there {
+        let text = "fragments begin like frames, but not all behind an end mark";
+        warnings.push(format!("{most} {text}: {there} are read"));
     }
     let ends = firsts.iter().skip(1).copied().chain([all]);
     Ok(Divided { frames: firsts.iter().zip(ends).map(|(first, end)| (*first, end - first)).collect(), warnings })

@@ -28,40 +28,23 @@ impl Frames {
         self.image.pixel.channels
     }
 
-    /// Numbers of a pixel as they are stored.
-    fn stored_channels(&self) -> usize {
-        match self.image.arrangement {
-            Arrangement::Luma | Arrangement::LumaPlane => 3,
-            Arrangement::LumaPairs => 2,
-            Arrangement::Palette(_) => 1,
-            _ => self.channels(),
-        }
+    /// A frame as it is stored, without its compression.
+    fn stored(&self) -> Expected {
+        let (channels, width) = match &self.image.arrangement {
+            Arrangement::Luma | Arrangement::LumaPlane => (3, self.width()),
+            Arrangement::LumaPairs => (2, self.width()),
+            Arrangement::Palette(palette) => (1, palette.numbers.width),
+            Arrangement::Plain | Arrangement::Planes => (self.channels(), self.width()),
+        };
+        Expected { size: self.image.size, channels, width }
     }
 
-    /// Bytes of a number in the file.
-    fn stored_width(&self) -> usize {
-        match &self.image.arrangement {
-            Arrangement::Palette(palette) => palette.numbers.width,
-            _ => self.width(),
-        }
-    }
-
-    /// Bytes of a frame in the file, if it is native.
-    fn stored_bytes(&self) -> u64 {
-        (self.image.size[0] * self.image.size[1] * self.stored_width() * self.stored_channels()) as u64
-    }
-
-    fn expected(&self) -> Expected {
-        Expected { size: self.image.size, channels: self.stored_channels(), width: self.stored_width() }
-    }
-
-    fn arranged(&self, numbers: Vec<u8>) -> Vec<u8> {
+    fn arranged(&self, mut numbers: Vec<u8>) -> Vec<u8> {
         match &self.image.arrangement {
             Arrangement::Plain => numbers,
             Arrangement::Luma => numbers.chunks_exact(3).map(|pixel| pixel[0]).collect(),
             Arrangement::LumaPairs => numbers.chunks_exact(4).flat_map(|pair| [pair[0], pair[1]]).collect(),
             Arrangement::LumaPlane => {
-                let mut numbers = numbers;
                 numbers.truncate(numbers.len() / 3);
                 numbers
             }
@@ -103,7 +86,7 @@ impl Decoded for Frames {
             return Ok(Vec::new());
         };
         let mut file = CountedFile::open(path)?;
-        let mut bytes = Vec::new();
+        let (mut bytes, stored) = (Vec::new(), self.stored());
         for (offset, length) in parts {
             // Whole words.
             let before = u64::from(self.image.swapped && place.odd);
@@ -114,20 +97,18 @@ impl Decoded for Frames {
         if self.image.swapped {
             bytes.as_chunks_mut::<2>().0.iter_mut().for_each(|word| word.swap(0, 1));
             bytes.drain(..usize::from(place.odd).min(bytes.len()));
-            bytes.truncate(self.stored_bytes() as usize);
+            bytes.truncate(stored.bytes());
         }
-        let wrong = |why: &str| io::Error::new(io::ErrorKind::InvalidData, format!("frame {number} {why}"));
         let numbers = match self.image.coding {
-            Coding::Native => bytes,
-            Coding::Rle => {
-                let pixels = self.image.size[0] * self.image.size[1];
-                unpacked(&bytes, pixels, self.stored_width(), self.stored_channels()).map_err(|why| wrong(&why))?
-            }
-            Coding::Jpeg => jpeg::baseline(&bytes, self.expected()).map_err(|why| wrong(&why))?,
-            Coding::JpegLossless => jpeg::lossless(&bytes, self.expected()).map_err(|why| wrong(&why))?,
-            Coding::Jpeg2000 => jpeg::jpeg_2000(&bytes, self.expected()).map_err(|why| wrong(&why))?,
+            Coding::Native => Ok(bytes),
+            Coding::Rle => unpacked(&bytes, stored.size[0] * stored.size[1], stored.width, stored.channels),
+            Coding::Jpeg => jpeg::baseline(&bytes, stored),
+            Coding::JpegLossless => jpeg::lossless(&bytes, stored),
+            Coding::Jpeg2000 => jpeg::jpeg_2000(&bytes, stored),
         };
-        if numbers.len() as u64 != self.stored_bytes() {
+        let wrong = |why| io::Error::new(io::ErrorKind::InvalidData, format!("frame {number} {why}"));
+        let numbers = numbers.map_err(wrong)?;
+        if numbers.len() != stored.bytes() {
             return Err(io::ErrorKind::UnexpectedEof.into());
         }
         Ok(self.cut(&self.arranged(numbers)))
@@ -246,7 +227,7 @@ mod tests {
         let planes = [[0, 1, 2, 3, 4, 5], [10, 11, 12, 13, 14, 15], [20, 21, 22, 23, 24, 25]].concat();
         let pixels = frames.cut(&frames.arranged(planes));
         assert_eq!(pixels, [1, 11, 21, 2, 12, 22, 4, 14, 24, 5, 15, 25]);
-        assert_eq!((frames.each(), frames.stored_bytes()), (12, 18));
+        assert_eq!((frames.each(), frames.stored().bytes()), (12, 18));
         assert_eq!(luma.cut(&luma.arranged((0..18).collect())), [1, 2, 4, 5]);
     }
 }

@@ -124,14 +124,10 @@ impl Image {
                     return fault("bits allocated (0028,0100)", why.into());
                 }
                 swapped = *in_words && elements.big_endian && allocated == Some(8);
-                frames
-                    .native(*offset, *length, swapped, &mut warnings)
-                    .map_err(|why| InputError::new(path, "data", why))?
+                let found = frames.native(*offset, *length, swapped, &mut warnings);
+                found.map_err(|why| InputError::new(path, "data", why))?
             }
-            (
-                Coding::Rle | Coding::Jpeg | Coding::JpegLossless | Coding::Jpeg2000,
-                PixelData::Encapsulated(table, fragments),
-            ) => {
+            (_, PixelData::Encapsulated(table, fragments)) if coding != Coding::Native => {
                 let table = offsets(table, root);
                 let found = frames.encapsulated(coding, &table, fragments, &mut warnings);
                 found.map_err(|why| InputError::new(path, "pixel data (7FE0,0010)", why))?
@@ -192,10 +188,8 @@ impl StatedFrames {
             return Err(format!("cut short, {length} of {claimed} bytes are there"));
         }
         if length > claimed.next_multiple_of(2) {
-            let text = format!(
-                "pixel data (7FE0,0010) is longer than stated: {frames} frames (0028,0008) have {claimed} bytes"
-            );
-            warnings.insert(format!("{text}, but {length} are there; the rest is not read"));
+            let text = format!("{frames} frames (0028,0008) have {claimed} bytes, but {length} are there");
+            warnings.insert(format!("pixel data (7FE0,0010) is longer than stated: {text}; the rest is not read"));
         }
         let parts = (0..frames).map(|n| (offset + n * each, each)).collect();
         let place = |n: u64| Place { file: 0, first: n as usize, count: 1, odd: !(n * each).is_multiple_of(2) };
@@ -213,12 +207,9 @@ impl StatedFrames {
         fragments: &[Fragment],
         warnings: &mut BTreeSet<String>,
     ) -> Result<Places, String> {
-        let frames = |n: u64| usize::try_from(n).ok();
         let stated = self.stated.or((self.slices > 1).then_some(1));
-        let numbers: Vec<usize> = match stated {
-            Some(n) if self.slices > 1 => [n.saturating_mul(self.slices), n].into_iter().filter_map(frames).collect(),
-            stated => stated.into_iter().filter_map(frames).collect(),
-        };
+        let pictures = stated.filter(|_| self.slices > 1).map(|n| n.saturating_mul(self.slices));
+        let numbers: Vec<usize> = pictures.into_iter().chain(stated).filter_map(|n| usize::try_from(n).ok()).collect();
         let there = fragments.iter().fold(0u64, |all, fragment| all.saturating_add(fragment.length));
         let most = there.saturating_mul(Encoding::Dicom(coding).most()).saturating_add(1024);
         let check = |frames: u64| match self.each.saturating_mul(frames) {
@@ -380,16 +371,14 @@ fn number(path: &Path, root: &Item, coding: Coding, is_palette: bool) -> Result<
 /// # Errors
 /// An order that the standard does not know.
 fn is_planar(path: &Path, root: &Item, photometric: &str, warnings: &mut BTreeSet<String>) -> Result<bool, InputError> {
+    const FIELD: &str = "planar configuration (0028,0006)";
     match root.word(tags::PLANAR) {
         Some(order @ 0..=1) => Ok(order == 1),
-        Some(other) => {
-            Err(InputError::new(path, "planar configuration (0028,0006)", format!("is {other}, must be 0 or 1")))
-        }
+        Some(other) => Err(InputError::new(path, FIELD, format!("is {other}, must be 0 or 1"))),
         // Pairs of pixels have but one order.
         None if photometric == "YBR_FULL_422" => Ok(false),
         None => {
-            let text = "planar configuration (0028,0006) is missing; the colours are taken pixel by pixel";
-            warnings.insert(text.into());
+            warnings.insert(format!("{FIELD} is missing; the colours are taken pixel by pixel"));
             Ok(false)
         }
     }

@@ -19,7 +19,7 @@ pub(super) struct Expected {
 }
 
 impl Expected {
-    fn bytes(&self) -> usize {
+    pub fn bytes(&self) -> usize {
         self.size[0] * self.size[1] * self.channels * self.width
     }
 
@@ -307,10 +307,7 @@ fn decoded_2000(bytes: &[u8], expected: Expected) -> Result<Vec<u8>, String> {
     let mut context = DecoderContext::default();
     let decoded = image.decode(&mut context).map_err(|e| unreadable(JPEG_2000, e))?;
     let channels = decoded.components();
-    let most = match expected.width {
-        1 => 8,
-        _ => 16,
-    };
+    let most = if expected.width == 1 { 8 } else { 16 };
     let pixels = expected.size[0] * expected.size[1];
     let is_right = |c: &hayro_jpeg2000::ComponentData| c.bit_depth() <= most && c.samples().len() == pixels;
     if channels.len() != expected.channels || !channels.iter().all(is_right) {

@@ -159,8 +159,8 @@ struct Segments<'a> {
     entries: Vec<u16>,
 }
 
-impl Segments<'_> {
-    fn get(&self, at: usize, count: usize) -> Result<&[u16], String> {
+impl<'a> Segments<'a> {
+    fn get(&self, at: usize, count: usize) -> Result<&'a [u16], String> {
         let there = at.checked_add(count).and_then(|end| self.numbers.get(at..end));
         there.ok_or_else(|| "has a segment that is cut short".to_string())
     }
@@ -174,13 +174,15 @@ impl Segments<'_> {
         }
         let next = match kind {
             0 => {
-                let entries = self.get(at, count)?.to_vec();
-                self.entries.extend(entries);
+                self.entries.extend(self.get(at, count)?);
                 at + count
             }
+            // On a straight line from the last entry, without it, up to the number.
             1 => {
-                let end = self.get(at, 1)?[0];
-                self.line(end, count)?;
+                let end = f64::from(self.get(at, 1)?[0]);
+                let begin = self.entries.last().copied().map(f64::from).ok_or("begins with a linear segment")?;
+                let step = (end - begin) / count as f64;
+                self.entries.extend((1..=count).map(|n| (begin + step * n as f64).round_ties_even() as u16));
                 at + 1
             }
             2 if may_point => {
@@ -205,16 +207,6 @@ impl Segments<'_> {
             true => Err(format!("has more than {MOST} entries")),
             false => Ok(next),
         }
-    }
-
-    /// Entries on a straight line from the last one, without it, up to `end`.
-    fn line(&mut self, end: u16, count: usize) -> Result<(), String> {
-        let Some(begin) = self.entries.last().copied().map(f64::from) else {
-            return Err("begins with a linear segment".into());
-        };
-        let step = (f64::from(end) - begin) / count as f64;
-        self.entries.extend((1..=count).map(|n| (begin + step * n as f64).round_ties_even() as u16));
-        Ok(())
     }
 }
 

@@ -17,10 +17,9 @@ use glam::DVec3;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-/// Codes of a region: pictures in two dimensions, of tissue, in centimetres.
+/// Codes of a region: pictures in two dimensions, of tissue.
 const TWO_DIMENSIONS: u16 = 1;
 const TISSUE: u16 = 1;
-const CENTIMETRES: u16 = 3;
 /// Largest difference of two scales that are the same, as a share.
 const MAX_APART: f64 = 0.01;
 /// What pictures lack that have no geometry.
@@ -49,7 +48,7 @@ impl Region {
         let (x1, y1) = ((x1? as usize).min(size[0] - 1), (y1? as usize).min(size[1] - 1));
         let is_picture = item.word(tags::REGION_FORMAT) == Some(TWO_DIMENSIONS);
         let units = tags::UNITS.map(|tag| item.word(tag));
-        if !is_picture || units != [Some(CENTIMETRES); 2] || x1 < x0 || y1 < y0 {
+        if !is_picture || units != [Some(tags::CENTIMETRES); 2] || x1 < x0 || y1 < y0 {
             return None;
         }
         let spacing = match tags::DELTA.map(|tag| item.real(tag).map(|cm| cm.abs() * 10.0)) {
@@ -101,29 +100,17 @@ pub(super) fn flat(root: &Item, size: [usize; 2]) -> Flat {
     let stated = pixel_spacing(root, &mut warnings);
     let Some(Region { part, spacing, origin, is_backward, .. }) = region else {
         if count > 0 {
-            let text = format!(
-                "none of {count} regions (0018,6011) is a picture in centimetres, so the whole picture is read"
-            );
-            warnings.insert(format!("{text}; {}", instead(stated)));
+            let text = format!("none of {count} regions (0018,6011) is a picture in centimetres");
+            warnings.insert(format!("{text}, so the whole picture is read; {}", instead(stated)));
         }
-        return Flat {
-            part: [0, 0, size[0], size[1]],
-            spacing: stated,
-            origin: [0.0; 2],
-            remarks: Vec::new(),
-            warnings,
-        };
+        let part = [0, 0, size[0], size[1]];
+        return Flat { part, spacing: stated, origin: [0.0; 2], remarks: Vec::new(), warnings };
     };
     let [x, y, columns, rows] = part;
-    let text = format!(
-        "columns {x} .. {}, rows {y} .. {} of {} x {} pixels; what is around it is not read",
-        x + columns - 1,
-        y + rows - 1,
-        size[0],
-        size[1]
-    );
-    let text = if count > 1 { format!("one of {count}: {text}") } else { text };
-    let mut remarks = vec![("region".into(), text)];
+    let (right, bottom) = (x + columns - 1, y + rows - 1);
+    let place = format!("columns {x} .. {right}, rows {y} .. {bottom} of {} x {} pixels", size[0], size[1]);
+    let place = if count > 1 { format!("one of {count}: {place}") } else { place };
+    let mut remarks = vec![("region".into(), format!("{place}; what is around it is not read"))];
     if is_backward {
         warnings
             .insert("physical delta (0018,602C) or (0018,602E) is below 0; its size counts, not its direction".into());
@@ -181,17 +168,8 @@ pub(super) fn pictures(path: &Path, root: &Item, image: &Image, options: &OpenOp
     let geometry = of_pictures(path, root, &flat, frames, options)?;
     let (remarks, mut warnings) = (flat.remarks, flat.warnings);
     let times = times(root, frames, &mut warnings);
-    let (part, has_spacing) = (flat.part, flat.spacing.is_some());
-    Ok(Placed {
-        format: "DICOM ultrasound pictures",
-        geometry,
-        order: in_order(image),
-        part,
-        has_spacing,
-        times,
-        remarks,
-        warnings,
-    })
+    let (order, part, has_spacing) = (in_order(image), flat.part, flat.spacing.is_some());
+    Ok(Placed { format: "DICOM ultrasound pictures", geometry, order, part, has_spacing, times, remarks, warnings })
 }
 
 /// The distance of slices that a secondary capture states for its frames, mm; None if they are no even stack.

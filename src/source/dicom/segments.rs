@@ -126,10 +126,8 @@ fn header(
     header.empty(0x0070_0081, b"LO");
     header.empty(0x0070_0084, b"PN");
     header.one(tags::SHARED_GROUPS, |item| {
-        item.one(tags::PLANE_ORIENTATION, |item| {
-            let both = [directions.x_axis.to_array(), directions.y_axis.to_array()].map(decimals).join("\\");
-            item.text(tags::ORIENTATION_PATIENT, b"DS", &both);
-        });
+        let both = [directions.x_axis.to_array(), directions.y_axis.to_array()].map(decimals).join("\\");
+        item.one(tags::PLANE_ORIENTATION, |item| item.text(tags::ORIENTATION_PATIENT, b"DS", &both));
         item.one(tags::PIXEL_MEASURES, |item| {
             item.text(tags::SLICE_THICKNESS, b"DS", &spacing[2]);
             item.text(tags::SPACING_BETWEEN_SLICES, b"DS", &spacing[2]);
@@ -140,14 +138,11 @@ fn header(
     let used: Vec<usize> = (0..depth).filter(|z| frames.iter().any(|(_, of)| of == z)).collect();
     header.sequence(tags::FRAME_GROUPS, frames.len(), |item, frame| {
         let (n, z) = frames[frame];
-        item.one(tags::FRAME_CONTENT, |item| {
-            let position = used.iter().position(|of| *of == z).unwrap_or(0);
-            item.longs(0x0020_9157, b"UL", &[n as u32 + 1, position as u32 + 1]);
-        });
-        item.one(tags::PLANE_POSITION, |item| {
-            let at = world.at(DVec3::Z * z as f64).to_array();
-            item.text(tags::POSITION_PATIENT, b"DS", &decimals(at));
-        });
+        let position = used.iter().position(|of| *of == z).unwrap_or(0);
+        let indices = [n, position].map(|index| index as u32 + 1);
+        item.one(tags::FRAME_CONTENT, |item| item.longs(0x0020_9157, b"UL", &indices));
+        let at = decimals(world.at(DVec3::Z * z as f64).to_array());
+        item.one(tags::PLANE_POSITION, |item| item.text(tags::POSITION_PATIENT, b"DS", &at));
         item.one(SEGMENT_IDENTIFICATION, |item| item.word(SEGMENT_NUMBER, n as u16 + 1));
     });
     header.head(tags::PIXEL_DATA, b"OB", bytes + bytes % 2);

@@ -5,10 +5,10 @@ use super::super::OpenOptions;
 use super::super::layout::{Cartesian, Layout, StoredGeometry};
 use super::super::packed::InputFile;
 use super::about::{about, accept};
+use super::classes::DIRECTORY;
 use super::elements::{Elements, is_one};
 use super::file::read;
-use super::image::Image;
-use super::image::Place;
+use super::image::{Image, Place};
 use super::placed::{Placed, layout};
 use super::planes::{Plane, sorted};
 use super::regions::{Flat, flat, in_patient, of_pictures, spacing_text};
@@ -23,8 +23,6 @@ use std::path::{Path, PathBuf};
 
 /// Most files of a folder that are looked at.
 const MAX_FILES: usize = 1 << 16;
-/// A file that lists others, in the folders of exported discs.
-const DIRECTORY: &str = "1.2.840.10008.1.3.10";
 
 /// True if a folder holds a DICOM file.
 pub(in super::super) fn is_series(folder: &Path) -> bool {
@@ -103,10 +101,8 @@ pub(in super::super) fn read_series(folder: &Path, options: &OpenOptions) -> Res
         return Err(InputError::new(folder, "--voxel-spacing", why));
     }
     let files = all.iter().map(|slice| slice.path.clone()).collect();
-    let mut slices = all.into_iter();
-    let Some(Slice { mut image, elements, .. }) = slices.next() else { return fault("holds no image".into()) };
-    let images = slices.map(|slice| slice.image);
-    for (n, next) in images.enumerate() {
+    let Slice { mut image, elements, .. } = all.remove(0);
+    for (n, Slice { image: next, .. }) in all.into_iter().enumerate() {
         let before = image.parts.len();
         let moved = |place: &Place| Place { file: n + 1, first: place.first + before, ..*place };
         image.places.extend(next.places.iter().map(moved));
@@ -130,67 +126,51 @@ fn placed(folder: &Path, all: &[Slice], plane: Flat, options: &OpenOptions) -> R
     let mut remarks = about(&all[0].elements);
     remarks.extend(plane.remarks.iter().cloned());
     remarks.push(("files".into(), all.len().to_string()));
-    let (part, warnings) = (plane.part, plane.warnings.clone());
-    let place = |slice: &Slice| in_patient(&slice.elements.root, &plane);
-    let places: Option<Vec<(DVec3, [DVec3; 2])>> = all.iter().map(place).collect();
-    if let (Some(places), Some([dx, dy])) = (places, plane.spacing) {
-        let planes: Vec<Plane> = places
-            .into_iter()
-            .map(|(position, [row, column])| Plane { position, row, column, index: None, time: None })
-            .collect();
-        let found = sorted(&planes).map_err(|why| fault("slices", why))?;
-        let (Some(first), Some(step)) = (found.order.first().map(|n| planes[*n]), found.step) else {
-            return pictures_in_time(folder, all, plane, remarks, options);
-        };
-        let axes = [first.row * dx, first.column * dy, step];
-        let world = World::new(axes, first.position).map_err(|why| fault("slices", why))?;
-        let size = [part[2], part[3], found.slices];
-        let geometry =
-            StoredGeometry::Cartesian(Cartesian { size, volumes: found.volumes, world, order: AxisOrder::STORED });
-        let (order, times) = (found.order, BTreeMap::new());
-        return Ok(Placed {
-            format: "DICOM series",
-            geometry,
-            order,
-            part,
-            has_spacing: true,
-            times,
-            remarks,
-            warnings,
-        });
-    }
-    let distance = root.decimal(tags::SPACING_BETWEEN_SLICES).filter(|mm| *mm > 0.0);
-    let spacing = match (plane.spacing, distance, options.voxel_spacing) {
-        (Some([x, y]), Some(z), _) => Some(([x, y, z], true)),
-        (None, _, Some(spacing)) => Some((spacing, false)),
-        _ => None,
+    let place = |slice: &Slice| {
+        let (position, [row, column]) = in_patient(&slice.elements.root, &plane)?;
+        Some(Plane { position, row, column, index: None, time: None })
     };
-    let Some((spacing, has_spacing)) = spacing else { return pictures_in_time(folder, all, plane, remarks, options) };
-    remarks.push(("order".into(), "by the numbers of the images; they state no places".into()));
-    let axes = [DVec3::X * spacing[0], DVec3::Y * spacing[1], DVec3::Z * spacing[2]];
-    let origin = DVec3::new(plane.origin[0], plane.origin[1], 0.0);
-    let world = World::new(axes, origin).map_err(|why| fault("spacing", why))?;
-    let size = [part[2], part[3], all.len()];
-    let geometry = StoredGeometry::Cartesian(Cartesian { size, volumes: 1, world, order: AxisOrder::STORED });
-    let order = (0..all.len()).collect();
-    let times = BTreeMap::new();
-    Ok(Placed { format: "DICOM series", geometry, order, part, has_spacing, times, remarks, warnings })
-}
-
-/// Pictures that have no distance from each other: they are frames in time.
-fn pictures_in_time(
-    folder: &Path,
-    all: &[Slice],
-    plane: Flat,
-    mut remarks: Vec<(String, String)>,
-    options: &OpenOptions,
-) -> Result<Placed, InputError> {
-    let geometry = of_pictures(folder, &all[0].elements.root, &plane, all.len(), options)?;
-    if let Some(spacing) = plane.spacing {
-        let text = format!("pictures of {} in time, by their numbers; they state no distance", spacing_text(spacing));
-        remarks.push(("order".into(), text));
-    }
-    let (order, part, has_spacing) = ((0..all.len()).collect(), plane.part, plane.spacing.is_some());
-    let (times, warnings) = (BTreeMap::new(), plane.warnings);
+    let planes: Option<Vec<Plane>> = all.iter().map(place).collect();
+    // Of the voxels: the field that is at fault if they are refused, the vectors of a column, a row and a slice, the first place, and the numbers of
+    // slices and volumes. With it the order of the files.
+    let mut order = (0..all.len()).collect();
+    let lattice = if let (Some(planes), Some([dx, dy])) = (planes, plane.spacing) {
+        let found = sorted(&planes).map_err(|why| fault("slices", why))?;
+        let first = found.order.first().map(|n| planes[*n]);
+        first.zip(found.step).map(|(first, step)| {
+            order = found.order;
+            let axes = [first.row * dx, first.column * dy, step];
+            ("slices", axes, first.position, [found.slices, found.volumes])
+        })
+    } else {
+        let distance = root.decimal(tags::SPACING_BETWEEN_SLICES).filter(|mm| *mm > 0.0);
+        let spacing = match (plane.spacing, distance) {
+            (Some([x, y]), Some(z)) => Some([x, y, z]),
+            (None, _) => options.voxel_spacing,
+            _ => None,
+        };
+        spacing.map(|[x, y, z]| {
+            remarks.push(("order".into(), "by the numbers of the images; they state no places".into()));
+            let origin = DVec3::new(plane.origin[0], plane.origin[1], 0.0);
+            ("spacing", [DVec3::X * x, DVec3::Y * y, DVec3::Z * z], origin, [all.len(), 1])
+        })
+    };
+    let geometry = match lattice {
+        Some((field, axes, origin, [slices, volumes])) => {
+            let world = World::new(axes, origin).map_err(|why| fault(field, why))?;
+            let size = [plane.part[2], plane.part[3], slices];
+            StoredGeometry::Cartesian(Cartesian { size, volumes, world, order: AxisOrder::STORED })
+        }
+        // Pictures that have no distance from each other are frames in time.
+        None => {
+            if let Some(spacing) = plane.spacing.map(spacing_text) {
+                let text = format!("pictures of {spacing} in time, by their numbers; they state no distance");
+                remarks.push(("order".into(), text));
+            }
+            of_pictures(folder, root, &plane, all.len(), options)?
+        }
+    };
+    let Flat { part, spacing, warnings, .. } = plane;
+    let (has_spacing, times) = (spacing.is_some(), BTreeMap::new());
     Ok(Placed { format: "DICOM series", geometry, order, part, has_spacing, times, remarks, warnings })
 }

@@ -22,6 +22,9 @@ pub(super) const SEQUENCE_END: Tag = 0xfffe_e0dd;
 pub(super) const KRETZ_GROUP: u32 = 0x7fe1;
 pub(super) const KRETZ_CREATOR: &str = "KRETZ_US";
 
+/// Centimetres, in the units of physical distances.
+pub(super) const CENTIMETRES: u16 = 3;
+
 const WORDS: Kind = Kind::Numbers(2);
 const LONGS: Kind = Kind::Numbers(4);
 const REALS: Kind = Kind::Numbers(8);

@@ -14,8 +14,6 @@ use glam::{DMat3, DVec3};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-/// Centimetres, in the units of physical distances.
-const CENTIMETRES: u16 = 3;
 /// Most names of data types in a remark.
 const MOST_NAMED: usize = 4;
 
@@ -67,9 +65,8 @@ pub(super) fn enhanced(path: &Path, elements: &Elements, image: &Image) -> Resul
     let (Some(first), Some([rows, columns])) = (found.order.first(), spacing.first_chunk::<2>()) else {
         return Err(fault("pixel measures (0028,9110)", "do not state the pixel spacing".into()));
     };
-    let is_other =
-        |g: &Groups| g.find(tags::PIXEL_MEASURES).map(|i| i.decimals(tags::PIXEL_SPACING)) != Some(spacing.clone());
-    if groups.iter().any(is_other) {
+    let spacing_of = |g: &Groups| g.numbers(tags::PIXEL_MEASURES, tags::PIXEL_SPACING, true);
+    if groups.iter().any(|g| spacing_of(g).as_ref() != Some(&spacing)) {
         return Err(fault("pixel measures (0028,9110)", "differ from frame to frame".into()));
     }
     let plane = all[*first];
@@ -83,25 +80,18 @@ pub(super) fn enhanced(path: &Path, elements: &Elements, image: &Image) -> Resul
     let size = [image.size[0], image.size[1], found.slices];
     let stated = |g: &Groups| g.numbers(tags::PLANE_ORIENTATION_VOLUME, tags::ORIENTATION_VOLUME, false);
     let in_volume = groups.first().and_then(stated).and_then(|numbers| directions(&numbers));
-    let order = transducer_order(&root.reals(tags::TO_TRANSDUCER), in_volume);
-    let world = world.reordered(&order, size);
+    let drawn = transducer_order(&root.reals(tags::TO_TRANSDUCER), in_volume);
+    let world = world.reordered(&drawn, size);
     let space = if is_patient { "the patient's (LPS)" } else { "the volume's own frame of reference" };
     remarks.push(("space".into(), space.into()));
     if let Some([x, y, z]) = root.reals(tags::APEX).first_chunk::<3>().map(|apex| apex.map(number)) {
         remarks.push(("apex".into(), format!("{x}, {y}, {z} mm in the volume's frame of reference")));
     }
-    let order_of_frames = found.order.iter().filter_map(|n| chosen.get(*n).copied()).collect();
-    let geometry = StoredGeometry::Cartesian(Cartesian { size, volumes: found.volumes, world, order });
-    Ok(Placed {
-        format: "DICOM Enhanced US Volume",
-        geometry,
-        order: order_of_frames,
-        part: [0, 0, image.size[0], image.size[1]],
-        has_spacing: true,
-        times: found.times,
-        remarks,
-        warnings: BTreeSet::new(),
-    })
+    let geometry = StoredGeometry::Cartesian(Cartesian { size, volumes: found.volumes, world, order: drawn });
+    let order = found.order.iter().filter_map(|n| chosen.get(*n).copied()).collect();
+    let (part, has_spacing) = ([0, 0, image.size[0], image.size[1]], true);
+    let (times, warnings) = (found.times, BTreeSet::new());
+    Ok(Placed { format: "DICOM Enhanced US Volume", geometry, order, part, has_spacing, times, remarks, warnings })
 }
 
 /// The frames of one type of data: of tissue if there are such, otherwise the first. The others are named.
@@ -168,10 +158,9 @@ pub(super) fn philips(path: &Path, elements: &Elements, image: &Image) -> Result
     let fault = |field: &str, fault: &str| InputError::new(path, field, fault);
     let root = &elements.root;
     let slices = root.long(tags::PHILIPS_SLICES).unwrap_or(0);
-    let unit_x = root.word(tags::UNITS[0]).unwrap_or(CENTIMETRES);
-    let unit_y = root.word(tags::UNITS[1]).unwrap_or(CENTIMETRES);
-    let unit_z = root.word(tags::PHILIPS_UNIT).unwrap_or(CENTIMETRES);
-    if [unit_x, unit_y, unit_z] != [CENTIMETRES; 3] {
+    let units =
+        [tags::UNITS[0], tags::UNITS[1], tags::PHILIPS_UNIT].map(|tag| root.word(tag).unwrap_or(tags::CENTIMETRES));
+    if units != [tags::CENTIMETRES; 3] {
         return Err(fault("units (0018,6024)", "are not centimetres"));
     }
     let deltas = [tags::DELTA[0], tags::DELTA[1], tags::PHILIPS_DELTA].map(|tag| root.real(tag));
@@ -189,16 +178,11 @@ pub(super) fn philips(path: &Path, elements: &Elements, image: &Image) -> Result
     let volumes = frames / slices;
     let seconds = root.decimal(tags::FRAME_TIME).filter(|ms| *ms > 0.0).map(|ms| ms / 1e3);
     let time = |n: usize| Some((n, seconds? * (n / slices) as f64));
-    Ok(Placed {
-        format: "DICOM volume of Philips",
-        geometry: StoredGeometry::Cartesian(Cartesian { size, volumes, world, order: AxisOrder::STORED }),
-        order: in_order(image),
-        part: [0, 0, image.size[0], image.size[1]],
-        has_spacing: true,
-        times: if volumes > 1 { (0..frames).filter_map(time).collect() } else { BTreeMap::new() },
-        remarks: Vec::new(),
-        warnings: BTreeSet::new(),
-    })
+    let times = if volumes > 1 { (0..frames).filter_map(time).collect() } else { BTreeMap::new() };
+    let geometry = StoredGeometry::Cartesian(Cartesian { size, volumes, world, order: AxisOrder::STORED });
+    let (order, part) = (in_order(image), [0, 0, image.size[0], image.size[1]]);
+    let (remarks, warnings) = (Vec::new(), BTreeSet::new());
+    Ok(Placed { format: "DICOM volume of Philips", geometry, order, part, has_spacing: true, times, remarks, warnings })
 }
 
 #[cfg(test)]

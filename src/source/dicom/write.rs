@@ -4,10 +4,9 @@
 //! Nothing is invented: attributes of the patient are empty, dates and the exposure of the acquisition are left out although the standard
 //! demands some of them. Identifiers are made of a digest of everything else in the file, so that the same volume gives the same bytes.
 
-use super::tags;
-use super::tags::Tag;
+use super::tags::{self, Tag};
 use crate::files::Unfinished;
-use crate::probe::World;
+use crate::probe::{Grid, World};
 use glam::DVec3;
 use sha2::{Digest, Sha256};
 use std::io::{self, Write};
@@ -133,6 +132,11 @@ pub(super) fn decimals<const N: usize>(values: [f64; N]) -> String {
     values.map(decimal).join("\\")
 }
 
+/// The two words of a tag, group and element, each with its low byte first.
+fn words(tag: Tag) -> [u8; 4] {
+    tag.rotate_left(16).to_le_bytes()
+}
+
 impl Header {
     fn new(size: [usize; 3], world: &World, capture: bool, width: usize) -> Header {
         let mut header = Header::default();
@@ -151,8 +155,7 @@ impl Header {
     }
 
     pub(super) fn head(&mut self, tag: Tag, vr: &[u8; 2], length: u32) {
-        self.bytes.extend(((tag >> 16) as u16).to_le_bytes());
-        self.bytes.extend((tag as u16).to_le_bytes());
+        self.bytes.extend(words(tag));
         self.bytes.extend(vr);
         match vr {
             b"OB" | b"OW" | b"SQ" => {
@@ -196,8 +199,7 @@ impl Header {
     }
 
     pub(super) fn tag(&mut self, tag: Tag, value: Tag) {
-        let bytes = [((value >> 16) as u16).to_le_bytes(), (value as u16).to_le_bytes()].concat();
-        self.value(tag, b"AT", &bytes);
+        self.value(tag, b"AT", &words(value));
     }
 
     pub(super) fn identifier(&mut self, tag: Tag, identifier: Identifier) {
@@ -299,17 +301,18 @@ impl Header {
         self.word(tags::IS_SIGNED, 0);
     }
 
-    /// No identity and no face is in the pixels.
-    fn no_identity(&mut self) {
+    /// States that no identity and no face is in the pixels, and that stored numbers are the values: slope 1, intercept 0.
+    fn plain_values(&mut self) {
         self.text(0x0028_0301, b"CS", "NO");
         self.text(0x0028_0302, b"CS", "NO");
+        self.text(tags::INTERCEPT, b"DS", "0");
+        self.text(tags::SLOPE, b"DS", "1");
     }
 
     fn enhanced(&mut self, class: &str, size: [usize; 3], world: &World, width: usize) {
         const KIND: &str = "DERIVED\\PRIMARY\\VOLUME\\RESAMPLED";
-        let spacing = [0, 1, 2].map(|n| world.axis(n).length());
         // The axes of the volume are those that are drawn, which are those of the transducer: y is depth.
-        let grid = world.grid(size);
+        let Grid { spacing, origin: [x, y, z], .. } = world.grid(size);
         let directions = world.directions();
         self.general(class, KIND, "US");
         self.text(tags::MANUFACTURER, b"LO", NAME);
@@ -357,9 +360,7 @@ impl Header {
         self.text(0x0020_9311, b"CS", "3D");
         self.identifier(0x0020_9312, Identifier::VolumeSpace);
         self.pixels(size, 8 * width as u16, None, is_right_handed.then_some([spacing[1], spacing[0]]));
-        self.no_identity();
-        self.text(tags::INTERCEPT, b"DS", "0");
-        self.text(tags::SLOPE, b"DS", "1");
+        self.plain_values();
         self.text(0x0028_2110, b"CS", "00");
         self.head(0x0040_0555, b"SQ", 0);
         self.unknown(0x0054_0220);
@@ -375,12 +376,9 @@ impl Header {
                 item.text(tags::DATA_TYPE, b"CS", "TISSUE_INTENSITY");
                 item.text(0x0018_980b, b"CS", "NO");
             });
-            item.one(tags::PLANE_ORIENTATION, |item| {
-                item.text(tags::ORIENTATION_PATIENT, b"DS", &both);
-            });
-            item.one(tags::PLANE_ORIENTATION_VOLUME, |item| {
-                item.reals(tags::ORIENTATION_VOLUME, &[1.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
-            });
+            item.one(tags::PLANE_ORIENTATION, |item| item.text(tags::ORIENTATION_PATIENT, b"DS", &both));
+            let own = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+            item.one(tags::PLANE_ORIENTATION_VOLUME, |item| item.reals(tags::ORIENTATION_VOLUME, &own));
             item.one(tags::PIXEL_MEASURES, |item| {
                 item.text(tags::SLICE_THICKNESS, b"DS", &decimal(spacing[2]));
                 item.text(tags::PIXEL_SPACING, b"DS", &decimals([spacing[1], spacing[0]]));
@@ -396,14 +394,10 @@ impl Header {
                 item.longs(tags::TEMPORAL_INDEX, b"UL", &[1]);
                 item.longs(0x0020_9157, b"UL", &[slice as u32 + 1]);
             });
-            item.one(tags::PLANE_POSITION, |item| {
-                let at = world.at(DVec3::Z * k).to_array();
-                item.text(tags::POSITION_PATIENT, b"DS", &decimals(at));
-            });
-            item.one(tags::PLANE_POSITION_VOLUME, |item| {
-                let [x, y, z] = grid.origin;
-                item.reals(tags::POSITION_VOLUME, &[x, y, z + k * spacing[2]]);
-            });
+            let at = decimals(world.at(DVec3::Z * k).to_array());
+            item.one(tags::PLANE_POSITION, |item| item.text(tags::POSITION_PATIENT, b"DS", &at));
+            let at = [x, y, z + k * spacing[2]];
+            item.one(tags::PLANE_POSITION_VOLUME, |item| item.reals(tags::POSITION_VOLUME, &at));
         });
     }
 
@@ -426,9 +420,7 @@ impl Header {
         self.study();
         self.empty(0x0020_0060, b"CS");
         self.pixels(size, 8, is_stated.then_some(tags::SLICE_LOCATIONS), Some([spacing[1], spacing[0]]));
-        self.no_identity();
-        self.text(tags::INTERCEPT, b"DS", "0");
-        self.text(tags::SLOPE, b"DS", "1");
+        self.plain_values();
         self.text(0x0028_1054, b"LO", "US");
         self.text(0x2050_0020, b"CS", "IDENTITY");
     }

@@ -1,12 +1,11 @@
 //! Pictures of a file with places in space, as one freehand volume.
 
 use super::{Compounder, CompoundingOptions, Lattice, Pose, TrackedFrame};
-use crate::Frame;
 use crate::describe::{self, Rows};
 use crate::files::{InputError, progress};
 use crate::frame::{Source, check_volume, file_bytes};
 use crate::probe::{Geometry, World};
-use crate::{SampleType, StoredType};
+use crate::{Frame, SampleType, StoredType};
 use std::path::{Path, PathBuf};
 
 /// A picture's pose, None if it is not known, and its samples.
@@ -126,16 +125,10 @@ impl<P: PlacedPictures> Source for FreehandFile<P> {
         Geometry::Cartesian(self.lattice.grid)
     }
 
-    fn stored_type(&self) -> StoredType {
-        self.placed.pictures().stored_type()
-    }
-
-    fn sample_type(&self) -> SampleType {
-        self.placed.pictures().sample_type()
-    }
-
-    fn range(&self) -> [f64; 2] {
-        self.placed.pictures().range()
+    passed_on! { self to self.placed.pictures();
+        stored_type() -> StoredType;
+        sample_type() -> SampleType;
+        range() -> [f64; 2];
     }
 
     fn volumes(&self) -> usize {
@@ -155,12 +148,10 @@ impl<P: PlacedPictures> Source for FreehandFile<P> {
     fn next_frame(&mut self) -> Result<Option<Frame>, InputError> {
         self.prepare()?;
         let slice = self.next;
-        let Some(bytes) = self.compounder.as_ref().and_then(|compounder| compounder.slice(slice)) else {
-            return Ok(None);
-        };
-        let bytes = bytes.to_vec();
-        self.next += 1;
-        Ok(Some(Frame::of_slice(0, slice, bytes)))
+        let bytes = self.compounder.as_ref().and_then(|compounder| compounder.slice(slice));
+        let frame = bytes.map(|bytes| Frame::of_slice(0, slice, bytes.to_vec()));
+        self.next += usize::from(frame.is_some());
+        Ok(frame)
     }
 
     fn prepare(&mut self) -> Result<(), InputError> {

@@ -1,7 +1,7 @@
 //! Growth of a freehand volume around pictures that leave it.
 
 use super::lattice::MAX_EDGE;
-use super::{Compounder, Lattice, Pose, Sticks, Voxels};
+use super::{Compounder, Lattice, MAX_VOXELS, Pose, Sticks, Voxels};
 use crate::probe::Grid;
 use glam::DVec3;
 
@@ -33,19 +33,14 @@ impl Compounder {
     /// The corners of the box around a picture, in voxels. None of a picture that is refused.
     fn reach_of(&self, pose: &Pose) -> Option<[DVec3; 2]> {
         pose.check().ok()?;
-        let [columns, rows] = pose.clipped(self.options.clip).ok()?;
-        let corner = |column: usize, row: usize| self.lattice.index_of(pose.place(column as f64, row as f64));
-        let (right, bottom) = (columns.1 - 1, rows.1 - 1);
-        let corners =
-            [corner(columns.0, rows.0), corner(right, rows.0), corner(columns.0, bottom), corner(right, bottom)];
-        let [first, others @ ..] = corners;
-        Some([others.iter().fold(first, |a, b| a.min(*b)), others.iter().fold(first, |a, b| a.max(*b))])
+        let corners = pose.corners(pose.clipped(self.options.clip).ok()?).map(|corner| self.lattice.index_of(corner));
+        Some([corners.into_iter().fold(corners[0], DVec3::min), corners.into_iter().fold(corners[0], DVec3::max)])
     }
 
     /// The grid with more voxels, or coarser ones, from `low` to `high` and beyond where these are outside of it.
     fn grown(&self, low: DVec3, high: DVec3, last: DVec3) -> Option<Grid> {
         let Grid { size, spacing, origin } = self.lattice.grid;
-        let most = self.most_voxels();
+        let most = self.options.max_voxels.min(MAX_VOXELS);
         let more = |axis: usize, beyond: f64| match beyond > 0.5 {
             true => (beyond + (LEAST_GROWTH * size[axis] as f64).max(self.options.margin / spacing[axis])).ceil(),
             false => 0.0,

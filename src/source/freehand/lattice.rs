@@ -25,8 +25,7 @@ impl Lattice {
     pub fn world(&self) -> Result<World, String> {
         let back = self.to_volume.inverse();
         let (spacing, origin) = (self.grid.spacing, self.grid.origin.into());
-        let axes =
-            [back.matrix3.x_axis * spacing[0], back.matrix3.y_axis * spacing[1], back.matrix3.z_axis * spacing[2]];
+        let axes = [0, 1, 2].map(|n| back.matrix3.col(n) * spacing[n]);
         World::new(axes, back.transform_point3(origin))
     }
 
@@ -68,13 +67,9 @@ impl Lattice {
         let origin = mean(&|pose, [columns, rows]| pose.place((columns.0 + columns.1 - 1) as f64 / 2.0, rows.0 as f64));
         let to_volume = DAffine3::from_mat3(rotation.transpose()) * DAffine3::from_translation(-origin);
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        for (pose, [columns, rows]) in &placed {
-            for (column, row) in
-                [(columns.0, rows.0), (columns.1 - 1, rows.0), (columns.0, rows.1 - 1), (columns.1 - 1, rows.1 - 1)]
-            {
-                let corner = to_volume.transform_point3(pose.place(column as f64, row as f64));
-                (low, high) = (low.min(corner), high.max(corner));
-            }
+        for corner in placed.iter().flat_map(|(pose, clip)| pose.corners(*clip)) {
+            let corner = to_volume.transform_point3(corner);
+            (low, high) = (low.min(corner), high.max(corner));
         }
         if let Some(beyond) = options.extent.map(|extent| extent - (high.z - low.z)).filter(|beyond| *beyond > 0.0) {
             let height = |(pose, _): &(&Pose, PixelRange)| to_volume.transform_point3(pose.place(0.0, 0.0)).z;

@@ -18,8 +18,8 @@ pub use given::FreehandArguments;
 pub use lattice::Lattice;
 pub use sweep::{Refusal, Schedule, Sweep};
 
-use crate::probe::Grid;
-use crate::probe::StoredType;
+use crate::probe::{Grid, StoredType};
+use crate::samples::put;
 use crate::tree::Defaults;
 use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
@@ -103,26 +103,22 @@ impl Compounder {
         if !lattice.to_volume.is_finite() {
             return Err("the volume's own place is not finite".into());
         }
-        let count = grid.size.iter().try_fold(1usize, |n, m| n.checked_mul(*m)).unwrap_or(usize::MAX);
+        let [x, y, z] = grid.size;
+        let count = x.saturating_mul(y).saturating_mul(z);
         let most = options.max_voxels.min(MAX_VOXELS);
         if count > most {
-            let [x, y, z] = grid.size;
             return Err(format!("{x} x {y} x {z} voxels: at most {most} are allowed; take a larger spacing"));
         }
         let sticks = Sticks::new(grid, options.max_hole)?;
-        let [x, y, z] = grid.size;
-        let voxels = Voxels::new(grid.size);
-        let zero = vec![0; x * y * stored.bytes()];
-        let (touched, slices) = (vec![false; z], vec![Vec::new(); z]);
         Ok(Compounder {
             lattice,
             stored,
             options,
-            voxels,
+            voxels: Voxels::new(grid.size),
             sticks,
-            touched,
-            slices,
-            zero,
+            touched: vec![false; z],
+            slices: vec![Vec::new(); z],
+            zero: vec![0; x * y * stored.bytes()],
             counts: CompoundingCounts::default(),
             first_spacing: lattice.grid.spacing[0],
         })
@@ -136,10 +132,6 @@ impl Compounder {
         self.stored
     }
 
-    fn most_voxels(&self) -> usize {
-        self.options.max_voxels.min(MAX_VOXELS)
-    }
-
     pub fn counts(&self) -> CompoundingCounts {
         self.counts
     }
@@ -150,13 +142,7 @@ impl Compounder {
     /// One line: why the frame is refused. The frame is counted as refused, and the volume is not changed.
     pub fn push(&mut self, frame: &TrackedFrame) -> Result<u64, String> {
         let checked = frame.check().and_then(|()| frame.pose.clipped(self.options.clip));
-        let [columns, rows] = match checked {
-            Ok(clipped) => clipped,
-            Err(fault) => {
-                self.counts.refused += 1;
-                return Err(fault);
-            }
-        };
+        let [columns, rows] = checked.inspect_err(|_| self.counts.refused += 1)?;
         let to_index = |place: DVec3| self.lattice.index_of(place);
         let origin = to_index(frame.pose.place(0.0, 0.0));
         let (right, down) =
@@ -253,14 +239,20 @@ impl Pose {
         if sine.is_nan() || sine < MIN_SINE {
             return Err("a pose that makes a line or a point of the frame".into());
         }
-        let (last, line) = ((columns - 1) as f64, (rows - 1) as f64);
-        let corners = [(0.0, 0.0), (last, 0.0), (0.0, line), (last, line)];
-        let near = corners.iter().all(|(c, r)| self.place(*c, *r).abs().max_element() <= MAX_DISTANCE);
+        let corners = self.corners([(0, columns), (0, rows)]);
+        let near = corners.iter().all(|corner| corner.abs().max_element() <= MAX_DISTANCE);
         let steps = [right, down].iter().all(|step| (1.0 / MAX_DISTANCE..=MAX_DISTANCE).contains(&step.length()));
         match near && steps {
             true => Ok(()),
             false => Err("a pose with pixels beyond 1e6 mm, or closer than 1e-6 mm to one another".into()),
         }
+    }
+
+    /// The positions of the first and last pixels of some rows and columns, in the space of the tracker, mm.
+    fn corners(&self, [columns, rows]: PixelRange) -> [DVec3; 4] {
+        let (left, right, top, bottom) = (columns.0, columns.1 - 1, rows.0, rows.1 - 1);
+        [(left, top), (right, top), (left, bottom), (right, bottom)]
+            .map(|(column, row)| self.place(column as f64, row as f64))
     }
 
     /// The pixels in a clip rectangle.
@@ -424,7 +416,8 @@ impl Sticks {
     /// A slice with its holes filled, little-endian.
     fn filled(&self, voxels: &Voxels, z: usize, stored: StoredType) -> Vec<u8> {
         let [width, height, depth] = voxels.size;
-        let mut bytes = vec![0; width * height * stored.bytes()];
+        let each = stored.bytes();
+        let mut bytes = vec![0; width * height * each];
         let slices = z.saturating_sub(self.reach())..(z + self.reach() + 1).min(depth);
         // A voxel between two others is within the bounds of all.
         let Some([[left, right], [top, bottom]]) = voxels.bounds(slices) else { return bytes };
@@ -432,8 +425,10 @@ impl Sticks {
             for x in left..=right {
                 let n = (z * height + y) * width + x;
                 let value = voxels.value(n).or_else(|| self.bridged(voxels, [x, y, z], n));
-                if let Some(value) = value {
-                    put(&mut bytes, stored, y * width + x, value);
+                // Denormals are flushed, as in every reader.
+                if let Some(value) = value.filter(|value| !value.is_subnormal()) {
+                    let at = (y * width + x) * each;
+                    put(stored.into(), value.into(), &mut bytes[at..at + each]);
                 }
             }
         }
@@ -465,18 +460,5 @@ impl Sticks {
             weights += near + far;
         }
         (weights > 0.0).then(|| (sum / weights) as f32)
-    }
-}
-
-/// Stores a value, rounded to nearest for an integer type.
-fn put(bytes: &mut [u8], stored: StoredType, n: usize, value: f32) {
-    let at = n * stored.bytes();
-    let Some(place) = bytes.get_mut(at..at + stored.bytes()) else { return };
-    match stored {
-        StoredType::U8 => place.copy_from_slice(&[value.round() as u8]),
-        StoredType::U16 => place.copy_from_slice(&(value.round() as u16).to_le_bytes()),
-        // Denormals are flushed, as in every reader.
-        StoredType::F32 if value.is_subnormal() => {}
-        StoredType::F32 => place.copy_from_slice(&value.to_le_bytes()),
     }
 }

@@ -1,5 +1,6 @@
 //! How long a message takes that has not ended: a peer that sends or reads a byte a second is not silent.
 
+use std::io::{self, ErrorKind};
 use std::time::{Duration, Instant};
 
 /// The least rate of a message that takes longer than its time-out, bytes a second.
@@ -8,6 +9,11 @@ const LEAST_RATE: f64 = 1e6;
 /// Longest time of a message of `length` bytes, from its first byte to its last: the time-out, and a second for each megabyte.
 pub(super) fn longest(timeout: Duration, length: usize) -> Duration {
     timeout + Duration::from_secs_f64(length as f64 / LEAST_RATE)
+}
+
+/// True if the peer was only not ready within the time-out of the socket, or a signal came.
+pub(super) fn is_passing(error: &io::Error) -> bool {
+    matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted)
 }
 
 /// Time at which the message that is being received began; None between messages.

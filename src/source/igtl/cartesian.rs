@@ -3,14 +3,16 @@
 use super::message::{Coordinates, Image, Scalar};
 use super::pixels::{range_of, samples, stored};
 use crate::frame::Header;
-use crate::probe::StoredType;
-use crate::probe::{AxisOrder, Geometry, Grid, World, is_rigid};
+use crate::probe::{AxisOrder, Geometry, Grid, StoredType, World, is_rigid};
 use crate::value_range::ValueRange;
 use glam::{DAffine3, DVec3};
 use std::ops::Range;
 
 /// Relative difference of spacings that count as equal: the spacing of a rotated volume is computed again in f32.
 const SPACING_TOLERANCE: f64 = 1e-5;
+
+/// The order of a left-handed image's voxels that makes it right-handed.
+const ROWS_REVERSED: AxisOrder = AxisOrder { reversed: [true, false, false], ..AxisOrder::STORED };
 
 /// A Cartesian volume that is assembled from images of an OpenIGTLink server.
 pub(super) struct CartesianVolume {
@@ -70,8 +72,8 @@ impl CartesianVolume {
         let pose = pose(&image, &grid, mirrored);
         let (mut brought, replaced) = samples(image)?;
         if mirrored {
-            let rows = AxisOrder { reversed: [true, false, false], ..AxisOrder::STORED };
-            brought = rows.reorder(&brought, [usize::from(i), usize::from(j), usize::from(slices)], stored.bytes());
+            brought =
+                ROWS_REVERSED.reorder(&brought, [usize::from(i), usize::from(j), usize::from(slices)], stored.bytes());
         }
         let is_same = |w: &&mut CartesianVolume| {
             let is_like = w.scalar == scalar && w.components == components && w.mirrored == mirrored;
@@ -160,8 +162,7 @@ fn pose(image: &Image, grid: &Grid, mirrored: bool) -> Option<DAffine3> {
     let axes = [0, 1, 2].map(|n| to_lps.col(n).truncate());
     let mut world = World::new(axes, to_lps.w_axis.truncate()).ok()?;
     if mirrored {
-        let rows = AxisOrder { reversed: [true, false, false], ..AxisOrder::STORED };
-        world = world.reordered(&rows, grid.size);
+        world = world.reordered(&ROWS_REVERSED, grid.size);
     }
     let pose = world.pose(grid);
     is_rigid(&pose).then_some(pose)
@@ -176,12 +177,8 @@ fn is_left_handed(image: &Image) -> bool {
 /// The grid of an image. An axis of one pixel may have any spacing, or none.
 fn grid(image: &Image) -> Grid {
     let size = image.size.map(usize::from);
-    let mut spacing = image.spacing();
-    for axis in 0..3 {
-        if size[axis] == 1 && spacing[axis] == 0.0 {
-            spacing[axis] = 1.0;
-        }
-    }
+    let stated = image.spacing();
+    let spacing = [0, 1, 2].map(|axis| if size[axis] == 1 && stated[axis] == 0.0 { 1.0 } else { stated[axis] });
     let half = |axis: usize| -spacing[axis] * (size[axis] as f64 - 1.0) / 2.0;
     Grid { size, spacing, origin: [half(0), 0.0, half(2)] }
 }

@@ -1,6 +1,6 @@
 //! A connection on a thread of its own, which reconnects, and the queue that the thread fills.
 
-use super::begun::{Begun, longest};
+use super::begun::{Begun, is_passing, longest};
 use super::codec::{BODY_LIMIT, DecodeError, Decoded, decode_with};
 use super::message::Message;
 use crate::files::escaped;
@@ -102,8 +102,10 @@ pub struct Client {
 struct Shared {
     state: Mutex<State>,
     changed: Condvar,
+    options: ClientOptions,
 }
 
+#[derive(Default)]
 struct State {
     queue: Queue,
     statistics: ClientStatistics,
@@ -114,13 +116,6 @@ struct State {
     finished: bool,
 }
 
-/// The end of a connection, and why.
-struct ConnectionEnd {
-    why: String,
-    /// It had delivered a message.
-    useful: bool,
-}
-
 impl Client {
     /// Starts to connect to `address`: a host name or an IP address, followed by a colon and the port unless it is [`PORT`]. If the server cannot be
     /// reached, the client keeps trying, and [`last_error`](Client::last_error) says why.
@@ -128,18 +123,9 @@ impl Client {
     /// # Errors
     /// The thread cannot be started.
     pub fn connect(address: &str, options: ClientOptions) -> io::Result<Client> {
-        let state = State {
-            queue: Queue::new(options.queue_messages, options.queue_bytes),
-            statistics: ClientStatistics::default(),
-            connections: 0,
-            last_error: None,
-            socket: None,
-            stop: false,
-            finished: false,
-        };
-        let shared = Arc::new(Shared { state: Mutex::new(state), changed: Condvar::new() });
+        let shared = Arc::new(Shared { state: Mutex::default(), changed: Condvar::new(), options });
         let (theirs, address) = (FinishOnExit(shared.clone()), with_port(address));
-        let thread = thread::Builder::new().name("igtl".into()).spawn(move || theirs.0.run(&address, &options))?;
+        let thread = thread::Builder::new().name("igtl".into()).spawn(move || theirs.0.run(&address))?;
         Ok(Client { shared, thread: Some(thread) })
     }
 
@@ -207,26 +193,26 @@ impl Shared {
         self.changed.wait_timeout(state, most).unwrap_or_else(PoisonError::into_inner).0
     }
 
-    fn run(&self, address: &str, options: &ClientOptions) {
-        let first_wait = options.first_wait.max(MIN_WAIT);
+    fn run(&self, address: &str) {
+        let first_wait = self.options.first_wait.max(MIN_WAIT);
         let mut wait = first_wait;
         while !locked(&self.state).stop {
-            let ended = match self.open(address, options) {
-                Ok(stream) => self.receive(&stream, options),
+            let before = locked(&self.state).statistics.messages;
+            let why = match self.open(address) {
+                Ok(stream) => self.receive(&stream),
                 Err(error) if error.kind() == ErrorKind::ConnectionRefused => {
-                    let why = format!("cannot connect: the connection was refused: no server listens at {address}");
-                    ConnectionEnd { why, useful: false }
+                    format!("cannot connect: the connection was refused: no server listens at {address}")
                 }
-                Err(error) => ConnectionEnd { why: format!("cannot connect: {error}"), useful: false },
+                Err(error) => format!("cannot connect: {error}"),
             };
-            if ended.useful {
-                wait = first_wait;
-            }
             let mut state = locked(&self.state);
             state.socket = None;
             state.statistics.connected = false;
+            if state.statistics.messages > before {
+                wait = first_wait;
+            }
             if !state.stop {
-                let why = escaped(&ended.why, MAX_ERROR_CHARACTERS);
+                let why = escaped(&why, MAX_ERROR_CHARACTERS);
                 tracing::info!("OpenIGTLink from {address}: {why}; trying again in {} ms", wait.as_millis());
                 state.last_error = Some(why);
             }
@@ -234,17 +220,17 @@ impl Shared {
             while !state.stop && since.elapsed() < wait {
                 state = self.wait(state, wait.saturating_sub(since.elapsed()));
             }
-            wait = wait.saturating_mul(2).min(options.longest_wait.max(first_wait));
+            wait = wait.saturating_mul(2).min(self.options.longest_wait.max(first_wait));
         }
     }
 
-    fn open(&self, address: &str, options: &ClientOptions) -> io::Result<TcpStream> {
+    fn open(&self, address: &str) -> io::Result<TcpStream> {
         let mut last = io::Error::new(ErrorKind::NotFound, "the name has no address");
         for address in address.to_socket_addrs()?.take(MAX_ADDRESSES) {
             if locked(&self.state).stop {
                 break;
             }
-            match TcpStream::connect_timeout(&address, options.connect_timeout.max(MIN_WAIT)) {
+            match TcpStream::connect_timeout(&address, self.options.connect_timeout.max(MIN_WAIT)) {
                 Ok(stream) => {
                     stream.set_read_timeout(Some(POLL))?;
                     let mut state = locked(&self.state);
@@ -260,34 +246,36 @@ impl Shared {
         Err(last)
     }
 
-    /// Receives messages until the connection breaks, its framing is lost, or the client is dropped.
-    fn receive(&self, stream: &TcpStream, options: &ClientOptions) -> ConnectionEnd {
+    /// Receives messages until the connection breaks, its framing is lost, or the client is dropped. Returns the reason.
+    fn receive(&self, stream: &TcpStream) -> String {
+        let options = &self.options;
         let mut input = BufReader::with_capacity(1 << 16, stream);
         // Holds one message at most, so that no bytes have to be moved.
         let mut bytes = Vec::new();
-        let mut useful = false;
         let (mut last, mut begun) = (Instant::now(), Begun::default());
         loop {
             let missing = match decode_with(&bytes, options.body_limit, options.takes_no_checksum) {
                 Ok(Decoded::Need(missing)) => missing,
                 Ok(Decoded::Message { message, .. }) => {
                     self.deliver(message);
-                    useful = true;
-                    clear(&mut bytes);
-                    begun = Begun::default();
-                    continue;
+                    0
                 }
-                Err(DecodeError::Framing { error }) => {
+                Err(lost @ DecodeError::Framing { .. }) => {
                     locked(&self.state).statistics.lost_framing += 1;
-                    return ConnectionEnd { why: DecodeError::Framing { error }.to_string(), useful };
+                    return lost.to_string();
                 }
                 Err(skipped) => {
                     self.skip(&skipped);
-                    clear(&mut bytes);
-                    begun = Begun::default();
-                    continue;
+                    0
                 }
             };
+            // A message ended, was skipped or refused: more is needed otherwise.
+            if missing == 0 {
+                bytes.clear();
+                bytes.shrink_to(MAX_KEPT_BYTES);
+                begun = Begun::default();
+                continue;
+            }
             // What is known of its length.
             let length = bytes.len() + missing;
             let read = input.fill_buf().map(|there| {
@@ -300,7 +288,7 @@ impl Shared {
             let mut state = locked(&self.state);
             state.statistics.bytes += came as u64;
             if state.stop {
-                return ConnectionEnd { why: "stopped".into(), useful };
+                return "stopped".into();
             }
             let most = longest(options.message_timeout, length);
             let is_late = begun.is_late(!bytes.is_empty(), Instant::now(), most);
@@ -310,7 +298,7 @@ impl Shared {
                 Ok(1..) => None,
                 Ok(0) if bytes.is_empty() => Some("the peer closed the connection".into()),
                 Ok(0) => Some(format!("the peer closed the connection {} bytes into a message", bytes.len())),
-                Err(e) if matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted) => {
+                Err(e) if is_passing(&e) => {
                     let most = if bytes.is_empty() { options.silence_timeout } else { options.stall_timeout };
                     (last.elapsed() > most).then(|| format!("nothing came for {} ms", most.as_millis()))
                 }
@@ -318,7 +306,7 @@ impl Shared {
             };
             if let Some(why) = why {
                 state.statistics.cut_short += u64::from(!bytes.is_empty());
-                return ConnectionEnd { why, useful };
+                return why;
             }
             if came > 0 {
                 last = Instant::now();
@@ -330,7 +318,7 @@ impl Shared {
         let mut state = locked(&self.state);
         state.statistics.messages += 1;
         state.statistics.skipped += u64::from(matches!(message, Message::Other(_)));
-        let dropped = state.queue.push(Received { message, arrived: Instant::now() });
+        let dropped = state.queue.push(Received { message, arrived: Instant::now() }, &self.options);
         state.statistics.dropped += dropped;
         self.changed.notify_all();
     }
@@ -343,11 +331,6 @@ impl Shared {
         }
         state.last_error = Some(refused.to_string());
     }
-}
-
-fn clear(bytes: &mut Vec<u8>) {
-    bytes.clear();
-    bytes.shrink_to(MAX_KEPT_BYTES);
 }
 
 /// The address with its port: [`PORT`] is added if there is none.
@@ -372,27 +355,23 @@ pub struct Received {
     pub arrived: Instant,
 }
 
+#[derive(Default)]
 struct Queue {
     waiting: VecDeque<(Received, usize)>,
     /// Memory of all queued messages.
     bytes: usize,
-    max_messages: usize,
-    max_bytes: usize,
 }
 
 impl Queue {
-    fn new(max_messages: usize, max_bytes: usize) -> Queue {
-        Queue { waiting: VecDeque::new(), bytes: 0, max_messages, max_bytes }
-    }
-
     /// Adds a message and returns how many older ones were dropped. The new one is always kept: otherwise, with a limit below its size,
     /// none would ever be delivered.
-    fn push(&mut self, received: Received) -> u64 {
+    fn push(&mut self, received: Received, options: &ClientOptions) -> u64 {
         let weight = received.message.weight();
         self.bytes = self.bytes.saturating_add(weight);
         self.waiting.push_back((received, weight));
         let mut dropped = 0;
-        while self.waiting.len() > 1 && (self.waiting.len() > self.max_messages || self.bytes > self.max_bytes) {
+        let is_full = |queue: &Queue| queue.waiting.len() > options.queue_messages || queue.bytes > options.queue_bytes;
+        while self.waiting.len() > 1 && is_full(self) {
             self.pop();
             dropped += 1;
         }
@@ -439,10 +418,11 @@ mod queue_tests {
 
     #[test]
     fn the_oldest_go_by_number_and_by_bytes_and_the_newest_stays() {
-        let mut queue = Queue::new(2, 10_000);
-        assert_eq!([1, 2, 3].map(|n| queue.push(text(n))), [0, 0, 1]);
-        assert_eq!(queue.push(text(9_000)), 1);
-        assert_eq!(queue.push(text(20_000)), 2);
+        let options = ClientOptions { queue_messages: 2, queue_bytes: 10_000, ..ClientOptions::default() };
+        let mut queue = Queue::default();
+        assert_eq!([1, 2, 3].map(|n| queue.push(text(n), &options)), [0, 0, 1]);
+        assert_eq!(queue.push(text(9_000), &options), 1);
+        assert_eq!(queue.push(text(20_000), &options), 2);
         assert_eq!(queue.pop().map(|r| r.message.time()), Some(20_000.0));
         assert!(queue.pop().is_none());
         assert_eq!(queue.bytes, 0);

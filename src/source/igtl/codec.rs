@@ -101,7 +101,7 @@ fn tool(bytes: &[u8]) -> Result<Tool, Fault> {
     let mut fields = Fields(bytes);
     let name = fields.name::<20>("tool's name")?;
     let number = fields.u8("tool's type")?;
-    let Some(kind) = ToolKind::read(number) else {
+    let Some(kind) = ToolKind::ALL.into_iter().find(|kind| *kind as u8 == number) else {
         return Err(Fault::new("tool's type", format!("is {number}, must be 1 to 4")));
     };
     fields.u8("reserved")?;
@@ -181,7 +181,7 @@ fn write(message: &Message, version: Version, body: &mut Vec<u8>) -> Result<(), 
         Message::TrackingData(m) => {
             for tool in &m.tools {
                 name(body, "tool's name", &tool.name, 20)?;
-                body.extend([tool.kind.number(), 0]);
+                body.extend([tool.kind as u8, 0]);
                 matrix(body, &tool.matrix)?;
             }
         }
@@ -237,23 +237,6 @@ fn no_zero(field: &'static str, text: &str) -> Result<(), Fault> {
     match text.find('\0') {
         None => Ok(()),
         Some(at) => Err(Fault::new(field, format!("has a zero at byte {at}, which would end it"))),
-    }
-}
-
-impl ToolKind {
-    fn read(number: u8) -> Option<ToolKind> {
-        [ToolKind::Tracker, ToolKind::SixD, ToolKind::ThreeD, ToolKind::FiveD]
-            .into_iter()
-            .find(|k| k.number() == number)
-    }
-
-    fn number(self) -> u8 {
-        match self {
-            ToolKind::Tracker => 1,
-            ToolKind::SixD => 2,
-            ToolKind::ThreeD => 3,
-            ToolKind::FiveD => 4,
-        }
     }
 }
 
@@ -319,12 +302,9 @@ impl Image {
         }
         for axis in 0..3 {
             let (start, count, whole) = (u32::from(offset[axis]), u32::from(size[axis]), u32::from(self.size[axis]));
-            if count == 0 || start + count > whole {
-                let end = start + count;
-                let fault = format!(
-                    "covers {start} to {end} of {whole} pixels along {}, must lie within",
-                    ["i", "j", "k"][axis]
-                );
+            let (end, name) = (start + count, ["i", "j", "k"][axis]);
+            if count == 0 || end > whole {
+                let fault = format!("covers {start} to {end} of {whole} pixels along {name}, must lie within");
                 return Err(Fault::new("sub-volume", fault));
             }
         }

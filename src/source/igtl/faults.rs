@@ -1,6 +1,7 @@
 //! What goes wrong with a live source, one line a second for each kind, with its count.
 
 use crate::files::escaped;
+use crate::tree::{All, Name};
 use std::time::{Duration, Instant};
 
 /// Shortest time between two reports of one kind.
@@ -8,48 +9,45 @@ const REPORT_INTERVAL: Duration = Duration::from_secs(1);
 /// Longest reason, characters.
 const MAX_REASON: usize = 400;
 
-/// The kinds of faults of an OpenIGTLink source, which are counted and reported separately.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// The kinds of faults of an OpenIGTLink source, which are counted and reported separately, in this order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, All, Name)]
 pub(super) enum FaultKind {
+    #[tree(rename = "not connected")]
     Unreachable,
+    #[tree(rename = "connection lost")]
     Lost,
+    #[tree(rename = "connected again")]
     Again,
+    #[tree(rename = "messages with a wrong checksum passed over")]
     Checksum,
+    #[tree(rename = "malformed messages passed over")]
     Malformed,
+    #[tree(rename = "messages dropped")]
     Dropped,
     /// An image is neither a volume nor a frame.
+    #[tree(rename = "images passed over")]
     Image,
     /// Images come from several devices, which show different things.
+    #[tree(rename = "images of several devices")]
     Devices,
+    #[tree(rename = "samples that are not finite or are denormal")]
     Samples,
     /// A frame has no pose.
+    #[tree(rename = "frames without a pose left out")]
     Unpaired,
     /// 2D images have no pose, or all the same one.
+    #[tree(rename = "images of one slice have no place")]
     Untracked,
+    #[tree(rename = "frames refused")]
     Pose,
+    #[tree(rename = "frames outside of the volume")]
     Outside,
+    #[tree(rename = "no volume for the sweep")]
     Volume,
     /// A volume that is sent in parts was incomplete when one of its slices arrived again.
+    #[tree(rename = "incomplete volumes left out")]
     Incomplete,
 }
-
-const KINDS: [(FaultKind, &str); 15] = [
-    (FaultKind::Unreachable, "not connected"),
-    (FaultKind::Lost, "connection lost"),
-    (FaultKind::Again, "connected again"),
-    (FaultKind::Checksum, "messages with a wrong checksum passed over"),
-    (FaultKind::Malformed, "malformed messages passed over"),
-    (FaultKind::Dropped, "messages dropped"),
-    (FaultKind::Image, "images passed over"),
-    (FaultKind::Devices, "images of several devices"),
-    (FaultKind::Samples, "samples that are not finite or are denormal"),
-    (FaultKind::Unpaired, "frames without a pose left out"),
-    (FaultKind::Untracked, "images of one slice have no place"),
-    (FaultKind::Pose, "frames refused"),
-    (FaultKind::Outside, "frames outside of the volume"),
-    (FaultKind::Volume, "no volume for the sweep"),
-    (FaultKind::Incomplete, "incomplete volumes left out"),
-];
 
 #[derive(Clone, Default)]
 struct Fault {
@@ -62,7 +60,7 @@ struct Fault {
 /// The faults of the source. Each kind is reported at most once a second, with its count.
 pub(super) struct Faults {
     address: String,
-    faults: [Fault; KINDS.len()],
+    faults: [Fault; FaultKind::ALL.len()],
 }
 
 impl Faults {
@@ -71,8 +69,8 @@ impl Faults {
     }
 
     pub(super) fn note(&mut self, kind: FaultKind, count: u64, why: &str) {
-        let place = KINDS.iter().position(|(k, _)| *k == kind).and_then(|n| self.faults.get_mut(n));
-        if let Some(fault) = place.filter(|_| count > 0) {
+        let fault = &mut self.faults[kind as usize];
+        if count > 0 {
             fault.count = fault.count.saturating_add(count);
             fault.why = escaped(why, MAX_REASON);
         }
@@ -82,13 +80,13 @@ impl Faults {
     /// within the last second.
     pub(super) fn due(&mut self) -> Option<String> {
         let waited = |fault: &Fault| fault.reported.is_none_or(|reported| reported.elapsed() >= REPORT_INTERVAL);
-        let mut faults = self.faults.iter_mut().zip(KINDS);
-        let (fault, (_, what)) = faults.find(|(fault, _)| fault.count > 0 && waited(fault))?;
+        let mut faults = self.faults.iter_mut().zip(FaultKind::ALL);
+        let (fault, kind) = faults.find(|(fault, _)| fault.count > 0 && waited(fault))?;
         let count = std::mem::take(&mut fault.count);
         fault.reported = Some(Instant::now());
         let times = if count == 1 { String::new() } else { format!(" ({count})") };
         let why = if fault.why.is_empty() { String::new() } else { format!(": {}", fault.why) };
-        Some(format!("OpenIGTLink from {}: {what}{times}{why}", self.address))
+        Some(format!("OpenIGTLink from {}: {}{times}{why}", self.address, kind.name()))
     }
 }
 

@@ -1,5 +1,6 @@
 //! The messages, as the user of a client receives them.
 
+use crate::tree::All;
 use glam::{DMat4, DVec3, DVec4};
 
 /// Number type of an image's samples. The protocol has no integers of 64 bits.
@@ -48,16 +49,16 @@ pub struct Tool {
 }
 
 /// Which degrees of freedom of a tool are known. The numbers are those on the wire (trackingdata.md of the protocol's documents).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, All)]
 pub enum ToolKind {
-    /// 1: the tracker itself.
-    Tracker,
-    /// 2: a tool with all six degrees of freedom.
-    SixD,
-    /// 3: only the tip.
-    ThreeD,
-    /// 4: tip and handle, but not the rotation about the line between them.
-    FiveD,
+    /// The tracker itself.
+    Tracker = 1,
+    /// A tool with all six degrees of freedom.
+    SixD = 2,
+    /// Only the tip.
+    ThreeD = 3,
+    /// Tip and handle, but not the rotation about the line between them.
+    FiveD = 4,
 }
 
 /// STATUS: the state of a device.
@@ -98,27 +99,25 @@ pub struct Other {
 }
 
 impl Message {
-    pub fn device(&self) -> &str {
+    /// Device and time stamp, which all messages have.
+    fn origin(&self) -> (&str, f64) {
         match self {
-            Message::Transform(m) => &m.device,
-            Message::TrackingData(m) => &m.device,
-            Message::Image(m) => &m.device,
-            Message::Status(m) => &m.device,
-            Message::Text(m) => &m.device,
-            Message::Other(m) => &m.device,
+            Message::Transform(Transform { device, time, .. })
+            | Message::TrackingData(TrackingData { device, time, .. })
+            | Message::Image(Image { device, time, .. })
+            | Message::Status(Status { device, time, .. })
+            | Message::Text(Text { device, time, .. })
+            | Message::Other(Other { device, time, .. }) => (device, *time),
         }
+    }
+
+    pub fn device(&self) -> &str {
+        self.origin().0
     }
 
     /// Time stamp of the message, s since 1970; 0 if it has none.
     pub fn time(&self) -> f64 {
-        match self {
-            Message::Transform(m) => m.time,
-            Message::TrackingData(m) => m.time,
-            Message::Image(m) => m.time,
-            Message::Status(m) => m.time,
-            Message::Text(m) => m.time,
-            Message::Other(m) => m.time,
-        }
+        self.origin().1
     }
 
     /// Name of the message type on the wire, such as IMAGE.

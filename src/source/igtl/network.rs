@@ -15,8 +15,7 @@ use super::pixels::{range_of, samples, stored};
 use crate::files::quoted;
 use crate::freehand::{AT_ITS_LIMIT, CompoundingOptions, Pose, Refusal, Schedule, Sweep};
 use crate::live::{Event, Live};
-use crate::probe::StoredType;
-use crate::probe::{Geometry, is_rigid};
+use crate::probe::{Geometry, StoredType, is_rigid};
 use crate::tree::Defaults;
 use crate::value_range::ValueRange;
 use crate::{Frame, Header};
@@ -196,13 +195,11 @@ impl Network {
 
     /// Starts to emit a volume.
     fn start_output(&mut self, of_sweep: bool, time: Option<f64>) {
-        let (header, pose) = match of_sweep {
-            true => (self.sweep.header(), self.sweep.pose()),
-            false => {
-                (self.whole.as_ref().map(CartesianVolume::header), self.whole.as_ref().and_then(|whole| whole.pose))
-            }
+        let found = match of_sweep {
+            true => self.sweep.header().map(|header| (header, self.sweep.pose())),
+            false => self.whole.as_ref().map(|whole| (whole.header(), whole.pose)),
         };
-        let Some(header) = header else { return };
+        let Some((header, pose)) = found else { return };
         if let Err((field, fault)) = header.check() {
             return self.faults.note(FaultKind::Image, 1, &format!("{field} {fault}"));
         }
@@ -343,17 +340,14 @@ impl TrackedImages {
         }
         match (message, &self.poses) {
             (Message::Image(image), Poses::Image) => self.frame(image, DAffine3::IDENTITY, faults),
-            (message, _) => {
-                let before = self.pairing.counts().dropped;
-                let paired = self.pairing.push(message);
-                self.frames(paired, before, faults);
-            }
+            (message, _) => self.frames(|pairing| pairing.push(message), faults),
         }
     }
 
-    /// Takes frames with their poses. `before`: how many were without one before.
-    fn frames(&mut self, paired: Vec<PairedFrame>, before: u64, faults: &mut Faults) {
-        for paired in paired {
+    /// Takes the frames that a function pairs with their poses.
+    fn frames(&mut self, paired: impl FnOnce(&mut Pairing) -> Vec<PairedFrame>, faults: &mut Faults) {
+        let before = self.pairing.counts().dropped;
+        for paired in paired(&mut self.pairing) {
             self.frame(paired.image, paired.pose, faults);
         }
         let dropped = self.pairing.counts().dropped - before;
@@ -406,9 +400,7 @@ impl TrackedImages {
         // Frames that wait for a later pose get none any more.
         if self.last.is_some_and(|last| last.elapsed() >= self.schedule.silence) {
             self.last = None;
-            let before = self.pairing.counts().dropped;
-            let paired = self.pairing.finish();
-            self.frames(paired, before, faults);
+            self.frames(Pairing::finish, faults);
         }
         let was_placed = self.sweep.is_placed();
         let changed = self.sweep.update(false, |refusal| note(refusal, faults));
@@ -435,9 +427,7 @@ impl TrackedImages {
 
 fn note(refusal: Refusal, faults: &mut Faults) {
     match refusal {
-        Refusal::Outside => {
-            faults.note(FaultKind::Outside, 1, AT_ITS_LIMIT);
-        }
+        Refusal::Outside => faults.note(FaultKind::Outside, 1, AT_ITS_LIMIT),
         Refusal::Picture(fault) => faults.note(FaultKind::Pose, 1, &fault),
         Refusal::Volume(fault) => faults.note(FaultKind::Volume, 1, &fault),
     }

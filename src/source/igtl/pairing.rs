@@ -3,6 +3,7 @@
 use super::message::{Image, Message};
 use super::names::Names;
 use crate::files::quoted;
+use crate::probe::is_rotation;
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use std::collections::VecDeque;
 
@@ -11,8 +12,6 @@ const MAX_POSES: usize = 1024;
 /// Most frames that wait for a later pose, and their bytes.
 const MAX_FRAMES: usize = 64;
 const MAX_FRAME_BYTES: usize = 256 << 20;
-/// Largest entry of R^T R - 1 for which a matrix counts as a rotation, so that it can be interpolated.
-const ROTATION_TOLERANCE: f64 = 1e-3;
 
 /// Assigns a pose to every 2D frame (IMAGE of depth 1), in order of arrival. It uses no clock but the time stamps of the messages.
 ///
@@ -204,11 +203,7 @@ impl Pairing {
 
 /// The pose at the fraction `part` from `a` to `b`, if both are rigid.
 fn between(a: &DAffine3, b: &DAffine3, part: f64) -> Option<DAffine3> {
-    let rotation = |m: DMat3| {
-        let off = (m.transpose() * m - DMat3::IDENTITY).to_cols_array();
-        let rigid = m.determinant() > 0.0 && off.iter().all(|v| v.abs() <= ROTATION_TOLERANCE);
-        rigid.then(|| DQuat::from_mat3(&m).normalize())
-    };
+    let rotation = |m: DMat3| is_rotation(&m).then(|| DQuat::from_mat3(&m).normalize());
     let turned = rotation(a.matrix3)?.slerp(rotation(b.matrix3)?, part);
     Some(DAffine3::from_rotation_translation(turned, a.translation.lerp(b.translation, part)))
 }

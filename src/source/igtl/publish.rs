@@ -59,10 +59,8 @@ struct Shared {
 struct Mail {
     picture: Option<Rgba>,
     volume: Option<Box<Whole>>,
-    pictures: u64,
-    volumes: u64,
-    replaced: u64,
-    fault: Option<String>,
+    /// Without those of the server.
+    statistics: PublisherStatistics,
     stop: bool,
 }
 
@@ -116,17 +114,15 @@ impl Publisher {
 
     /// Counts since the publisher was started.
     pub fn statistics(&self) -> PublisherStatistics {
-        let mail = locked(&self.shared.mail);
-        let (pictures, volumes, replaced, fault) = (mail.pictures, mail.volumes, mail.replaced, mail.fault.clone());
-        drop(mail);
-        PublisherStatistics { server: self.server.statistics(), pictures, volumes, replaced, fault }
+        let own = locked(&self.shared.mail).statistics.clone();
+        PublisherStatistics { server: self.server.statistics(), ..own }
     }
 
     /// Queues a picture of 8-bit red, green, blue, alpha, rows from the top; ignored while no client is connected. `size`: width and height.
     pub fn picture(&self, size: [u32; 2], pixels: Vec<u8>) {
         if self.server.has_clients() {
             let mut mail = locked(&self.shared.mail);
-            mail.replaced += u64::from(mail.picture.replace(Rgba { size, pixels }).is_some());
+            mail.statistics.replaced += u64::from(mail.picture.replace(Rgba { size, pixels }).is_some());
             drop(mail);
             self.shared.changed.notify_all();
         }
@@ -184,9 +180,9 @@ impl Shared {
             let sent = image.and_then(|image| server.send(&Message::Image(image)).map_err(|e| e.to_string()));
             let mut mail = locked(&self.mail);
             match sent {
-                Ok(()) if is_picture => mail.pictures += 1,
-                Ok(()) => mail.volumes += 1,
-                Err(fault) => mail.fault = Some(fault),
+                Ok(()) if is_picture => mail.statistics.pictures += 1,
+                Ok(()) => mail.statistics.volumes += 1,
+                Err(fault) => mail.statistics.fault = Some(fault),
             }
         }
     }
@@ -197,9 +193,8 @@ impl Rgba {
     fn image(&self) -> Result<Image, String> {
         let [width, height] = self.size;
         let (Ok(columns), Ok(rows)) = (u16::try_from(width), u16::try_from(height)) else {
-            return Err(format!(
-                "a picture of {width} x {height} pixels; OpenIGTLink holds {MAX_EDGE} along an axis: take a smaller --size"
-            ));
+            let what = format!("a picture of {width} x {height} pixels");
+            return Err(format!("{what}; OpenIGTLink holds {MAX_EDGE} along an axis: take a smaller --size"));
         };
         let size = [columns, rows, 1];
         let rgb = self.pixels.chunks_exact(4).flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
@@ -219,15 +214,11 @@ impl Whole {
             }
         };
         let [x, y, z] = grid.size;
-        let voxels = x as f64 * y as f64 * z as f64;
-        let most = match grid.size.iter().any(|n| *n > MAX_EDGE) {
-            true => format!("{MAX_EDGE} along an axis"),
-            false => format!("{MAX_VOXELS} of them"),
-        };
-        if voxels > MAX_VOXELS || grid.size.iter().any(|n| *n > MAX_EDGE) {
-            return Err(format!(
-                "a volume of {x} x {y} x {z} voxels; OpenIGTLink holds {most}: take a larger --serve-spacing"
-            ));
+        let is_long = grid.size.iter().any(|n| *n > MAX_EDGE);
+        if is_long || x as f64 * y as f64 * z as f64 > MAX_VOXELS {
+            let most = if is_long { format!("{MAX_EDGE} along an axis") } else { format!("{MAX_VOXELS} of them") };
+            let what = format!("a volume of {x} x {y} x {z} voxels");
+            return Err(format!("{what}; OpenIGTLink holds {most}: take a larger --serve-spacing"));
         }
         let [low, high] = self.range;
         let mut slice = vec![0.0; x * y];
@@ -295,7 +286,7 @@ impl Listener {
         filling.volume.take(frame);
         let Some((_, whole)) = self.filling.take_if(|(_, filling)| filling.volume.is_whole()) else { return };
         let mut mail = locked(&self.shared.mail);
-        mail.replaced += u64::from(mail.volume.replace(whole).is_some());
+        mail.statistics.replaced += u64::from(mail.volume.replace(whole).is_some());
         drop(mail);
         self.shared.changed.notify_all();
     }

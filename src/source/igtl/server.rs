@@ -1,13 +1,13 @@
 //! A server on threads of its own. It sends each message to all connected clients. If a client is slow, the oldest messages of its own
 //! queue are dropped.
 
-use super::begun::{Begun, longest};
+use super::begun::{Begun, is_passing, longest};
 use super::codec::{self, BODY_LIMIT, DecodeError, Decoded, MessageError, Version, decode, encode};
 use super::message::{Message, Status, Text};
 use crate::sync::locked;
 use crate::tree::Defaults;
 use std::collections::{BTreeMap, VecDeque};
-use std::io::{self, ErrorKind, Read, Write};
+use std::io::{self, Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream, ToSocketAddrs};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
@@ -204,9 +204,7 @@ impl Server {
     pub fn statistics(&self) -> ServerStatistics {
         locked(&self.shared.state).statistics.clone()
     }
-}
 
-impl Server {
     /// Sends the waiting messages, for [`ServerOptions::last`] at most, and ends all connections. The statistics remain available.
     pub fn finish(&self) {
         let mut state = locked(&self.shared.state);
@@ -330,8 +328,7 @@ impl Shared {
                 match stream.write(rest) {
                     Ok(0) => return "it is closed".into(),
                     Ok(n) => (rest, moved) = (&rest[n..], Instant::now()),
-                    Err(e) if matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
-                    Err(e) if e.kind() == ErrorKind::Interrupted => {}
+                    Err(e) if is_passing(&e) => {}
                     Err(e) => return e.to_string(),
                 }
                 let mut state = locked(&self.state);
@@ -366,9 +363,7 @@ impl Shared {
                 }
                 Err(DecodeError::Checksum { length, .. } | DecodeError::Content { length, .. }) => length,
                 // Something else than a client.
-                Err(DecodeError::Framing { .. }) => {
-                    return self.refuse(stream, number, "it speaks another protocol");
-                }
+                Err(DecodeError::Framing { .. }) => return self.refuse(stream, number, "it speaks another protocol"),
             };
             if skipped > 0 {
                 bytes.drain(..skipped);
@@ -383,7 +378,7 @@ impl Shared {
                 // It has closed the connection.
                 Ok(0) => return self.leave(number),
                 Ok(n) => bytes.extend_from_slice(&block[..n]),
-                Err(e) if matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted) => {}
+                Err(e) if is_passing(&e) => {}
                 Err(_) => return self.leave(number),
             }
             let state = locked(&self.state);
@@ -408,31 +403,19 @@ impl Shared {
         let State { clients, last, statistics, .. } = &mut *state;
         let Some(queue) = clients.get_mut(&number) else { return true };
         let name = query.device();
-        let found = || match last.get(name) {
-            Some(packet) => Some(packet.clone()),
-            None if name.is_empty() => last.values().next().cloned(),
-            None => None,
-        };
-        let short = |bytes: Option<Arc<[u8]>>| bytes.map(|bytes| Packet { device: None, bytes });
-        let answer = match (what, kind) {
-            ("GET", "CAPABIL" | "CAPABILITY") => short(self.capabilities()),
-            ("GET", "STATUS") => short(self.status()),
-            ("GET", "STRING") => short(self.text()),
+        if let ("STT" | "STP", "IMAGE") = (what, kind) {
+            queue.is_paused = what == "STP";
+        }
+        let image = last.get(name).or_else(|| last.values().next().filter(|_| name.is_empty()));
+        let packet = match image.filter(|_| (what, kind) == ("GET", "IMAGE")) {
             // The image itself, queued as if it were new: a client that asks faster than it reads loses the oldest.
-            ("GET", "IMAGE") => found().or_else(|| short(self.result("RTS_IMAGE", ERROR))),
-            ("STT", "IMAGE") => {
-                queue.is_paused = false;
-                short(self.result("RTS_IMAGE", SUCCESS))
+            Some(image) => image.clone(),
+            None => {
+                // RTS_ is as long as what it replaces, so that only a name of this server that no message holds leaves a query without an answer.
+                let Some(Ok(bytes)) = self.short_answer(what, kind) else { return true };
+                Packet { device: None, bytes: bytes.into() }
             }
-            ("STP", "IMAGE") => {
-                queue.is_paused = true;
-                short(self.result("RTS_IMAGE", SUCCESS))
-            }
-            ("GET" | "STT" | "STP", other) => short(self.result(&format!("RTS_{other}"), ERROR)),
-            _ => return true,
         };
-        // RTS_ is as long as what it replaces, so that only a name of this server that no message holds leaves a query without an answer.
-        let Some(packet) = answer else { return true };
         statistics.dropped += queue.push(packet, &self.options);
         let is_bearable = queue.answers <= MAX_ANSWERS;
         drop(state);
@@ -440,28 +423,25 @@ impl Shared {
         is_bearable
     }
 
-    fn capabilities(&self) -> Option<Arc<[u8]>> {
-        let names = CAPABILITIES.map(|name| {
-            let mut field = [0; 12];
-            field[..name.len()].copy_from_slice(name.as_bytes());
-            field
-        });
-        codec::packed("CAPABILITY", &self.options.name, now(), &names.concat()).ok().map(Arc::from)
-    }
-
-    fn result(&self, kind: &str, result: u8) -> Option<Arc<[u8]>> {
-        codec::packed(kind, &self.options.name, now(), &[result]).ok().map(Arc::from)
-    }
-
-    fn status(&self) -> Option<Arc<[u8]>> {
-        let (device, name) = (self.options.name.clone(), String::new());
-        let status = Status { device, time: now(), code: 1, subcode: 0, name, text: "sending pictures".into() };
-        encode(&Message::Status(status), Version::V1).ok().map(Arc::from)
-    }
-
-    fn text(&self) -> Option<Arc<[u8]>> {
-        let text = Text { device: self.options.name.clone(), time: now(), text: self.options.name.clone() };
-        encode(&Message::Text(text), Version::V1).ok().map(Arc::from)
+    /// The answer to a query for anything but an image that is there; None if it is no query.
+    fn short_answer(&self, what: &str, kind: &str) -> Option<Result<Vec<u8>, MessageError>> {
+        let (device, time) = (self.options.name.clone(), now());
+        let result = |kind: &str, result| codec::packed(kind, &self.options.name, time, &[result]);
+        Some(match (what, kind) {
+            ("GET", "CAPABIL" | "CAPABILITY") => {
+                // Fields of 12 bytes, filled with zeros; no name is longer.
+                let names = CAPABILITIES.map(|name| format!("{name:\0<12}")).concat();
+                codec::packed("CAPABILITY", &device, time, names.as_bytes())
+            }
+            ("GET", "STATUS") => {
+                let (name, text) = (String::new(), "sending pictures".into());
+                encode(&Message::Status(Status { device, time, code: 1, subcode: 0, name, text }), Version::V1)
+            }
+            ("GET", "STRING") => encode(&Message::Text(Text { text: device.clone(), device, time }), Version::V1),
+            ("STT" | "STP", "IMAGE") => result("RTS_IMAGE", SUCCESS),
+            ("GET" | "STT" | "STP", other) => result(&format!("RTS_{other}"), ERROR),
+            _ => return None,
+        })
     }
 }
 

@@ -329,8 +329,7 @@ impl FreeRunning {
 
 impl Live for FreeRunning {
     fn next(&mut self, patience: Duration) -> Event {
-        if !self.begun {
-            self.begun = true;
+        if !std::mem::replace(&mut self.begun, true) {
             return Event::Begin(Box::new(self.header.clone()));
         }
         let now = Instant::now();

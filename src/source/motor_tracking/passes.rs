@@ -29,7 +29,6 @@ struct Pass {
     slices: usize,
 }
 
-#[derive(Clone)]
 struct Candidate {
     /// ArrayState in the order of the pass.
     step: usize,

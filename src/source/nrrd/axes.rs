@@ -1,7 +1,7 @@
 //! What the axes of a NRRD are: space, time or colours, by their kinds, directions, labels and units; and where its voxels are.
 
 use super::super::data_files::StoredOrder;
-use super::super::layout::{extent, warned};
+use super::super::layout::{Remarks, extent, warned};
 use super::super::plus::spread;
 use super::super::units::{millimetres, seconds};
 use super::header::{Header, Vector};
@@ -10,8 +10,8 @@ use crate::probe::World;
 use glam::DVec3;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Pairs of title and text.
-type Remarks = Vec<(String, String)>;
+/// The axes of the voxels and their origin, mm.
+type Placed = ([DVec3; 3], DVec3);
 
 /// Kinds whose numbers are colours.
 const COLOURS: [&str; 4] = ["rgb-color", "rgba-color", "3-color", "4-color"];
@@ -186,25 +186,16 @@ impl Axes {
     /// One line that names the file and the field: the axes or the origin are impossible.
     pub(super) fn world(&self, header: &Header, remarks: &mut Remarks) -> Result<World, InputError> {
         let sign = sign(header)?;
-        let mut axes = [DVec3::X, DVec3::Y, DVec3::Z];
-        let is_directed = self.all.iter().any(Axis::is_in_space);
-        let (named, origin) = if is_directed {
-            ("space directions", self.directed(header, sign, &mut axes, remarks)?)
-        } else {
-            ("spacings", self.spaced(header, sign, &mut axes, remarks)?)
+        let (named, (axes, origin)) = match self.all.iter().any(Axis::is_in_space) {
+            true => ("space directions", self.directed(header, sign, remarks)?),
+            false => ("spacings", self.spaced(header, sign, remarks)?),
         };
         World::new(axes, origin).map_err(|why| InputError::new(header.path, named, why))
     }
 
-    /// Axes by their directions; returns the origin, mm.
-    fn directed(
-        &self,
-        header: &Header,
-        sign: DVec3,
-        axes: &mut [DVec3; 3],
-        remarks: &mut Remarks,
-    ) -> Result<DVec3, InputError> {
-        let field = "space directions";
+    /// Axes by their directions, and the origin, mm.
+    fn directed(&self, header: &Header, sign: DVec3, remarks: &mut Remarks) -> Result<Placed, InputError> {
+        let (field, mut axes) = ("space directions", [DVec3::ZERO; 3]);
         let lengths: BTreeSet<usize> =
             self.all.iter().filter_map(|axis| axis.direction.as_ref()?.as_ref().map(Vec::len)).collect();
         let Some(dimension) = lengths.first().filter(|_| lengths.len() == 1).copied() else {
@@ -239,10 +230,10 @@ impl Axes {
             }
         }
         match header.vectors("space origin")?.as_deref() {
-            None => Ok(DVec3::ZERO),
+            None => Ok((axes, DVec3::ZERO)),
             Some([Some(origin)]) if origin.len() == dimension => match scale.of_origin() {
-                _ if place(origin) == DVec3::ZERO => Ok(DVec3::ZERO),
-                Some(scale) => Ok(place(origin) * sign * scale),
+                _ if place(origin) == DVec3::ZERO => Ok((axes, DVec3::ZERO)),
+                Some(scale) => Ok((axes, place(origin) * sign * scale)),
                 None => header.fault("units", "differ from axis to axis, so that those of space origin are not known"),
             },
             Some(_) => header.fault("space origin", format!("is not one vector of {dimension} numbers")),
@@ -270,14 +261,9 @@ impl Axes {
         }
     }
 
-    /// Axes along the world by their spacings; returns the origin, mm.
-    fn spaced(
-        &self,
-        header: &Header,
-        sign: DVec3,
-        axes: &mut [DVec3; 3],
-        remarks: &mut Remarks,
-    ) -> Result<DVec3, InputError> {
+    /// Axes along the world by their spacings, and the origin, mm.
+    fn spaced(&self, header: &Header, sign: DVec3, remarks: &mut Remarks) -> Result<Placed, InputError> {
+        let mut axes = [DVec3::X, DVec3::Y, DVec3::Z];
         let stated = header.get("space dimension").and_then(|text| text.parse().ok());
         let scale =
             self.scale(header, stated.unwrap_or(if header.has("space") { 3 } else { self.space.len() }), remarks)?;
@@ -302,11 +288,11 @@ impl Axes {
             remarks.push(("spacing".into(), text));
         }
         match header.vectors("space origin")?.as_deref() {
-            Some([Some(origin)]) => Ok(place(origin) * sign * scale.of_axis(self.space[0])),
+            Some([Some(origin)]) => Ok((axes, place(origin) * sign * scale.of_axis(self.space[0]))),
             Some(_) => header.fault("space origin", "is not one vector"),
             None => {
                 let starts: Option<Vec<f64>> = starts.into_iter().collect();
-                Ok(starts.map_or(DVec3::ZERO, |starts| place(&starts)))
+                Ok((axes, starts.map_or(DVec3::ZERO, |starts| place(&starts))))
             }
         }
     }

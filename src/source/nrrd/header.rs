@@ -1,6 +1,7 @@
 //! The header of a NRRD: its fields, the keys that programs add, and the names of its data files.
 
 use super::super::keys::{Aspect, Keys, Stated, Unused, Use, keys};
+use super::super::layout::Remarks;
 use super::super::packed::InputFile;
 use super::super::plus::PlusFrames;
 use crate::files::{InputError, quoted};
@@ -186,9 +187,8 @@ impl<'a> Header<'a> {
     ///
     /// # Errors
     /// A field for which the file has to be refused.
-    pub(super) fn unused(self, remarks: &mut Vec<(String, String)>) -> Result<Unused, InputError> {
-        let path = self.path;
-        self.stated.finish(path, remarks).map_err(|(field, fault)| InputError::new(path, field, fault))
+    pub(super) fn unused(self, remarks: &mut Remarks) -> Result<Unused, InputError> {
+        self.stated.finish(self.path, remarks)
     }
 
     /// The value of a key that is not of NRRD itself but of a program; None if it is absent.
@@ -226,15 +226,12 @@ impl<'a> Header<'a> {
     /// The field has another number of entries, or one is not a finite number.
     pub(super) fn numbers(&self, field: &str, count: usize) -> Result<Vec<Option<f64>>, InputError> {
         let Some(words) = self.words(field, count)? else { return Ok(vec![None; count]) };
-        let mut numbers = Vec::new();
-        for word in words {
-            match word.parse::<f64>() {
-                Ok(number) if number.is_nan() => numbers.push(None),
-                Ok(number) if number.is_finite() => numbers.push(Some(number)),
-                _ => return self.fault(field, format!("{} is not a finite number", quoted(&word))),
-            }
-        }
-        Ok(numbers)
+        let number = |word: &String| match word.parse::<f64>() {
+            Ok(number) if number.is_nan() => Ok(None),
+            Ok(number) if number.is_finite() => Ok(Some(number)),
+            _ => self.fault(field, format!("{} is not a finite number", quoted(word))),
+        };
+        words.iter().map(number).collect()
     }
 
     /// The vectors of a field. An inner None stands for the word `none` or a vector of NaN; the result is None if the field is absent.

@@ -5,21 +5,18 @@ mod axes;
 mod header;
 
 use super::data_files::{self, Pattern};
-use super::layout::Layout;
+use super::layout::{Layout, Remarks, frames};
 use super::packed::{Encoding, InputFile, Pixels};
 use super::pixel::{Number, PixelFormat};
-use super::plus::PlusWords;
+use super::plus::{PlusWords, spread};
 use crate::files::{InputError, quoted};
 use crate::probe::World;
 use axes::Axes;
 use header::{Header, IMAGE_TYPE, ORIENTATION};
 
 pub(super) use header::KEYS;
-use std::io::{BufRead, BufReader};
+use std::io::{BufReader, Read};
 use std::path::Path;
-
-/// Most frames of all volumes.
-const MAX_FRAMES: u64 = 1 << 20;
 
 /// The number types by their names.
 const NUMBERS: [(&[&str], Number); 10] = [
@@ -51,19 +48,15 @@ pub(super) fn read(file: &InputFile) -> Result<Layout, InputError> {
     };
     let mut remarks = Vec::new();
     let axes = Axes::of(&header, &mut remarks)?;
-    let pixel = PixelFormat { number: *number, channels: 1, big_endian: false, scale: None };
+    let pixel = PixelFormat::grey(*number);
     let pixel = PixelFormat { channels: axes.channels, big_endian: is_big_endian(&header, pixel.bytes())?, ..pixel };
     let [width, height, depth] = axes.size;
-    let frames = depth as u64 * axes.volumes as u64;
-    if frames > MAX_FRAMES {
-        return header.fault("sizes", format!("make {frames} frames, at most {MAX_FRAMES} are read"));
-    }
-    let frames = frames as usize;
+    let frames = frames(file.path, "sizes", "make", depth, axes.volumes)?;
     let world = axes.world(&header, &mut remarks)?;
     let world = of_frames(&header, world, &mut remarks)?;
     let times = match header.frames.times.is_empty() {
         true => axes.times(&header, &mut remarks)?,
-        false => header.frames.times(depth, frames),
+        false => spread(&header.frames.times, depth, frames),
     };
     let words = PlusWords {
         path: file.path,
@@ -124,7 +117,7 @@ fn is_big_endian(header: &Header, bytes: usize) -> Result<bool, InputError> {
 }
 
 /// The world with the spacing that the frames of PLUS state, if they do.
-fn of_frames(header: &Header, world: World, remarks: &mut Vec<(String, String)>) -> Result<World, InputError> {
+fn of_frames(header: &Header, world: World, remarks: &mut Remarks) -> Result<World, InputError> {
     let stated = [0, 1, 2].map(|n| world.axis(n).length());
     let Some(spacing) = header.frames.spacing(header.path, stated, remarks) else { return Ok(world) };
     let axes = [0, 1, 2].map(|n| world.directions().col(n) * spacing[n]);
@@ -199,11 +192,7 @@ fn place(header: &Header, pixels: &mut Pixels, bytes: u64) -> Result<u64, InputE
             pixels.offset = end.saturating_sub(bytes).max(pixels.offset);
             pixels.length = end - pixels.offset;
         }
-        Ok(skip @ 0..) if pixels.is_compressed() => pixels.inside = pixels.inside.saturating_add(skip as u64),
-        Ok(skip @ 0..) => {
-            let skip = (skip as u64).min(pixels.length);
-            (pixels.offset, pixels.length) = (pixels.offset + skip, pixels.length - skip);
-        }
+        Ok(skip @ 0..) => pixels.leave_out(skip as u64),
         _ => return header.fault("byte skip", format!("{} is not possible here", quoted(skip))),
     }
     if pixels.is_compressed() || pixels.length <= bytes {
@@ -224,37 +213,15 @@ fn skip_lines(header: &Header, pixels: &mut Pixels) -> Result<(), InputError> {
         return Ok(());
     }
     let unreadable = |e: std::io::Error| InputError::unreadable(&pixels.path, &e);
-    let mut input = BufReader::new(pixels.open(0).map_err(unreadable)?);
-    let mut skipped = 0;
-    for there in 0..lines {
-        // The line is not kept: without an end it is as long as the file.
-        let (bytes, has_end) = skip_line(&mut input).map_err(unreadable)?;
-        skipped += bytes;
-        if !has_end {
-            return header.fault("line skip", format!("is {lines}, but {there} lines are there"));
+    let (mut skipped, mut there) = (0, 0);
+    // No line is kept: without an end it is as long as the file.
+    for byte in BufReader::new(pixels.open(0).map_err(unreadable)?).bytes() {
+        skipped += 1;
+        there += u64::from(byte.map_err(unreadable)? == b'\n');
+        if there == lines {
+            pixels.leave_out(skipped);
+            return Ok(());
         }
     }
-    match pixels.is_compressed() {
-        true => pixels.inside = pixels.inside.saturating_add(skipped),
-        false => {
-            let skipped = skipped.min(pixels.length);
-            (pixels.offset, pixels.length) = (pixels.offset + skipped, pixels.length - skipped);
-        }
-    }
-    Ok(())
-}
-
-/// The bytes of a line, and whether it ends before the file.
-fn skip_line(input: &mut impl BufRead) -> std::io::Result<(u64, bool)> {
-    let mut bytes = 0;
-    loop {
-        let there = input.fill_buf()?;
-        let end = there.iter().position(|byte| *byte == b'\n');
-        let taken = end.map_or(there.len(), |at| at + 1);
-        input.consume(taken);
-        bytes += taken as u64;
-        if end.is_some() || taken == 0 {
-            return Ok((bytes, end.is_some()));
-        }
-    }
+    header.fault("line skip", format!("is {lines}, but {there} lines are there"))
 }

@@ -1,7 +1,7 @@
 //! The bodies of the phantom: their echoes, and the ground truth of those that have a formula.
 
 use super::PhantomOptions;
-use super::head::{Head, Surroundings};
+use super::head::Head;
 use super::labels::Label;
 use super::speckle::{Beam, DYNAMIC_RANGE, Echo};
 use super::vessels::VesselTree;
@@ -9,9 +9,7 @@ use crate::files::InputError;
 use crate::probe::Probe;
 use crate::tree::{All, Name};
 use glam::DVec3;
-use std::fmt;
 use std::path::Path;
-use std::str::FromStr;
 
 /// The object that the phantom's probe scans.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, All, Name)]
@@ -48,21 +46,7 @@ impl Body {
     }
 }
 
-impl fmt::Display for Body {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-impl FromStr for Body {
-    type Err = InputError;
-
-    fn from_str(name: &str) -> Result<Body, InputError> {
-        let known = || Body::ALL.map(Body::name).join(", ");
-        let found = Body::ALL.into_iter().find(|body| body.name() == name);
-        found.ok_or_else(|| refusal("body", format!("'{name}' is not known, must be one of {}", known())))
-    }
-}
+named!(Body, "body");
 
 /// A straight wire between two points, mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -196,11 +180,10 @@ pub(super) enum Scatterers {
 impl Scatterers {
     /// The object that `options.body` names, placed before the face of the probe.
     pub fn new(options: &PhantomOptions, probe: &Probe) -> Scatterers {
-        let PhantomOptions { still, gap, clutter_db, .. } = *options;
         let face = probe.array_radius();
         let depth = |depth: f64| face + depth;
         let truth = match options.body {
-            Body::Head => return Scatterers::Head(Box::new(Head::new(face, &Surroundings { still, gap, clutter_db }))),
+            Body::Head => return Scatterers::Head(Box::new(Head::new(face, options))),
             Body::Sphere => Truth::Sphere {
                 centre: DVec3::new(4.0, depth(62.0), -3.0),
                 radius: 20.0,
@@ -227,7 +210,7 @@ impl Scatterers {
             // A large fetal heart at 144 a minute.
             Body::Heart => Truth::Heart(HeartTruth {
                 centre: DVec3::new(2.0, depth(58.0), -1.0),
-                radii: if still { [13.0; 2] } else { [9.0, 13.0] },
+                radii: if options.still { [13.0; 2] } else { [9.0, 13.0] },
                 wall: 4.0,
                 period: 60.0 / 144.0,
                 swing: options.heart_swing,
@@ -290,11 +273,8 @@ fn exact(truth: &Truth, beam: &Beam, sample: usize, pitch: f64) -> Echo {
             let nearest = wires.iter().map(|wire| wire.distance(place)).fold(f64::MAX, f64::min);
             let bump = peak - per_mm2 * nearest * nearest;
             let mirror = if bump > *outside { level(bump) } else { Echo::SILENT.mirror };
-            return if mirror > Echo::SILENT.mirror {
-                Echo { diffuse: Echo::SILENT.diffuse, mirror }
-            } else {
-                Echo { diffuse: level(*outside), mirror }
-            };
+            let diffuse = if mirror > Echo::SILENT.mirror { Echo::SILENT.diffuse } else { level(*outside) };
+            return Echo { diffuse, mirror };
         }
         Truth::Heart(heart) => {
             let away = (place - heart.centre).length() - heart.radius(heart.cycles(beam.time));

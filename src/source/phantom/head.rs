@@ -5,7 +5,7 @@ use super::limbs::{Hand, cord, shoulders};
 use super::shape::{gradient, normal};
 use super::skull::{self, Intracranial, intracranial, is_bone};
 use super::speckle::{Beam, Echo};
-use super::{GAP, face};
+use super::{GAP, PhantomOptions, face};
 use glam::{Mat3, Vec3, vec3};
 use std::f32::consts::TAU;
 
@@ -52,16 +52,6 @@ const NEAR_WALL: f32 = 88.0;
 const SCALE: f32 = 1.0;
 /// The distances of the model may grow faster than the point moves. So much of a distance is safe to skip.
 const SAFE_STEP: f32 = 0.6;
-
-/// The fluid and the clutter around the fetus, and whether anything moves.
-pub(super) struct Surroundings {
-    /// True if nothing moves.
-    pub still: bool,
-    /// Least distance between the near uterine wall and the fetus, filled by fluid, mm.
-    pub gap: f64,
-    /// Level of the clutter, dB re full scale; None: no clutter.
-    pub clutter_db: Option<f64>,
-}
 
 pub(super) struct Head {
     /// Between the eyes, in the space of the probe.
@@ -118,9 +108,9 @@ enum Part {
 
 impl Head {
     /// A head with what is around it, in front of an array whose face is at Y = `face` mm.
-    pub fn new(face: f64, surroundings: &Surroundings) -> Head {
+    pub fn new(face: f64, options: &PhantomOptions) -> Head {
         let face = face as f32;
-        let Surroundings { still, gap, clutter_db } = *surroundings;
+        let PhantomOptions { still, gap, clutter_db, .. } = *options;
         Head {
             // The whole vault is inside the fan.
             origin: vec3(0.0, face + 55.0, 0.0),
@@ -144,7 +134,7 @@ impl Head {
         let mut facing: Option<f32> = None;
         let mut sample = 0;
         while sample < out.len() {
-            let place = beam.rough_place(sample);
+            let place = beam.place(sample).as_vec3();
             let depth = beam.start_depth as f32 + sample as f32 * pitch;
             let wall = self.wall(place);
             let tissue = self.tissue(place, &pose);

@@ -74,9 +74,7 @@ impl Hand {
         thumb = join(thumb, ball(p, middle + vec3(0.0, 0.0, 0.6), 2.7), 1.0);
         join(d, thumb, 2.2)
     }
-}
 
-impl Hand {
     /// Distance of a position in the axes of the head, mm, from the nearest bone of fingers, thumb, palm and forearm, negative inside. The joints are
     /// of cartilage, which is dark, and do not count. Far from the hand the result is a lower bound.
     pub fn bone(&self, p: Vec3) -> f32 {

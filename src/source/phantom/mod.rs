@@ -4,6 +4,27 @@
 //! an echogenicity (`body`, and `head` with `face`, `limbs` and `skull`), `truth` tells what is where, and `speckle` adds the speckle of a real image. `source` hands out the frames. The same options give the same bytes on every machine
 //! with the same mathematics library, with any number of threads.
 
+/// The text form of an enum that derives `All` and `Name`: the names of its variants. `$field`: the option that is refused in the error.
+macro_rules! named {
+    ($kind:ident, $field:literal) => {
+        impl std::fmt::Display for $kind {
+            fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+                f.write_str(self.name())
+            }
+        }
+
+        impl std::str::FromStr for $kind {
+            type Err = InputError;
+
+            fn from_str(name: &str) -> Result<$kind, InputError> {
+                let known = || $kind::ALL.map($kind::name).join(", ");
+                let found = $kind::ALL.into_iter().find(|one| one.name() == name);
+                found.ok_or_else(|| refusal($field, format!("'{name}' is not known, must be one of {}", known())))
+            }
+        }
+    };
+}
+
 mod body;
 mod face;
 mod head;
@@ -29,10 +50,9 @@ pub use vessels::{Vessel, VesselTree};
 
 use crate::Frame;
 use crate::files::InputError;
-use crate::probe::SampleType;
-use crate::probe::{Advance, Array, Axis, Motion, Probe, Rigid, Volumes};
+use crate::probe::{Advance, Array, Axis, Motion, Probe, Rigid, SampleType, Volumes};
 use crate::sequence::{self, MAX_FRAMES};
-use crate::tree::Defaults;
+use crate::tree::{Defaults, Name};
 use body::{Scatterers, refusal};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -58,24 +78,17 @@ const SOUND_SPEED: f64 = 1540.0;
 const MAX_VOLUME_SAMPLES: usize = 1 << 25;
 
 /// How speckle is simulated.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Name)]
+#[tree(rename_all = "lowercase")]
 pub enum Speckle {
     /// One realisation of the speckle, as a probe sees it.
+    #[tree(rename = "true")]
     Random,
     /// The mean grey value over all realisations of the speckle, blurred by the probe: the ideal result of a speckle filter.
     Mean,
     /// No speckle: samples are the exact echogenicity, not blurred by the probe.
+    #[tree(rename = "false")]
     None,
-}
-
-impl Speckle {
-    fn name(self) -> &'static str {
-        match self {
-            Speckle::Random => "true",
-            Speckle::Mean => "mean",
-            Speckle::None => "false",
-        }
-    }
 }
 
 /// Options of a [`Phantom`].
@@ -282,24 +295,16 @@ impl Phantom {
     /// # Errors
     /// More than 20000 frames, a path that does not end in .mha, or a file that cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), InputError> {
-        write_sequence(self, path)
-    }
-}
-
-fn write_sequence(phantom: &Phantom, path: &Path) -> Result<(), InputError> {
-    let frames = phantom.options().frames * phantom.volumes();
-    if frames > MAX_FRAMES {
-        let why = format!("make {frames} frames, a file holds at most {MAX_FRAMES}");
-        return Err(InputError::new(path, "volumes", why));
-    }
-    sequence::write_both(path, &header(phantom), &probe_file(phantom), |file| {
-        for volume in 0..phantom.volumes() {
-            for frame in phantom.volume(volume) {
-                file.write_all(&frame.bytes).map_err(|e| InputError::unwritable(path, &e))?;
-            }
+        let frames = self.options.frames * self.volumes();
+        if frames > MAX_FRAMES {
+            let why = format!("make {frames} frames, a file holds at most {MAX_FRAMES}");
+            return Err(InputError::new(path, "volumes", why));
         }
-        Ok(())
-    })
+        sequence::write_both(path, &header(self), &probe_file(self), |file| {
+            let mut frames = (0..self.volumes()).flat_map(|volume| self.volume(volume));
+            frames.try_for_each(|frame| file.write_all(&frame.bytes)).map_err(|e| InputError::unwritable(path, &e))
+        })
+    }
 }
 
 /// The header of the sequence. If the keys of a pre-scan sweep can describe all of it, they are added, so that the file needs no probe

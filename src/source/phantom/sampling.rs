@@ -3,8 +3,6 @@
 use super::{PhantomOptions, refusal};
 use crate::files::InputError;
 use crate::tree::{All, Name};
-use std::fmt;
-use std::str::FromStr;
 
 /// Standard deviations of the Gaussian point-spread function of the complex field, whose magnitude is the image. 0 is no blur.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,18 +43,4 @@ impl Sampling {
     }
 }
 
-impl fmt::Display for Sampling {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-impl FromStr for Sampling {
-    type Err = InputError;
-
-    fn from_str(name: &str) -> Result<Sampling, InputError> {
-        let known = || Sampling::ALL.map(Sampling::name).join(", ");
-        let found = Sampling::ALL.into_iter().find(|sampling| sampling.name() == name);
-        found.ok_or_else(|| refusal("sampling", format!("'{name}' is not known, must be one of {}", known())))
-    }
-}
+named!(Sampling, "sampling");

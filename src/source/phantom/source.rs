@@ -3,8 +3,7 @@
 use super::Phantom;
 use crate::files::InputError;
 use crate::frame::{Frame, Source, check_volume};
-use crate::probe::Geometry;
-use crate::probe::StoredType;
+use crate::probe::{Geometry, StoredType};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;

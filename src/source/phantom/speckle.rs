@@ -60,11 +60,6 @@ impl Beam {
         self.first + self.step * sample as f64
     }
 
-    /// Position of a sample in f32, for objects that need no higher precision.
-    pub(crate) fn rough_place(&self, sample: usize) -> Vec3 {
-        self.place(sample).as_vec3()
-    }
-
     /// Unit vector along the line, away from the probe.
     pub fn direction(&self) -> Vec3 {
         (self.step / self.pitch).as_vec3()
@@ -284,11 +279,8 @@ impl Field {
     }
 
     fn add(&mut self, other: &Field, weight: f32) {
-        for (sum, value) in self.re.iter_mut().zip(&other.re) {
-            *sum += weight * value;
-        }
-        for (sum, value) in self.im.iter_mut().zip(&other.im) {
-            *sum += weight * value;
+        for (sums, values) in [(&mut self.re, &other.re), (&mut self.im, &other.im)] {
+            sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += weight * value);
         }
     }
 }

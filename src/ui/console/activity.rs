@@ -11,7 +11,8 @@ const PATIENCE: Duration = Duration::from_millis(500);
 /// Times of the user's last actions, and of those whose effect no picture shows yet.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Activity {
-    acted: Instant,
+    /// Time of the user's last action.
+    pub(super) acted: Instant,
     changed: Instant,
     /// The first input whose settings are not sent to the stream yet.
     unsent: Option<Instant>,
@@ -27,11 +28,6 @@ impl Activity {
     /// Notes that the user did something.
     pub(super) fn acts(&mut self, now: Instant) {
         self.acted = self.acted.max(now);
-    }
-
-    /// Time of the user's last action.
-    pub(super) fn acted(&self) -> Instant {
-        self.acted
     }
 
     /// Notes that settings, or marks on the picture, were changed.
@@ -113,6 +109,6 @@ mod tests {
         assert!(!activity.has_paused(at(600)) && activity.has_paused(at(601)));
         activity.acts(at(700));
         activity.acts(at(650));
-        assert_eq!(activity.acted(), at(700), "inputs may be handled late");
+        assert_eq!(activity.acted, at(700), "inputs may be handled late");
     }
 }

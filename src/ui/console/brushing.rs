@@ -27,7 +27,7 @@ impl Console {
         match change {
             Change::Settings => {
                 self.activity.changes_settings(now);
-                self.quality.scene_changed();
+                self.quality.pace.forget();
             }
             Change::Refused(why) => self.notify(why, true),
             _ => {}

@@ -18,14 +18,14 @@ impl Console {
     pub fn execute(&mut self, command: &Command, now: Instant) {
         tracing::debug!("{command:?}");
         self.user_acts(now);
-        if self.first_steps.end(command) {
+        if self.start.first_steps.end(command) {
             return self.presentation.redraw();
         }
-        let stops = self.turntable.stop_for(command);
+        let stops = self.hands.turntable.stop_for(command);
         self.presentation.redraw_if(stops);
         let before = is_of_tone(command).then(|| self.controls.settings().clone());
         // A drag by keyboard is one step, however long it rests.
-        if self.activity.has_paused(now) && !self.hands.holds() {
+        if self.activity.has_paused(now) && !self.hands.pointer.is_held() {
             self.controls.seal();
         }
         self.note_what_is_measured_on(command);
@@ -39,20 +39,20 @@ impl Console {
         }
         match change {
             Change::Nothing => return,
-            Change::Tool => self.survey.end_distance(),
+            Change::Tool => self.survey.first_end = None,
             Change::Marks => self.activity.changes(now),
             Change::Refused(why) => self.notify(why, true),
             Change::Settings => {
                 self.activity.changes_settings(now);
                 if command.is_continuous() {
                     if before.as_ref().is_some_and(|before| before.light != self.controls.settings().light) {
-                        self.quality.light_moved(now);
+                        self.quality.light_moved = Some(now);
                     }
                     let work = before.map_or(Work::Rays, |before| self.work_since(before));
-                    self.quality.moved(work, now);
+                    self.quality.pace.moved(work, now);
                 } else {
                     // Another scene takes another time.
-                    self.quality.scene_changed();
+                    self.quality.pace.forget();
                 }
             }
             Change::Caller(command) => self.execute_own(&command, now),
@@ -74,11 +74,11 @@ impl Console {
     fn execute_own(&mut self, command: &Command, now: Instant) {
         let count = self.stream.cine().volumes().len();
         if matches!(*command, Command::Freeze | Command::StepCine(_) | Command::SeekCine(_) | Command::PlayCine) {
-            self.replay.forget_frozen();
+            self.replay.frozen = None;
         }
         match *command {
             Command::Freeze => {
-                self.replay.stop();
+                self.replay.player.stop();
                 self.stream.freeze(!self.stream.is_frozen());
             }
             Command::StepCine(by) => {
@@ -92,7 +92,7 @@ impl Console {
             }
             Command::PlayCine => {
                 self.stream.freeze(true);
-                self.replay.toggle(loop_of(&self.controls, &self.stream), now);
+                self.replay.player.toggle(loop_of(&self.controls, &self.stream), now);
             }
             Command::MarkCine(end) => {
                 self.mark_cine(self.stream.cine_position().unwrap_or(count.saturating_sub(1)), end, now);
@@ -143,9 +143,9 @@ impl Console {
             Command::Preset(n) => self.take_preset(n, now),
             Command::NamePreset => self.begin_naming(None),
             Command::RenamePreset(n) => self.begin_naming(Some(n)),
-            Command::EndNaming => self.end_naming(),
-            Command::DeletePreset(n) => self.delete_preset(n),
-            Command::RestorePresets => self.restore_presets(),
+            Command::EndNaming => self.change_presets(|presets, settings| presets.end_naming(settings)),
+            Command::DeletePreset(n) => self.change_presets(|presets, _| presets.delete(n)),
+            Command::RestorePresets => self.change_presets(|presets, _| presets.restore()),
             Command::Back => self.go_back(),
             // A kiosk ends only with its exit keys: a sleeve may press Escape.
             Command::Exit if self.fixed.is_kiosk => {}
@@ -174,7 +174,7 @@ impl Console {
     }
 
     pub(super) fn show_cine_volume(&mut self, index: usize) {
-        self.replay.stop();
+        self.replay.player.stop();
         self.stream.freeze(true);
         self.stream.show_cine_volume(index);
     }
@@ -182,9 +182,9 @@ impl Console {
     /// Begins to turn, or ends it.
     fn toggle_turning(&mut self, now: Instant) {
         let turns = self.stream.scene().is_some_and(|scene| !scene.is_flat());
-        match (self.turntable.stop(), turns) {
+        match (self.hands.turntable.stop(), turns) {
             (true, _) => {}
-            (false, true) => self.turntable.begin(now),
+            (false, true) => self.hands.turntable.begin(now),
             (false, false) => self.notify(texts::NOTHING_TURNS, true),
         }
     }
@@ -192,16 +192,16 @@ impl Console {
     /// Rotates the view by the next step, if the turntable runs.
     pub(super) fn turn(&mut self, now: Instant) {
         let can_draw = !self.stream.is_drawing() && self.stream.is_idle();
-        let Some(by) = self.turntable.step(can_draw, now) else { return };
+        let Some(by) = self.hands.turntable.step(can_draw, now) else { return };
         let is_flat = self.stream.scene().is_none_or(|scene| scene.is_flat());
         match self.controls.apply(&Command::Rotate([by, 0.0]), self.stream.scene()) {
             Change::Settings => {
                 self.activity.changes(now);
-                self.quality.moved(Work::Rays, now);
+                self.quality.pace.moved(Work::Rays, now);
             }
             // The mode has nothing that turns.
             _ if is_flat => {
-                self.turntable.stop();
+                self.hands.turntable.stop();
                 self.presentation.redraw();
             }
             _ => {}
@@ -219,7 +219,7 @@ impl Console {
             return;
         }
         let shown = self.stream.cine_position();
-        if let Some(next) = self.replay.advance(loop_of(&self.controls, &self.stream), shown, now) {
+        if let Some(next) = self.replay.player.advance(loop_of(&self.controls, &self.stream), shown, now) {
             self.stream.show_cine_volume(next);
         }
     }
@@ -239,11 +239,11 @@ impl Console {
         if is_closed {
             return;
         }
-        if self.hands.points() && self.controls.work().is_none() && self.controls.line().is_none() {
+        if self.hands.pointer.is_on && self.controls.work().is_none() && self.controls.line().is_none() {
             self.toggle_keyboard_pointer(Instant::now());
-        } else if self.leave_measuring() || self.turntable.stop() {
+        } else if self.leave_measuring() || self.hands.turntable.stop() {
             // The view shows it.
-        } else if self.presentation.is_full_screen() && !self.fixed.is_kiosk {
+        } else if self.presentation.is_full_screen && !self.fixed.is_kiosk {
             self.request.toggle_full_screen = true;
         } else if !self.fixed.follows_another || self.fixed.started.elapsed() >= ESCAPE_PAUSE {
             self.execute_own(&Command::Exit, Instant::now());
@@ -283,7 +283,7 @@ impl Console {
     /// Asks, if leaving loses anything. Without panels nobody sees a question.
     fn asks_before_leaving(&mut self) -> bool {
         let question = self.unsaved().filter(|_| self.fixed.overlay);
-        question.iter().for_each(|question| self.leaving.ask(question));
+        self.leaving.question = question.or(self.leaving.question);
         question.is_some()
     }
 
@@ -303,7 +303,7 @@ impl Console {
 
     /// Sets whether the window fills the screen. If it does, [`Command::Back`] leaves full screen before it leaves the program.
     pub fn set_full_screen(&mut self, is_full_screen: bool) {
-        self.presentation.set_full_screen(is_full_screen);
+        self.presentation.is_full_screen = is_full_screen;
     }
 
     /// True while the user is asked whether to save before the program ends.
@@ -314,7 +314,7 @@ impl Console {
 
 /// The cine loop as it is played.
 fn loop_of<'a>(controls: &'a Controls, stream: &'a Stream) -> Loop<'a> {
-    Loop { cine: &controls.settings().cine, volumes: stream.cine().volumes() }
+    Loop { cine: &controls.settings().drawn.cine, volumes: stream.cine().volumes() }
 }
 
 /// True for continuous commands that may leave the rays as they are.

@@ -1,7 +1,7 @@
 //! The comparison of the shown volume with another one.
 
 use super::{Console, ConsoleError};
-use crate::comparison::{Comparison, News, volume_of};
+use crate::comparison::{Comparison, volume_of};
 use crate::live::StreamError;
 use crate::live::cine::CineVolume;
 use crate::picture::Picture;
@@ -11,7 +11,6 @@ use crate::source::recorder::Header;
 use crate::texts;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::Instant;
 
 /// Correlation of two aligned volumes below which the user is told to look.
 const UNLIKE: f64 = 0.5;
@@ -19,12 +18,12 @@ const UNLIKE: f64 = 0.5;
 impl Console {
     /// The picture of the difference, and after it those of the compared volumes, each None until it is drawn; empty without a comparison.
     pub fn compared(&self) -> Vec<Option<Arc<Picture>>> {
-        self.comparison.as_ref().map_or_else(Vec::new, |comparison| comparison.shown().pictures())
+        self.comparison.as_ref().map_or_else(Vec::new, |comparison| comparison.shown.pictures())
     }
 
     /// The length, mm, and the angle, degrees, by which the first compared volume is moved; None if it is where its recording says.
     pub fn compared_is_moved(&self) -> Option<[f64; 2]> {
-        self.comparison.as_ref()?.shown().others[0].moved
+        self.comparison.as_ref()?.shown.others[0].moved
     }
 
     /// Begins a comparison: with the next open recording, or else with the shown volume as it is now. Ends one that is there.
@@ -42,7 +41,7 @@ impl Console {
             };
             match begun {
                 Ok(mut comparison) => {
-                    comparison.name_first(self.shown_name());
+                    comparison.shown.first = self.shown_name();
                     self.comparison = Some(comparison);
                 }
                 Err(fault) => self.notify(&texts::not_compared(fault), true),
@@ -53,7 +52,7 @@ impl Console {
 
     /// Compares with the open recording after those that are compared.
     pub(super) fn compare_further(&mut self) {
-        let Some(compared) = self.comparison.as_ref().map(|comparison| comparison.shown().others.len()) else {
+        let Some(compared) = self.comparison.as_ref().map(|comparison| comparison.shown.others.len()) else {
             return self.toggle_comparison();
         };
         let file = self.next_recording(compared as i32 + 1).ok_or_else(|| texts::WHY_NO_FURTHER.to_string());
@@ -88,10 +87,14 @@ impl Console {
         Some((header, volume))
     }
 
+    /// The volume of the cine loop that is on display; None if that is not in the loop.
+    pub(super) fn cine_volume(&self) -> Option<&CineVolume> {
+        self.stream.cine().volumes().get(self.stream.cine_position()?)
+    }
+
     /// The volume of the cine loop that is on display, or else its newest one.
     pub(super) fn shown_in_loop(&self) -> Option<&CineVolume> {
-        let volumes = self.stream.cine().volumes();
-        self.stream.cine_position().and_then(|at| volumes.get(at)).or(volumes.back())
+        self.cine_volume().or(self.stream.cine().volumes().back())
     }
 
     /// Moves a compared volume as a drag over its picture does.
@@ -126,19 +129,19 @@ impl Console {
             Err(fault) => {
                 self.comparison = None;
                 self.resize_picture();
-                Some(News::Fault(fault.to_string()))
+                Some(Err(fault.to_string()))
             }
         };
         match news {
             None => {}
-            Some(News::Aligned(found)) if found.correlation < UNLIKE => {
+            Some(Ok(found)) if found.correlation < UNLIKE => {
                 self.notify(&texts::hardly_aligned(found.correlation), true);
             }
-            Some(News::Aligned(found)) => {
+            Some(Ok(found)) => {
                 let moved = [found.motion.shift.length(), found.motion.angle()];
                 self.notify(&texts::aligned(moved, found.correlation), false);
             }
-            Some(News::Fault(fault)) => self.notify(&texts::not_compared(fault), true),
+            Some(Err(fault)) => self.notify(&texts::not_compared(fault), true),
         }
         self.draw_difference();
         Ok(())
@@ -159,10 +162,5 @@ impl Console {
             comparison.make_difference(&first);
             self.presentation.redraw();
         }
-    }
-
-    /// When the comparison is to be updated without an event.
-    pub(super) fn comparison_due(&self, now: Instant) -> Option<Instant> {
-        self.comparison.as_ref()?.due(now)
     }
 }

@@ -8,9 +8,11 @@ use std::time::{Duration, Instant};
 
 /// The source of frames, and what is known about its connection.
 pub(super) struct Connection {
-    source: SourceSupervisor,
-    kind: SourceKind,
-    silence: Silence,
+    /// Opens the source, and opens it again after a failure.
+    pub(super) source: SourceSupervisor,
+    pub(super) kind: SourceKind,
+    /// How long a live source has sent nothing.
+    pub(super) silence: Silence,
     /// The reason shown last why the source is not connected.
     disconnected: Option<String>,
     /// Number of frames received.
@@ -24,21 +26,17 @@ impl Connection {
         Connection { source, kind, silence: Silence::new(now), disconnected: None, frames: 0, ended: None }
     }
 
-    pub(super) fn kind(&self) -> SourceKind {
-        self.kind
-    }
-
     pub(super) fn is_opening(&self) -> bool {
-        *self.source.state() == SourceState::Opening
+        self.source.state == SourceState::Opening
     }
 
     pub(super) fn is_open(&self) -> bool {
-        matches!(self.source.state(), SourceState::Open)
+        matches!(self.source.state, SourceState::Open)
     }
 
     /// True if the source ended for good.
     pub(super) fn is_over(&self) -> bool {
-        matches!(self.source.state(), SourceState::Ended(_))
+        matches!(self.source.state, SourceState::Ended(_))
     }
 
     /// Time since a probe or a pipe ended for good, since when the picture is not live; None if it has not.
@@ -46,32 +44,12 @@ impl Connection {
         self.ended.map(|at| now.saturating_duration_since(at))
     }
 
-    /// Number of failed attempts to open the source.
-    pub(super) fn not_opened(&self) -> u64 {
-        self.source.not_opened()
-    }
-
     /// The reason why the source could not be opened; None if it was.
     pub(super) fn fault(&self) -> Option<String> {
-        match self.source.state() {
-            SourceState::Ended(why) if self.not_opened() > 0 => why.clone(),
+        match &self.source.state {
+            SourceState::Ended(why) if self.source.not_opened > 0 => why.clone(),
             _ => None,
         }
-    }
-
-    /// Cancels the opening of the source. Returns false if it is not being opened.
-    pub(super) fn cancel(&mut self) -> bool {
-        self.source.cancel()
-    }
-
-    /// Notes that an update of the console begins.
-    pub(super) fn begin_update(&mut self, now: Instant) {
-        self.silence.begin_update(now);
-    }
-
-    /// Notes that the update that began at `now` took the time `took`. `is_busy`: the device still works.
-    pub(super) fn end_update(&mut self, now: Instant, took: Duration, is_busy: bool) {
-        self.silence.end_update(now, took, is_busy);
     }
 
     /// The source, if it was opened since the last call. It is dropped if `is_wanted` is false.
@@ -118,14 +96,14 @@ impl Connection {
         now: Instant,
     ) -> Option<SourceNotice> {
         let is_silent = self.silence.is_silent(now) && !is_frozen;
-        self.source.state().notice(self.kind, disconnected, is_silent, has_shown)
+        self.source.state.notice(self.kind, disconnected, is_silent, has_shown)
     }
 
     /// Times at which the connection has to be polled again.
     pub(super) fn due(&self, is_frozen: bool, now: Instant) -> impl Iterator<Item = Instant> {
         let is_listening = self.is_open() && !is_frozen;
         let silence = Some(self.silence.due()).filter(|at| is_listening && *at > now);
-        self.source.wakes_at().into_iter().chain(silence)
+        self.source.next_attempt.into_iter().chain(silence)
     }
 }
 

@@ -28,7 +28,7 @@ pub(super) struct Faults {
     stall_shown_until: Option<Instant>,
     shaders: Option<Arc<ShaderFolder>>,
     /// Why the picture is not drawn with the present shaders of their folder.
-    of_shaders: Option<String>,
+    pub(super) of_shaders: Option<String>,
     /// Watches the folder of shaders and reloads them.
     _watch: Option<Watch>,
 }
@@ -88,11 +88,6 @@ impl Faults {
         let is_other = fault != self.of_shaders;
         self.of_shaders = fault;
         is_other
-    }
-
-    /// The reason why pictures are not drawn with the present shaders of the watched folder; None if they are.
-    pub(super) fn of_shaders(&self) -> Option<&str> {
-        self.of_shaders.as_deref()
     }
 
     /// Times at which the faults have to be checked again.

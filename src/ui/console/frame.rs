@@ -3,7 +3,6 @@
 use super::presentation::PictureState;
 use super::quality::full_settings;
 use super::{Console, ConsoleError, LoopRequest};
-use crate::comparison::Comparison;
 use crate::gpu::window::PresentOutcome;
 use crate::live::metrics::SourceStatus;
 use crate::live::{Feed, FinishedPicture, Step, StreamError};
@@ -32,7 +31,7 @@ impl Console {
 
     fn advance(&mut self, now: Instant) -> Result<LoopRequest, ConsoleError> {
         let begun = Instant::now();
-        self.connection.begin_update(now);
+        self.connection.silence.begin_update(now);
         self.request.restart |= self.faults.is_resolved(now);
         if let Some(feed) = self.connection.poll(!self.faults.prevents_view(), now) {
             self.stream.replace_source(feed);
@@ -62,7 +61,7 @@ impl Console {
         self.present(now)?;
         self.write_metrics(now);
         let is_busy = self.stream.is_drawing() || !self.stream.is_idle();
-        self.connection.end_update(now, begun.elapsed(), is_busy);
+        self.connection.silence.end_update(now, begun.elapsed(), is_busy);
         let request = std::mem::take(&mut self.request);
         // The console that replaces this one is updated at once: nothing else may wake it. What this one waits for is not its concern.
         let wake_at = if request.restart { Some(now) } else { self.next_wake(now) };
@@ -76,11 +75,11 @@ impl Console {
         self.presentation.redraw_if(is_other);
         match self.stream.lower(settings.clone(), full_settings(&self.controls)) {
             Ok(()) => {
-                self.quality.sent(settings);
+                self.quality.sent = Some(settings);
                 self.activity.settings_sent(Instant::now());
             }
             Err(fault) => {
-                self.quality.rejected(settings);
+                self.quality.rejected = Some(settings);
                 self.notify(&fault.to_string(), true);
             }
         }
@@ -89,20 +88,13 @@ impl Console {
     /// While the user rests, compiles what may be asked for next. Frames that arrive meanwhile are drawn as before.
     fn warm(&mut self, now: Instant) {
         // The first picture in full has the processor for itself.
-        let has_drawn = self.start.is_over() && self.stream.renderer().is_some_and(|renderer| renderer.has_drawn());
+        let has_drawn = self.start.is_over && self.stream.renderer().is_some_and(|renderer| renderer.has_drawn());
         if !has_drawn {
             return;
         }
-        let (acted, has_warmed) = (self.activity.acted(), self.stream.has_warmed());
+        let (acted, has_warmed) = (self.activity.acted, self.stream.has_warmed());
         if let Some(next) = self.quality.warm(&self.controls, acted, has_warmed, now) {
             self.stream.warm(next);
-        }
-    }
-
-    /// Takes over what the stream found from its source. What the user has set stays.
-    fn adopt_found(&mut self) {
-        if let Some(found) = self.stream.take_found() {
-            self.controls.adopt(found);
         }
     }
 
@@ -120,7 +112,8 @@ impl Console {
                     break;
                 }
                 Ok(Step::Fault(fault)) => self.notify(&fault, true),
-                Ok(Step::Progress) => self.adopt_found(),
+                // What the stream found from its source is taken over; what the user has set stays.
+                Ok(Step::Progress) => self.stream.take_found().into_iter().for_each(|found| self.controls.adopt(found)),
                 Ok(Step::End(why)) => self.source_ended(why, now),
                 Err(StreamError::Gpu(lost)) if lost.is_device_lost() => return Err(ConsoleError::DeviceLost(lost)),
                 // A device that fails every time is treated as lost.
@@ -155,10 +148,10 @@ impl Console {
         // A coarse one says nothing of what a picture of this quality takes.
         if !picture.is_coarse {
             self.quality.picture_took(picture.work, picture.took);
-            self.measured.picture_took(picture.took);
+            self.measured.times.pictures.add(picture.took);
         }
         self.measured.picture_finished(picture.latency, Instant::now());
-        self.comparison.iter_mut().for_each(Comparison::picture_changed);
+        self.comparison.iter_mut().for_each(|comparison| comparison.shown.difference = None);
         self.start.picture_finished(picture.is_coarse);
         self.faults.picture_finished();
     }
@@ -180,18 +173,18 @@ impl Console {
             return;
         }
         let acquisition_time = self.stream.acquisition_time();
-        let delay = self.measured.times().delay();
+        let delay = self.measured.times.delay();
         // Without a picture or a frame they cannot fail; a fault here must not stop the view.
         if let Ok(statistics) = self.stream.take_statistics() {
             let is_active = self.measured.add(&statistics, acquisition_time, || self.stream.totals());
-            let is_other = delay.is_some() || self.measured.times().delay().is_some();
+            let is_other = delay.is_some() || self.measured.times.delay().is_some();
             self.presentation.redraw_if(self.visible.times && is_active || self.connection.is_live() && is_other);
         }
     }
 
     /// True while frames come from a probe or a pipe, or while some that came are not shown yet.
     pub(super) fn is_followed(&self) -> bool {
-        let comes = self.measured.times().frames > 0.0 || !self.stream.is_idle();
+        let comes = self.measured.times.frames > 0.0 || !self.stream.is_idle();
         comes && self.connection.is_live() && self.stream.is_connected()
     }
 
@@ -200,7 +193,7 @@ impl Console {
         let source = SourceStatus {
             is_connected: self.connection.is_open() && self.stream.is_connected(),
             is_frozen: self.stream.is_frozen(),
-            not_opened: self.connection.not_opened(),
+            not_opened: self.connection.source.not_opened,
         };
         self.measured.write(&self.stream, &self.context, source, now);
     }
@@ -219,17 +212,17 @@ impl Console {
         if !self.stream.is_idle() || self.presentation.waits() {
             return Some(now);
         }
-        let tells_delay = self.is_followed() && self.measured.times().delay().is_some();
+        let tells_delay = self.is_followed() && self.measured.times.delay().is_some();
         [
-            self.quality.rests_at(now),
-            self.replay.due(),
-            self.quality.warms_at(self.activity.acted(), now),
-            self.presets.due(self.activity.acted(), now),
-            self.reel.due(now),
-            self.turntable.due(),
+            self.quality.pace.rests_at(now),
+            self.replay.player.next,
+            self.quality.warms_at(self.activity.acted, now),
+            self.presets.due(self.activity.acted, now),
+            self.replay.reel.due(now),
+            self.hands.turntable.due(),
             self.exporter.exporting().map(|_| now + EXPORT_POLL),
             self.opening.due(self.reads_source(), now),
-            self.comparison_due(now),
+            self.comparison.as_ref().and_then(|comparison| comparison.due(now)),
         ]
         .into_iter()
         .flatten()
@@ -251,7 +244,7 @@ impl Console {
             drawn_for: self.stream.last_begun().map(|begun| begun.elapsed()),
             is_paced,
             is_idle: self.stream.is_idle(),
-            has_started: self.start.is_over(),
+            has_started: self.start.is_over,
         };
         if !self.presentation.is_due(&picture, now) {
             return Ok(());
@@ -277,7 +270,7 @@ impl Console {
         };
         match presented {
             Ok(PresentOutcome::Presented) => {
-                screen.take_latencies().into_iter().for_each(|time| self.measured.reached_monitor(time));
+                screen.take_latencies().into_iter().for_each(|time| self.measured.times.scan_out.add(time));
                 self.presentation.presented(content, is_drawing, self.panels.has_pending_input());
                 if !has_drawn {
                     self.start.presented();
@@ -286,7 +279,7 @@ impl Console {
                     self.measured.presented(Instant::now());
                 }
                 if !is_drawing && let Some(input) = self.activity.answered_by(self.stream.last_begun()) {
-                    self.measured.input_waited(input.elapsed());
+                    self.measured.times.input_latency.add(input.elapsed());
                 }
             }
             // Try again when the window asks for it, or after a moment.

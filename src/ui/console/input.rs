@@ -21,31 +21,31 @@ impl Console {
             self.presentation.redraw();
         }
         if let (Some(exit), Input::Key { key, pressed: true }) = (&self.fixed.exit, input)
-            && exit.is(*key, self.hands.modifiers())
+            && exit.is(*key, self.hands.keys.modifiers)
         {
             self.request.exit = true;
         }
-        self.hands.see(input);
+        self.hands.pointer.other_input(input);
         let typed = self.key_of_search(input).or_else(|| {
             let is_taken = self.key_of_panels(input) || self.key_of_pointer(input, now);
             if is_taken { Some(Vec::new()) } else { self.typed(input) }
         });
         if typed.is_some() {
             // The keys go on to be held, and give nothing else.
-            self.hands.key(input);
+            self.hands.keys.input(input);
             typed.iter().flatten().for_each(|command| self.execute(command, now));
-        } else if let Some(command) = self.hands.key(input) {
+        } else if let Some(command) = self.hands.keys.input(input) {
             let command = if self.leaving.asks() { answer(input) } else { Some(command) };
             command.iter().for_each(|command| self.execute(command, now));
         }
-        self.gesture(input, self.hands.modifiers(), now);
+        self.gesture(input, self.hands.keys.modifiers, now);
     }
 
     /// Executes what an input does on the picture.
     fn gesture(&mut self, input: &Input, modifiers: Modifiers, now: Instant) {
         let is_over_panel = self.hands.place(input).is_some_and(|at| self.panels.covers(at));
         let (mut hands, tool) = (std::mem::take(&mut self.hands), self.controls.tool());
-        let commands = hands.gesture(input, &self.viewport(is_over_panel, now), tool, modifiers);
+        let commands = hands.gestures.input(input, &self.viewport(is_over_panel, now), tool, modifiers);
         self.hands = hands;
         commands.iter().for_each(|command| self.execute(command, now));
     }
@@ -82,24 +82,24 @@ impl Console {
         }
         let pointed = self.hands.toggle_pointer(self.room().picture);
         self.point(&pointed, now);
-        self.notify(if self.hands.points() { keys::POINTER_IS_ON } else { keys::POINTER_IS_OFF }, false);
+        self.notify(if self.hands.pointer.is_on { keys::POINTER_IS_ON } else { keys::POINTER_IS_OFF }, false);
     }
 
     /// Takes a key for the pointer by keyboard. True if it is none of the view's own.
     fn key_of_pointer(&mut self, input: &Input, now: Instant) -> bool {
         let Input::Key { key, pressed: true } = *input else { return false };
-        if !self.hands.points() || self.leaving.asks() || self.controls.typing().is_some() || self.shows_list() {
+        if !self.hands.pointer.is_on || self.leaving.asks() || self.controls.typing().is_some() || self.shows_list() {
             return false;
         }
-        let was_held = self.hands.holds();
+        let was_held = self.hands.pointer.is_held();
         if let Some(pointed) = self.hands.point(key, self.room().picture) {
-            if self.hands.holds() && !was_held {
+            if self.hands.pointer.is_held() && !was_held {
                 self.controls.seal();
             }
             self.point(&pointed, now);
             return true;
         }
-        let modifiers = self.hands.modifiers();
+        let modifiers = self.hands.keys.modifiers;
         let ends = modifiers == Modifiers { control: true, ..Modifiers::default() } && key == Key::Enter;
         let command = self.what_enter_ends().filter(|_| ends);
         command.iter().for_each(|command| self.execute(command, now));
@@ -118,19 +118,19 @@ impl Console {
     /// Takes a key for the search, or for a number that is typed: what it does, or none if it is another one's key.
     fn key_of_search(&mut self, input: &Input) -> Option<Vec<Command>> {
         let Input::Key { key, pressed: true } = *input else { return None };
-        if self.leaving.asks() { None } else { self.visible.key(key, self.hands.modifiers()) }
+        if self.leaving.asks() { None } else { self.visible.key(key, self.hands.keys.modifiers) }
     }
 
     /// Takes a key for the control that has the keyboard. True if it is none of the view's own.
     fn key_of_panels(&mut self, input: &Input) -> bool {
         let Input::Key { key, pressed: true } = *input else { return false };
-        let (modifiers, shows_list) = (self.hands.modifiers(), self.shows_list());
+        let (modifiers, shows_list) = (self.hands.keys.modifiers, self.shows_list());
         let has_keys_of_its_own = self.leaving.asks() || self.controls.typing().is_some() || self.opening.is_typing();
         if !self.fixed.overlay || has_keys_of_its_own || (shows_list && key == Key::Escape) {
             return false;
         }
         let walks = shows_list && !self.presets.is_naming();
-        (walks && self.panels.walk(key, modifiers, self.presets.is_shown())) || self.panels.key(key, modifiers)
+        (walks && self.panels.walk(key, modifiers, self.presets.is_shown)) || self.panels.key(key, modifiers)
     }
 }
 

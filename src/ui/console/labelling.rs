@@ -2,7 +2,6 @@
 
 use super::Console;
 use super::surface::SurfaceMap;
-use crate::gpu::Wake;
 use crate::labelling::{Effect, Labelling};
 use crate::panels::Note;
 use crate::passes::Texels;
@@ -29,8 +28,8 @@ type Place = (DVec3, Option<DVec3>);
 type Finish = Box<dyn FnOnce(&mut Console) + Send>;
 
 /// The work in progress on labels, and on bodies that are measured.
+#[derive(Default)]
 pub(super) struct LabelWork {
-    wake: Wake,
     /// Receives the result of the thread that is at work, and what the window says meanwhile.
     at_work: Option<(Receiver<Finish>, &'static str)>,
     /// The surface under the stroke in progress; the last place of the stroke in space, mm; and why the brush has no place.
@@ -40,10 +39,6 @@ pub(super) struct LabelWork {
 }
 
 impl LabelWork {
-    pub(super) fn new(wake: Wake) -> LabelWork {
-        LabelWork { wake, at_work: None, surface: None, last: None, fault: None }
-    }
-
     /// What the window says while a thread is at work.
     pub(super) fn note(&self) -> Option<Note> {
         self.at_work.as_ref().map(|(_, text)| Note { text: (*text).into(), is_fault: false })
@@ -57,7 +52,7 @@ impl Console {
             return self.notify(texts::STILL_AT_WORK, true);
         }
         let (sender, done) = channel();
-        let wake = self.label_work.wake.clone();
+        let wake = self.fixed.wake.clone();
         let work = move || {
             // The console may have ended.
             let _ = sender.send(work());

@@ -1,9 +1,8 @@
 //! Lays out the panels of the console and executes their commands.
 
 use super::Console;
-use crate::comparison::Comparison;
 use crate::gpu;
-use crate::panels::{Banner, PanelState, first_steps};
+use crate::panels::{Banner, PanelState, Pointers, SmallPictures, Timeliness, first_steps};
 use crate::shown_picture::ShownPicture;
 use std::time::{Duration, Instant};
 
@@ -17,7 +16,7 @@ impl Console {
             self.export_note().into_iter().chain(self.label_work.note()).chain(self.notes.shown()).collect();
         let recordings = self.opening.named();
         let exit_key = self.fixed.exit.as_ref().filter(|_| self.fixed.is_kiosk).map(ToString::to_string);
-        let loop_pictures = self.reel.pictures(self.stream.cine().volumes());
+        let loop_pictures = self.replay.reel.pictures(self.stream.cine().volumes());
         let says_work_at = self.activity.says_it_works_at().filter(|_| !self.stream.is_idle());
         let is_late = says_work_at.is_some_and(|at| at <= now);
         let room = self.room();
@@ -25,37 +24,40 @@ impl Console {
             shows_first_steps,
             controls: &self.controls,
             scene: self.stream.scene(),
-            times: self.measured.times(),
+            times: &self.measured.times,
             room,
             visible: &self.visible,
             files: self.opening.shown(),
             recordings: &recordings,
-            reading: self.opening.told(),
-            is_turning: self.turntable.is_on(),
-            exporting: self.exporter.exporting().map(|name| (name, self.exporter.progress())),
+            reading: self.opening.told.as_ref(),
+            is_turning: self.hands.turntable.is_on(),
+            exporting: self.exporter.exporting().map(|name| (name, self.exporter.progress)),
             presets: self.presets.shown(),
-            has_small_pictures: self.fixed.small_pictures,
-            looks: self.presets.tiles(),
-            loop_pictures: &loop_pictures,
+            small: SmallPictures {
+                are_drawn: self.fixed.small_pictures,
+                looks: self.presets.tiles(),
+                of_loop: &loop_pictures,
+            },
             origin: self.origin(),
             shows_only_origin: !self.fixed.overlay,
-            leaving: self.leaving.question(),
-            is_frozen: self.stream.is_frozen(),
-            is_live: self.is_followed(),
-            is_late,
-            ended: self.connection.ended_for(now),
-            cine: self.replay.state(self.cine_loop(), self.stream.cine_position()),
+            leaving: self.leaving.question,
+            timeliness: Timeliness {
+                is_frozen: self.stream.is_frozen(),
+                is_live: self.is_followed(),
+                is_late,
+                ended: self.connection.ended_for(now),
+            },
+            cine: self.replay.player.state(self.cine_loop(), self.stream.cine_position()),
             picture,
-            quality: (self.quality.label(), self.quality.budget()),
+            quality: (self.quality.label(), self.quality.pace.budget()),
             banner,
             notes: &notes,
             exit_key: exit_key.as_deref().unwrap_or_default(),
-            pointer: self.presentation.pointer(),
-            keyboard_pointer: self.hands.mark(room.picture),
-            compared: self.comparison.as_ref().map(Comparison::shown),
+            pointers: Pointers { of_mouse: self.presentation.pointer, of_keys: self.hands.pointer.mark(room.picture) },
+            compared: self.comparison.as_ref().map(|comparison| &comparison.shown),
         };
         let time = now.saturating_duration_since(self.fixed.started).as_secs_f64();
-        let output = self.panels.lay_out(&state, self.presentation.size(), time);
+        let output = self.panels.lay_out(&state, self.presentation.size, time);
         let to_be_said = says_work_at.map_or(Duration::MAX, |at| at.saturating_duration_since(now));
         let repaint_after = if is_late { output.repaint_after } else { output.repaint_after.min(to_be_said) };
         self.presentation.laid_out(output.tree, repaint_after, now);
@@ -69,12 +71,10 @@ impl Console {
     fn shows_first_steps(&mut self, is_free: bool) -> bool {
         let room = self.room();
         let is_seen = self.fixed.overlay && self.visible.panels && !self.fixed.is_kiosk;
-        let is_open = self.visible.is_any_open(&room)
-            || self.leaving.asks()
-            || self.opening.is_shown()
-            || self.presets.is_shown();
+        let is_open =
+            self.visible.is_any_open(&room) || self.leaving.asks() || self.opening.is_shown() || self.presets.is_shown;
         let has_room = first_steps::has_room(room.picture.1, self.panels.scale());
-        is_free && is_seen && has_room && !is_open && self.notes.is_empty() && self.first_steps.show()
+        is_free && is_seen && has_room && !is_open && self.notes.is_empty() && self.start.first_steps.show()
     }
 
     /// The message that lasts: a fault, or what is waited for.
@@ -85,7 +85,7 @@ impl Console {
         let gone = self.stream.disconnected();
         let (is_frozen, has_shown) = (self.stream.is_frozen(), self.stream.volumes_shown() > 0);
         // What is being read says it itself.
-        if self.connection.is_opening() && self.opening.told().is_some() {
+        if self.connection.is_opening() && self.opening.told.is_some() {
             return None;
         }
         let (title, text, is_fault) = self.connection.notice(gone.as_deref(), is_frozen, has_shown, now)?;

@@ -18,7 +18,7 @@ pub(super) struct Leaving {
     /// Whether everything that arrives is recorded to a file.
     is_recorded: bool,
     /// The question, while it is shown.
-    question: Option<&'static Unsaved>,
+    pub(super) question: Option<&'static Unsaved>,
     /// Number of files that have to be saved before the program ends.
     awaited: Option<usize>,
     /// The newest volume of the completely saved loops.
@@ -43,14 +43,6 @@ impl Leaving {
 
     pub(super) fn asks(&self) -> bool {
         self.question.is_some()
-    }
-
-    pub(super) fn question(&self) -> Option<&'static Unsaved> {
-        self.question
-    }
-
-    pub(super) fn ask(&mut self, question: &'static Unsaved) {
-        self.question = Some(question);
     }
 
     /// Closes the question. Returns false if none was shown.
@@ -122,7 +114,7 @@ mod tests {
     fn the_program_ends_with_the_files_that_it_waits_for_and_not_with_a_fault() {
         let (mut leaving, work) =
             (Leaving::new(SourceKind::Probe, false), || Holds::Work { kept: None, work: Handiwork::default() });
-        leaving.ask(&texts::UNSAVED_LOOP);
+        leaving.question = Some(&texts::UNSAVED_LOOP);
         assert!(leaving.asks() && leaving.dismiss() && !leaving.dismiss());
         assert!(!leaving.saved(&Holds::Loop(5)), "nothing is waited for");
         leaving.after(2);

@@ -1,6 +1,6 @@
 //! Presets in the console: applying one, saving the present look, and the pictures of the list.
 
-use super::Console;
+use super::{Console, Presets};
 use crate::command::{Command, InspectorTab};
 use crate::controls::Change;
 use crate::live::cine::CineVolume;
@@ -15,7 +15,7 @@ use std::time::Instant;
 impl Console {
     /// The thumbnails of the presets, in the order of their list; None for one that is not drawn yet. Empty if none was requested.
     pub fn thumbnails(&self) -> &[Option<Arc<Picture>>] {
-        self.presets.thumbnails()
+        &self.presets.thumbnails.pictures
     }
 
     pub(super) fn toggle_presets(&mut self) {
@@ -26,7 +26,7 @@ impl Console {
     }
 
     fn with_preset(&self, n: usize, scene: &Scene) -> Result<Settings, String> {
-        self.presets.settings(n, &self.controls, scene, self.connection.kind() == SourceKind::Demo)
+        self.presets.settings(n, &self.controls, scene, self.connection.kind == SourceKind::Demo)
     }
 
     /// Applies the n-th preset of the list, and closes the list.
@@ -43,7 +43,7 @@ impl Console {
                 self.presets.close();
                 if self.controls.take(settings, &Command::Preset(n)) == Change::Settings {
                     self.activity.changes_settings(now);
-                    self.quality.scene_changed();
+                    self.quality.pace.forget();
                 }
             }
             Err(why) => self.notify(&why, true),
@@ -60,25 +60,12 @@ impl Console {
         }
     }
 
-    /// Saves the present settings as a preset of the typed name, or renames a preset.
-    pub(super) fn end_naming(&mut self) {
-        let said = self.presets.end_naming(self.controls.settings());
-        self.say(said);
-    }
-
-    pub(super) fn delete_preset(&mut self, n: usize) {
-        let said = self.presets.delete(n);
-        self.say(said);
-    }
-
-    /// Restores the user's presets as they were before the last change.
-    pub(super) fn restore_presets(&mut self) {
-        let restored = self.presets.restore();
-        self.say(restored.map(|is_done| is_done.then(|| texts::PRESETS_RESTORED.to_string())));
-    }
-
-    fn say(&mut self, said: Result<Option<String>, String>) {
-        match said {
+    /// Changes the user's presets, and says what became of them.
+    pub(super) fn change_presets(
+        &mut self,
+        change: impl FnOnce(&mut Presets, &Settings) -> Result<Option<String>, String>,
+    ) {
+        match change(&mut self.presets, self.controls.settings()) {
             Ok(None) => {}
             Ok(Some(said)) => self.notify(&said, false),
             Err(why) => self.notify(&why, true),
@@ -87,13 +74,12 @@ impl Console {
 
     /// Updates the thumbnails: of the present volume with each preset, if volume or view have changed much, and of the volumes of the cine loop.
     pub(super) fn poll_thumbnails(&mut self, now: Instant) {
-        let (acted, is_drawing) = (self.activity.acted(), self.stream.is_drawing());
-        let has_new = self.presets.poll(acted, is_drawing, now) | self.reel.poll(acted, is_drawing, now);
+        let (acted, is_drawing) = (self.activity.acted, self.stream.is_drawing());
+        let has_new = self.presets.poll(acted, is_drawing, now) | self.replay.reel.poll(acted, is_drawing, now);
         self.presentation.redraw_if(has_new);
-        let in_panels = self.fixed.small_pictures && self.visible.panels && self.start.is_over();
+        let in_panels = self.fixed.small_pictures && self.visible.panels && self.start.is_over;
         let rests = self.stream.is_frozen() || !self.is_followed();
-        let volumes = self.stream.cine().volumes();
-        let shown = self.stream.cine_position().and_then(|at| volumes.get(at)).or(volumes.back());
+        let (volumes, shown) = (self.stream.cine().volumes(), self.shown_in_loop());
         let (Some(shown), Some(scene), Some(header)) = (shown, self.stream.scene(), self.stream.header()) else {
             return;
         };
@@ -103,7 +89,12 @@ impl Console {
             let geometry = if is_backward { header.backward.clone() } else { header.forward.clone() };
             Wanted { geometry, frames: of.frames.clone(), settings }
         };
-        let job = |pictures| Job { context: self.context.clone(), input: scene.input, pictures };
+        let job = |pictures| Job {
+            context: self.context.clone(),
+            input: scene.input,
+            pictures,
+            wake: self.fixed.wake.clone(),
+        };
         let of_inspector = in_panels && self.visible.inspector.tab(&self.room()) == InspectorTab::Look;
         let volume = shown.volume;
         if self.presets.wants_thumbnails((volume, settings), (of_inspector, rests), acted, now) {
@@ -111,11 +102,11 @@ impl Console {
             let job = job(looks.collect());
             return self.presets.make_thumbnails(job, volume, settings, now);
         }
-        if in_panels && rests && self.reel.wants(volumes, settings, acted, now) {
-            let missing = self.reel.missing(volumes, settings);
+        if in_panels && rests && self.replay.reel.wants(volumes, settings, acted, now) {
+            let missing = self.replay.reel.missing(volumes, settings);
             let of_loop = volumes.iter().zip(missing);
             let job = job(of_loop.map(|(of, is_missing)| is_missing.then(|| wanted(of, settings.clone()))).collect());
-            self.reel.make(job, volumes, settings);
+            self.replay.reel.make(job, volumes, settings);
         }
     }
 }

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 /// Collects the times that the viewer measures, and determines when statistics are due.
 pub(super) struct Measured {
-    times: Times,
+    pub(super) times: Times,
     /// When the last frame arrived that the finished picture shows, until that is presented.
     arrived: Option<Instant>,
     /// When statistics were last collected.
@@ -24,15 +24,6 @@ impl Measured {
         Measured { times: Times::default(), arrived: None, taken: now, interval, metrics }
     }
 
-    pub(super) fn times(&self) -> &Times {
-        &self.times
-    }
-
-    /// Adds the time from the start of a picture to its completion.
-    pub(super) fn picture_took(&mut self, time: Duration) {
-        self.times.pictures.add(time);
-    }
-
     /// Notes that a picture is finished whose last new frame arrived `latency` ago; 0: it shows no new frame.
     pub(super) fn picture_finished(&mut self, latency: Duration, now: Instant) {
         self.arrived = (!latency.is_zero()).then(|| now.checked_sub(latency)).flatten();
@@ -43,16 +34,6 @@ impl Measured {
         if let Some(arrived) = self.arrived.take() {
             self.times.frame_latency.add(now.saturating_duration_since(arrived));
         }
-    }
-
-    /// Adds the time from an input to the picture that shows its effect.
-    pub(super) fn input_waited(&mut self, time: Duration) {
-        self.times.input_latency.add(time);
-    }
-
-    /// Adds the time from the presentation of a picture to its first pixel on the monitor.
-    pub(super) fn reached_monitor(&mut self, time: Duration) {
-        self.times.scan_out.add(time);
     }
 
     /// True once in each interval, when statistics have to be collected.
@@ -143,10 +124,10 @@ mod tests {
         assert!(!measured.is_due(at(999)) && measured.is_due(at(1000)) && !measured.is_due(at(1001)));
         assert_eq!(measured.due(true).count(), 0, "no picture yet");
         assert_eq!(measured.line(), "ms: picture p50 - p95 -, input to picture p50 - p95 -");
-        measured.picture_took(Duration::from_millis(12));
+        measured.times.pictures.add(Duration::from_millis(12));
         assert_eq!(measured.due(true).collect::<Vec<_>>(), [at(2000)]);
         assert_eq!(measured.due(false).count(), 0);
-        measured.reached_monitor(Duration::from_millis(8));
+        measured.times.scan_out.add(Duration::from_millis(8));
         // A picture that shows no new frame is not measured, and one that does is measured once.
         measured.picture_finished(Duration::ZERO, at(5));
         measured.presented(at(6));

@@ -4,6 +4,7 @@ use super::Console;
 use super::opening::ListKey;
 use super::surface::SurfaceMap;
 use crate::command::{Command, Tool};
+use crate::controls::Change;
 use crate::export::Holds;
 use crate::files;
 use crate::input::{Input, Key};
@@ -26,8 +27,7 @@ impl Console {
         let Tool::Measure(kind) = self.controls.tool() else { return };
         match self.picked(kind, pixel) {
             Ok(Some(measured)) => {
-                let change = self.controls.add_measure(measured);
-                if let crate::controls::Change::Refused(why) = change {
+                if let Change::Refused(why) = self.controls.add_measure(measured) {
                     self.notify(why, true);
                 }
                 self.activity.changes(Instant::now());
@@ -44,25 +44,21 @@ impl Console {
         }
         // Undo may have taken the first end back.
         let is_begun = self.controls.work().is_some_and(|work| work.kind == MeasureKind::Surface);
-        let from = self.survey.first_end().filter(|_| is_begun);
+        let from = self.survey.first_end.filter(|_| is_begun && kind == MeasureKind::Surface);
         let (scene, distances) = self.drawn_surface(texts::POINT_NEEDS_SURFACE)?;
         let map = SurfaceMap::of(&scene, &distances);
         let place = map.at(pixel).ok_or(texts::NO_SURFACE_HERE)?;
         let point = scene.point_of(place);
-        if kind != MeasureKind::Surface {
-            let now = Instant::now();
-            self.execute(&Command::Point(point, true), now);
-            return Ok(None);
-        }
         let Some(from) = from else {
-            self.survey.begin_distance(place);
-            let now = Instant::now();
-            self.execute(&Command::Point(point, true), now);
+            if kind == MeasureKind::Surface {
+                self.survey.first_end = Some(place);
+            }
+            self.execute(&Command::Point(point, true), Instant::now());
             return Ok(None);
         };
         let path = map.path(from, place).ok_or(texts::FIRST_END_BEHIND_CAMERA)?;
         let points = path.into_iter().map(|place| scene.point_of(place)).collect();
-        self.survey.end_distance();
+        self.survey.first_end = None;
         self.controls.leave_work();
         Ok(Some(Measurement { kind, points, on_surface: true, ..Measurement::default() }))
     }
@@ -91,7 +87,7 @@ impl Console {
                         made,
                         ..Measurement::default()
                     };
-                    if let crate::controls::Change::Refused(why) = console.controls.add_measure(measured) {
+                    if let Change::Refused(why) = console.controls.add_measure(measured) {
                         return console.notify(why, true);
                     }
                     console.activity.changes(Instant::now());
@@ -109,7 +105,7 @@ impl Console {
         if self.controls.measures().is_empty() {
             return self.notify(texts::NO_MEASUREMENTS_YET, true);
         }
-        match self.survey.copy(outcome::csv(self.controls.measures(), &self.recording_name())) {
+        match self.survey.clipboard.copy(outcome::csv(self.controls.measures(), &self.recording_name())) {
             Ok(()) => self.notify(texts::RESULTS_COPIED, false),
             Err(fault) => {
                 self.notify(&texts::no_clipboard(fault), true);
@@ -132,16 +128,13 @@ impl Console {
 
     /// Saves settings, recording and measurements as a workspace. Returns false if that is impossible.
     pub(super) fn save_workspace(&mut self) -> bool {
-        let origin = self.fixed.origin.clone().ok_or_else(|| texts::WHY_NO_ORIGIN.to_string());
-        let saved = origin.and_then(|mut origin| {
-            let volumes = self.stream.cine().volumes();
-            let shown = self.stream.cine_position().and_then(|at| volumes.get(at)).filter(|_| self.fixed.plays_once);
-            origin.volume = shown.map_or(0, |kept| kept.volume as usize);
+        let origin = self.numbered_origin().ok_or_else(|| texts::WHY_NO_ORIGIN.to_string());
+        let saved = origin.and_then(|origin| {
             let is_live = origin.recording.is_none();
             let mut settings = self.controls.settings().clone();
             // Other numbers of volumes mean nothing in the recording.
             if !self.fixed.plays_once {
-                (settings.cine.first, settings.cine.last) = (None, None);
+                (settings.drawn.cine.first, settings.drawn.cine.last) = (None, None);
             }
             let holds = Holds::Work { kept: None, work: self.controls.handiwork() };
             let labels = self.controls.edited_labels();
@@ -174,7 +167,7 @@ impl Console {
     /// Discards the measurement in progress or the text that is being typed, or else leaves the measuring tool. Returns false if there was
     /// nothing to leave.
     pub(super) fn leave_measuring(&mut self) -> bool {
-        self.survey.end_distance();
+        self.survey.first_end = None;
         if self.controls.work().is_some() || self.controls.typing().is_some() {
             self.execute(&Command::CancelMeasure, Instant::now());
             return true;
@@ -195,7 +188,7 @@ impl Console {
     /// view.
     pub(super) fn typed(&mut self, input: &Input) -> Option<Vec<Command>> {
         let Input::Key { key, pressed: true } = *input else { return None };
-        let modifiers = self.hands.modifiers();
+        let modifiers = self.hands.keys.modifiers;
         if modifiers.control || modifiers.alt || self.leaving.asks() {
             return None;
         }
@@ -218,7 +211,7 @@ impl Console {
                 _ => Some(Vec::new()),
             };
         }
-        if self.presets.is_shown() {
+        if self.presets.is_shown {
             let commands = self.presets.key(key, modifiers.shift);
             self.presentation.redraw_if(self.presets.is_naming());
             return commands;
@@ -258,6 +251,6 @@ impl Console {
 
     /// True while a list is open whose entries can be chosen by keys.
     pub(super) fn shows_list(&self) -> bool {
-        self.opening.is_shown() || self.visible.exports || self.presets.is_shown()
+        self.opening.is_shown() || self.visible.exports || self.presets.is_shown
     }
 }

@@ -48,12 +48,10 @@ pub use self::options::{ConsoleOptions, OpenFile, Opened, OpeningOptions, Startu
 use self::presentation::Presentation;
 use self::presets::Presets;
 use self::quality::PictureQuality;
-use self::reel::Reel;
 use self::render_start::RenderStart;
 use self::replay::Replay;
 use self::start::Start;
 use self::survey::Survey;
-use self::turntable::Turntable;
 use super::comparison::Comparison;
 use super::controls::Controls;
 use super::export::Exporter;
@@ -110,17 +108,14 @@ pub struct Console {
     activity: Activity,
     panels: Panels,
     visible: Visible,
-    first_steps: FirstSteps,
     notes: Notes,
     leaving: Leaving,
     exporter: Exporter,
     opening: Opening,
     presets: Presets,
-    reel: Reel,
     replay: Replay,
     survey: Survey,
     label_work: LabelWork,
-    turntable: Turntable,
     render_start: RenderStart,
     start: Start,
     faults: Faults,
@@ -162,9 +157,9 @@ impl Console {
         let mut settings = options.settings;
         // Saved pictures have their bar unless a file says otherwise, or the window shows another recording without.
         if let Some(layers) = chosen.as_mut().filter(|layers| !layers.has("marks.bar")) {
-            settings.marks.bar = display.is_none_or(|display| display.bar);
+            settings.drawn.marks.bar = display.is_none_or(|display| display.bar);
             // It is a setting: it is not refused.
-            let _ = layers.set(&format!("marks.bar={}", settings.marks.bar));
+            let _ = layers.set(&format!("marks.bar={}", settings.drawn.marks.bar));
         }
         let visible = Visible {
             panels: display.map_or(options.panels, |display| display.panels) && options.overlay,
@@ -208,19 +203,16 @@ impl Console {
             activity: Activity::new(now),
             panels: Panels::new(options.scale),
             visible,
-            first_steps: FirstSteps::new(options.first_steps),
             notes: Notes::default(),
             leaving: Leaving::new(options.source, is_recorded),
             exporter: Exporter::new(options.folder, wake.clone()),
             opening: Opening::new(options.opening, wake.clone()),
-            presets: Presets::new(options.presets, small_pictures, wake.clone()),
-            reel: Reel::new(wake.clone()),
+            presets: Presets::new(options.presets, small_pictures),
             replay: Replay::new(frozen),
             survey: Survey::default(),
-            label_work: LabelWork::new(wake.clone()),
-            turntable: Turntable::default(),
+            label_work: LabelWork::default(),
             render_start: RenderStart::default(),
-            start: Start::new(now),
+            start: Start::new(FirstSteps::new(options.first_steps), now),
             faults,
             measured: Measured::new(options.statistics_interval, metrics, now),
             fixed: Fixed {
@@ -250,7 +242,7 @@ impl Console {
 
     /// The reason why pictures are not drawn with the present shaders of the watched folder; None if they are.
     pub fn shader_fault(&self) -> Option<&str> {
-        self.faults.of_shaders()
+        self.faults.of_shaders.as_deref()
     }
 
     /// Sets the screen on which pictures are presented; None: there is none.
@@ -273,7 +265,7 @@ impl Console {
         self.presentation.screen = None;
         self.comparison = None;
         self.presets.device_lost();
-        self.reel.forget();
+        self.replay.reel.forget();
         self.context = context.clone();
         let revived = self.stream.revive(context);
         self.set_screen(screen);
@@ -311,15 +303,15 @@ impl Console {
 
     /// What the panels leave and have in the window.
     fn room(&self) -> Room {
-        let room = Room::of(self.presentation.size(), self.panels.scale(), self.visible.panels);
+        let room = Room::of(self.presentation.size, self.panels.scale(), self.visible.panels);
         let compared = self.comparison.as_ref().filter(|_| self.fixed.overlay);
-        compared.map_or(room, |comparison| room.divided(comparison.shown().tiles()))
+        compared.map_or(room, |comparison| room.divided(comparison.shown.tiles()))
     }
 
     /// Sets whether the panels are described to a screen reader.
     pub fn describe(&mut self, is_described: bool) {
         self.panels.describe(is_described && self.fixed.overlay);
-        _ = self.presentation.take_tree();
+        _ = self.presentation.tree.take();
         self.presentation.redraw();
     }
 
@@ -330,7 +322,7 @@ impl Console {
 
     /// The accessibility tree of the panels for a screen reader; None if they were not laid out since the last call.
     pub fn take_tree(&mut self) -> Option<TreeUpdate> {
-        self.presentation.take_tree()
+        self.presentation.tree.take()
     }
 
     /// Does what a screen reader requests of a control, such as a press.
@@ -369,7 +361,7 @@ impl Console {
 
     /// The quality of the settings that were sent to the stream last.
     pub fn quality(&self) -> Quality {
-        self.quality.now()
+        self.quality.quality
     }
 
     /// Leaves the processor to what the user asks for.

@@ -2,7 +2,6 @@
 //! next is open, and its state is kept.
 
 use super::options::{OpenFile, Opened, OpeningOptions};
-use crate::controls::Handiwork;
 use crate::files::progress::{Progress, Share};
 use crate::gpu::Wake;
 use crate::input::Key;
@@ -30,13 +29,13 @@ pub(super) struct Opening {
     /// The file that is being read while the present one is still shown.
     file: Option<BeingRead>,
     /// Files dropped on the window since the last update.
-    dropped: Vec<PathBuf>,
+    pub(super) dropped: Vec<PathBuf>,
     /// The list, while it is shown.
     list: Option<List>,
     /// Progress of opening this console's own source.
-    source: Progress,
-    /// What the window last showed of the file being read.
-    told: Option<Reading>,
+    pub(super) source: Progress,
+    /// The file that is being read and its progress, as the window shows it; None if it shows none.
+    pub(super) told: Option<Reading>,
 }
 
 /// A file that is being read in the background.
@@ -174,12 +173,7 @@ impl Opening {
         self.recordings().list()
     }
 
-    /// The file that is being read and its progress, as the window shows it; None if it shows none.
-    pub(super) fn told(&self) -> Option<&Reading> {
-        self.told.as_ref()
-    }
-
-    fn recordings(&self) -> MutexGuard<'_, Recordings> {
+    pub(super) fn recordings(&self) -> MutexGuard<'_, Recordings> {
         locked(&self.recordings)
     }
 
@@ -229,16 +223,6 @@ impl Opening {
         let is_folder = matches!(kind, Kind::Folder | Kind::FolderAbove);
         self.list = is_folder.then(|| self.list(&path, false));
         (!is_folder).then_some(path)
-    }
-
-    /// Notes a file that was dropped on the window.
-    pub(super) fn drop_file(&mut self, path: &Path) {
-        self.dropped.push(path.to_path_buf());
-    }
-
-    /// The files that were dropped since the last call.
-    pub(super) fn take_dropped(&mut self) -> Vec<PathBuf> {
-        std::mem::take(&mut self.dropped)
     }
 
     /// Adds recordings to the list of open ones. Returns false if there was no room for all.
@@ -302,11 +286,6 @@ impl Opening {
         Some(name)
     }
 
-    /// Cancels the opening of the source with which this console began.
-    pub(super) fn cancel_source(&self) {
-        self.source.cancel();
-    }
-
     /// Path of the n-th open recording, and whether it is shown. None if there is no n-th.
     pub(super) fn recording(&self, n: usize) -> Option<(PathBuf, bool)> {
         let list = self.recordings();
@@ -321,37 +300,27 @@ impl Opening {
         list.index(list.step(from, by)?).filter(|_| list.list().len() > 1)
     }
 
-    /// Closes the n-th recording, or the shown one if `n` is `usize::MAX`. One that is not shown is closed now, and its name is returned (Ok).
-    /// For the shown one the recording to show in its place is returned (Err): the next one, or else the previous one. None if there is no n-th
-    /// recording.
-    pub(super) fn close(&mut self, n: usize) -> Option<Result<String, Option<PathBuf>>> {
-        let list = self.named();
-        let shown = list.iter().position(|named| named.is_shown);
-        let n = if n == usize::MAX { shown.unwrap_or(n) } else { n };
-        let name = list.get(n)?.name.clone();
-        if shown == Some(n) {
-            let next = if n + 1 < list.len() { Some(n + 1) } else { n.checked_sub(1) };
-            return Some(Err(next.and_then(|next| self.recordings().path(next).map(Path::to_path_buf))));
-        }
-        let path = self.recordings().path(n).map(Path::to_path_buf);
-        if self.file.as_ref().is_some_and(|file| Some(&file.path) == path.as_ref()) {
-            self.file = None;
-        }
-        let mut list = self.recordings();
-        if let Some(n) = path.and_then(|path| list.index(&path)) {
-            list.remove(n);
-        }
-        Some(Ok(name))
+    /// Name and path of the n-th recording, or of the shown one if `n` is `usize::MAX`, and whether it is shown. None if there is no n-th.
+    pub(super) fn to_close(&self, n: usize) -> Option<(String, PathBuf, bool)> {
+        let list = self.recordings();
+        let path = if n == usize::MAX { list.shown() } else { list.path(n) }?;
+        Some((list.name(path), path.to_path_buf(), Some(path) == list.shown()))
     }
 
-    /// Name and path of the recording that [`Opening::close`] would close, and whether it is shown; None if it would close none.
-    pub(super) fn to_close(&self, n: usize) -> Option<(String, PathBuf, bool)> {
-        let list = self.named();
-        let shown = list.iter().position(|named| named.is_shown);
-        let n = if n == usize::MAX { shown? } else { n };
-        let recordings = self.recordings();
-        let path = recordings.path(n).filter(|_| list.len() > 1)?.to_path_buf();
-        Some((list.get(n)?.name.clone(), path, shown == Some(n)))
+    /// The recording that takes the place of the shown one when that is closed: the next one, or else the previous one. None if there is no other.
+    pub(super) fn in_its_place(&self) -> Option<PathBuf> {
+        let list = self.recordings();
+        let shown = list.index(list.shown()?)?;
+        list.path(shown + 1).or_else(|| list.path(shown.checked_sub(1)?)).map(Path::to_path_buf)
+    }
+
+    /// Closes a recording that is not shown.
+    pub(super) fn close(&mut self, path: &Path) {
+        self.file.take_if(|file| file.path == path);
+        let mut list = self.recordings();
+        if let Some(n) = list.index(path) {
+            list.remove(n);
+        }
     }
 
     /// The recordings that are not shown and have measurements, marks or cuts that are in no file, with the state kept of each.
@@ -359,11 +328,6 @@ impl Opening {
         let recordings = self.recordings();
         let of = |n: usize| Some((recordings.path(n)?.to_path_buf(), recordings.unsaved(n)?.clone()));
         (0..MAX_OPEN).filter_map(of).collect()
-    }
-
-    /// Notes that these measurements, marks and cuts of a recording are saved in a file.
-    pub(super) fn saved(&self, path: &Path, work: Handiwork) {
-        self.recordings().saved(path, work);
     }
 
     /// The file whose reading has ended since the last call; None if there is none.
@@ -459,8 +423,8 @@ mod tests {
         opening.read(Path::new("bad"), false).expect("a thread");
         let begun = Instant::now();
         assert!(opening.poll().is_none() && opening.is_reading() && opening.named().len() == 2);
-        assert!(!opening.look(None, begun) && opening.told().is_none(), "too short to be told");
-        assert!(opening.look(None, begun + SHOWN_AFTER) && opening.told().is_some());
+        assert!(!opening.look(None, begun) && opening.told.is_none(), "too short to be told");
+        assert!(opening.look(None, begun + SHOWN_AFTER) && opening.told.is_some());
         release.send(()).expect("it waits");
         woken.recv().expect("it was read");
         assert_eq!(opening.poll().map(|read| read.err()), Some(Some("it is bad".into())));

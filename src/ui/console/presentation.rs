@@ -36,11 +36,13 @@ pub(super) struct PictureState {
 }
 
 /// Decides when the window is presented, from what of its content is out of date.
+#[derive(Default)]
 pub(super) struct Presentation {
     pub(super) screen: Option<Screen>,
     /// Size of the window, pixels.
-    size: [u32; 2],
-    is_full_screen: bool,
+    pub(super) size: [u32; 2],
+    /// Whether the window fills the screen and can leave that state.
+    pub(super) is_full_screen: bool,
     /// Whether something besides the picture changed.
     needs_redraw: bool,
     /// Whether a picture was drawn that is not shown yet.
@@ -58,29 +60,15 @@ pub(super) struct Presentation {
     /// Number of presentations of the panels while a picture was being drawn.
     shown_between: u64,
     /// Where to draw the pointer, pixels of the window.
-    pointer: Option<[f64; 2]>,
+    pub(super) pointer: Option<[f64; 2]>,
     /// The tree of the panels for a screen reader, since they were last laid out.
-    tree: Option<TreeUpdate>,
+    pub(super) tree: Option<TreeUpdate>,
 }
 
 impl Presentation {
     /// A window of this size, pixels, that has no screen yet.
     pub(super) fn new(size: [u32; 2]) -> Presentation {
-        Presentation {
-            screen: None,
-            size,
-            is_full_screen: false,
-            needs_redraw: true,
-            has_new_picture: false,
-            drawn: None,
-            shown: None,
-            blank_since: None,
-            repaint_at: None,
-            retry_at: None,
-            shown_between: 0,
-            pointer: None,
-            tree: None,
-        }
+        Presentation { size, needs_redraw: true, ..Presentation::default() }
     }
 
     /// Sets the screen on which pictures are presented; None: there is none.
@@ -103,20 +91,6 @@ impl Presentation {
             self.size = size;
         }
         is_open
-    }
-
-    /// Size of the window, pixels.
-    pub(super) fn size(&self) -> [u32; 2] {
-        self.size
-    }
-
-    /// True if the window fills the screen and can leave that state.
-    pub(super) fn is_full_screen(&self) -> bool {
-        self.is_full_screen
-    }
-
-    pub(super) fn set_full_screen(&mut self, is_full_screen: bool) {
-        self.is_full_screen = is_full_screen;
     }
 
     /// Number of all presentations, and of those while a picture was being drawn.
@@ -160,15 +134,6 @@ impl Presentation {
     pub(super) fn set_pointer(&mut self, at: Option<[f64; 2]>) {
         self.needs_redraw |= self.pointer != at;
         self.pointer = at;
-    }
-
-    pub(super) fn pointer(&self) -> Option<[f64; 2]> {
-        self.pointer
-    }
-
-    /// The accessibility tree of the panels for a screen reader; None if they were not laid out since the last call.
-    pub(super) fn take_tree(&mut self) -> Option<TreeUpdate> {
-        self.tree.take()
     }
 
     /// Notes a layout of the panels: their tree for a screen reader, and the time after which they have to be laid out again.
@@ -358,6 +323,6 @@ mod tests {
         assert!(window.is_due(&SHOWN, at(60)));
         window.laid_out(None, Duration::MAX, at(60));
         assert_eq!(window.due(at(60)).count(), 0);
-        assert!(!window.resize([0, 64]) && window.resize([32, 16]) && window.size() == [32, 16], "minimised");
+        assert!(!window.resize([0, 64]) && window.resize([32, 16]) && window.size == [32, 16], "minimised");
     }
 }

@@ -2,16 +2,13 @@
 
 use crate::command::Command;
 use crate::controls::{Controls, EXAMS};
-use crate::gpu::Wake;
 use crate::input::Key;
 use crate::panels::{PresetTile, PresetsShown};
-use crate::picture::Picture;
 use crate::scene::{Scene, Settings};
 use crate::texts;
 use crate::thumbnails::{Job, Thumbnails};
 use crate::user_presets::{self, MAX_NAME, MAX_PRESETS, UserPreset, checked_name};
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Least time between two rounds of thumbnails of volumes that go on coming.
@@ -25,10 +22,11 @@ const MUCH_DEGREES: f64 = 15.0;
 const MUCH: f64 = 0.1;
 
 /// The list of presets: the built-in ones and the user's, with their thumbnails.
+#[derive(Default)]
 pub(super) struct Presets {
     /// The file with the user's presets; `None`: there are none.
     file: Option<PathBuf>,
-    is_shown: bool,
+    pub(super) is_shown: bool,
     own: Vec<UserPreset>,
     /// Why the user's presets cannot be read.
     fault: Option<String>,
@@ -36,7 +34,7 @@ pub(super) struct Presets {
     /// The user's presets before the last change.
     before: Option<Vec<UserPreset>>,
     keeps_pictures: bool,
-    thumbnails: Thumbnails,
+    pub(super) thumbnails: Thumbnails,
     /// The volume and view of the thumbnails.
     made_of: Option<MadeOf>,
 }
@@ -57,26 +55,12 @@ struct MadeOf {
 
 impl Presets {
     /// `file`: path of the user's presets. `keeps_pictures`: the inspector shows the thumbnails, too.
-    pub(super) fn new(file: Option<PathBuf>, keeps_pictures: bool, wake: Wake) -> Presets {
-        let mut presets = Presets {
-            keeps_pictures,
-            file,
-            is_shown: false,
-            own: Vec::new(),
-            fault: None,
-            naming: None,
-            before: None,
-            thumbnails: Thumbnails::new(wake),
-            made_of: None,
-        };
+    pub(super) fn new(file: Option<PathBuf>, keeps_pictures: bool) -> Presets {
+        let mut presets = Presets { file, keeps_pictures, ..Presets::default() };
         if keeps_pictures {
             presets.read();
         }
         presets
-    }
-
-    pub(super) fn is_shown(&self) -> bool {
-        self.is_shown
     }
 
     pub(super) fn is_naming(&self) -> bool {
@@ -93,16 +77,14 @@ impl Presets {
         (self.is_shown, self.naming, self.before) = (false, None, None);
         if !self.keeps_pictures {
             self.made_of = None;
-            self.thumbnails.clear();
+            self.thumbnails.keep_first(0);
         }
     }
 
     fn read(&mut self) {
         let read = self.file.as_deref().map_or(Ok(Vec::new()), user_presets::read);
-        (self.own, self.fault) = match read {
-            Ok(own) => (own, None),
-            Err(fault) => (Vec::new(), Some(fault)),
-        };
+        self.fault = read.as_ref().err().cloned();
+        self.own = read.unwrap_or_default();
     }
 
     /// The list of presets as the panels show it; None while it is not shown.
@@ -118,7 +100,7 @@ impl Presets {
 
     /// All presets, with their thumbnails as far as they are drawn.
     pub(super) fn tiles(&self) -> Vec<PresetTile<'_>> {
-        let pictures = self.thumbnails.pictures();
+        let pictures = &self.thumbnails.pictures;
         let picture = |n: usize| pictures.get(n).cloned().flatten();
         let built_in = EXAMS.iter().enumerate().map(|(n, exam)| PresetTile {
             name: exam.title,
@@ -254,12 +236,12 @@ impl Presets {
         Ok(Some(texts::preset_is_deleted(name)))
     }
 
-    /// Restores the user's presets as they were before the last change. Returns false if there was no change.
+    /// Restores the user's presets as they were before the last change. Returns a message for the user; None if there was no change.
     ///
     /// # Errors
     /// One line: another window changed them since, or they cannot be written.
-    pub(super) fn restore(&mut self) -> Result<bool, String> {
-        let Some(before) = self.before.clone() else { return Ok(false) };
+    pub(super) fn restore(&mut self) -> Result<Option<String>, String> {
+        let Some(before) = self.before.clone() else { return Ok(None) };
         let known = self.own.clone();
         self.read();
         if self.own != known {
@@ -267,7 +249,7 @@ impl Presets {
             return Err(texts::PRESETS_CHANGED_ELSEWHERE.into());
         }
         self.keep(before)?;
-        Ok(true)
+        Ok(Some(texts::PRESETS_RESTORED.into()))
     }
 
     /// Discards the name that is being typed or, if there is none, closes the list. Returns false if the list is not shown.
@@ -306,11 +288,6 @@ impl Presets {
             naming.text.extend(letter);
         }
         Some(Vec::new())
-    }
-
-    /// The thumbnails of the presets, in the order of the list; None for one that is not drawn yet. Empty if none was requested.
-    pub(super) fn thumbnails(&self) -> &[Option<Arc<Picture>>] {
-        self.thumbnails.pictures()
     }
 
     /// Collects thumbnails that are finished. `acted`: time of the user's last action. Returns true if there are new ones.
@@ -407,7 +384,7 @@ mod tests {
     #[test]
     fn presets_are_named_deleted_and_brought_back() {
         let folder = crate::files::WorkFolder::new(&std::env::temp_dir(), "echolume-test-").expect("a folder");
-        let mut presets = Presets::new(Some(folder.path().join("presets.toml")), false, Arc::new(|| ()));
+        let mut presets = Presets::new(Some(folder.path().join("presets.toml")), false);
         let settings = Settings::default();
         assert_eq!(presets.begin_naming(None), Ok(false), "the list is not shown");
         assert_eq!(presets.toggle(), None);
@@ -424,17 +401,18 @@ mod tests {
         presets.key(Key::Backspace, false);
         presets.key(Key::Char('b'), false);
         assert!(presets.end_naming(&settings).is_err() && presets.is_naming(), "taken; it can be corrected");
-        assert!(presets.leave() && !presets.is_naming() && presets.is_shown());
+        assert!(presets.leave() && !presets.is_naming() && presets.is_shown);
         assert!(presets.delete(9).is_ok_and(|said| said.is_none()));
         assert!(presets.delete(0).is_ok_and(|said| said.is_some()));
-        assert_eq!((presets.count(), presets.restore()), (EXAMS.len() + 1, Ok(true)));
+        assert_eq!(presets.count(), EXAMS.len() + 1);
+        assert!(presets.restore().is_ok_and(|said| said.is_some()));
         assert_eq!(presets.count(), EXAMS.len() + 2);
         let now = Instant::now();
         let wants = |presets: &Presets, in_inspector, rests, at| {
             presets.wants_thumbnails((3, &settings), (in_inspector, rests), now, at)
         };
         assert!(wants(&presets, false, false, now) && presets.due(now, now) == Some(now + REST));
-        assert!(presets.leave() && !presets.is_shown() && !presets.leave());
+        assert!(presets.leave() && !presets.is_shown && !presets.leave());
         assert!(!wants(&presets, false, true, now) && presets.due(now, now).is_none());
         // In the inspector after a longer rest.
         assert!(!wants(&presets, true, true, now) && wants(&presets, true, true, now + LONG_REST));

@@ -14,18 +14,18 @@ const REST_BEFORE_WARMING: Duration = Duration::from_secs(1);
 
 /// Chooses the quality of pictures by the frame budget, and knows the settings that were sent to the stream.
 pub(super) struct PictureQuality {
-    pace: Pace,
+    pub(super) pace: Pace,
     rungs: Arc<Vec<Rung>>,
-    /// The quality of the last settings that were sent.
-    quality: Quality,
+    /// The quality of the settings that were sent to the stream last.
+    pub(super) quality: Quality,
     /// The last settings that were sent.
-    sent: Option<Settings>,
+    pub(super) sent: Option<Settings>,
     /// Settings that could not be drawn, to report them only once.
-    rejected: Option<Settings>,
+    pub(super) rejected: Option<Settings>,
     /// Number of volumes received from a live source.
     live_volumes: u64,
     /// When a light last moved.
-    light_moved: Option<Instant>,
+    pub(super) light_moved: Option<Instant>,
     /// Whether pipelines are compiled in advance.
     warms: bool,
     /// The settings around which pipelines were last compiled in advance.
@@ -51,35 +51,12 @@ impl PictureQuality {
     /// A function that gives the settings of all lower rungs for a scene at full quality, so that stage 1 can serve them; None without a budget.
     pub(super) fn lowered(&self) -> Option<Lowered> {
         let rungs = self.rungs.clone();
-        self.budget().map(|_| Arc::new(move |scene: &Scene| frame_budget::lowered(&rungs, scene)) as Lowered)
-    }
-
-    pub(super) fn budget(&self) -> Option<Duration> {
-        self.pace.budget()
-    }
-
-    /// The quality of the settings that were sent to the stream last.
-    pub(super) fn now(&self) -> Quality {
-        self.quality
+        self.pace.budget().map(|_| Arc::new(move |scene: &Scene| frame_budget::lowered(&rungs, scene)) as Lowered)
     }
 
     /// The present quality in words, for the display of times.
     pub(super) fn label(&self) -> &str {
         frame_budget::label(self.quality, &self.rungs)
-    }
-
-    /// Notes that the user moved something whose picture needs this kind of work.
-    pub(super) fn moved(&mut self, work: Work, now: Instant) {
-        self.pace.moved(work, now);
-    }
-
-    pub(super) fn light_moved(&mut self, now: Instant) {
-        self.light_moved = Some(now);
-    }
-
-    /// Discards the measured times, because pictures of another scene take other times.
-    pub(super) fn scene_changed(&mut self) {
-        self.pace.forget();
     }
 
     /// Measures the rate at which volumes arrive. `count`: number that arrived so far from a live source; `None` without one.
@@ -96,11 +73,6 @@ impl PictureQuality {
         self.pace.picture_took(work, self.quality, time);
     }
 
-    /// Time at which a moving view counts as at rest; None if it does not move.
-    pub(super) fn rests_at(&self, now: Instant) -> Option<Instant> {
-        self.pace.rests_at(now)
-    }
-
     /// The quality and settings to send to the stream now; None if it has these settings, or cannot draw them.
     pub(super) fn to_send(&self, controls: &Controls, now: Instant) -> Option<(Quality, Settings)> {
         let (quality, settings) = self.effective(controls, now);
@@ -113,26 +85,14 @@ impl PictureQuality {
         std::mem::replace(&mut self.quality, quality) != quality
     }
 
-    pub(super) fn sent(&mut self, settings: Settings) {
-        self.sent = Some(settings);
-    }
-
-    pub(super) fn rejected(&mut self, settings: Settings) {
-        self.rejected = Some(settings);
-    }
-
     /// The quality that keeps the frame budget now, and the settings of it.
     fn effective(&self, controls: &Controls, now: Instant) -> (Quality, Settings) {
         let quality = self.pace.quality(now);
         let full = full_settings(controls);
-        let lowered = match self.rungs.get(quality.rays) {
-            Some(rung) => rung.apply(&full),
-            None => full,
-        };
-        let lowered = match quality.rays > 0 && self.makes_light(controls.settings(), now) {
-            true => frame_budget::coarsely_lit(lowered),
-            false => lowered,
-        };
+        let mut lowered = self.rungs.get(quality.rays).map(|rung| rung.apply(&full)).unwrap_or(full);
+        if quality.rays > 0 && self.makes_light(controls.settings(), now) {
+            lowered = frame_budget::coarsely_lit(lowered);
+        }
         (quality, frame_budget::shaded(lowered, quality.shading))
     }
 
@@ -213,13 +173,13 @@ mod tests {
         let (rung, full) = quality.to_send(&controls, at(0)).expect("the first");
         assert_eq!((rung, &full), (Quality::default(), &full_settings(&controls)));
         assert!(!quality.choose(rung));
-        quality.sent(full.clone());
+        quality.sent = Some(full.clone());
         assert!(quality.to_send(&controls, at(1)).is_none());
-        quality.moved(Work::Rays, at(10));
+        quality.pace.moved(Work::Rays, at(10));
         let (rung, lower) = quality.to_send(&controls, at(11)).expect("it moves");
         assert!(rung.rays == 1 && lower != full && quality.choose(rung) && !quality.choose(rung));
-        assert_eq!((quality.now(), quality.rests_at(at(11))), (rung, Some(at(260))));
-        quality.rejected(lower);
+        assert_eq!((quality.quality, quality.pace.rests_at(at(11))), (rung, Some(at(260))));
+        quality.rejected = Some(lower);
         assert!(quality.to_send(&controls, at(12)).is_none(), "it was refused");
         assert!(quality.to_send(&controls, at(260)).is_none(), "the stream still has those at rest");
     }

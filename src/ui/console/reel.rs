@@ -1,7 +1,6 @@
 //! Thumbnails of the volumes of the cine loop, for its time line. They are made while the loop rests.
 
 use super::presets::{LONG_REST, REST};
-use crate::gpu::Wake;
 use crate::live::cine::CineVolume;
 use crate::picture::Picture;
 use crate::scene::{Layout, Mode, Settings};
@@ -19,6 +18,7 @@ fn stride(count: usize) -> usize {
 }
 
 /// The thumbnails of the cine loop's volumes.
+#[derive(Default)]
 pub(super) struct Reel {
     thumbnails: Thumbnails,
     /// The numbers of the volumes, in the order of the pictures.
@@ -32,10 +32,6 @@ fn look_of(settings: &Settings) -> (Mode, Layout) {
 }
 
 impl Reel {
-    pub(super) fn new(wake: Wake) -> Reel {
-        Reel { thumbnails: Thumbnails::new(wake), volumes: Vec::new(), look: None }
-    }
-
     /// Collects thumbnails that are finished. `acted`: time of the user's last action. Returns true if there are new ones.
     pub(super) fn poll(&mut self, acted: Instant, is_drawing: bool, now: Instant) -> bool {
         self.thumbnails.poll(now >= acted + REST && !is_drawing)
@@ -50,7 +46,7 @@ impl Reel {
 
     fn picture(&self, volume: u32) -> Option<Arc<Picture>> {
         let at = self.volumes.iter().position(|made| *made == volume)?;
-        self.thumbnails.pictures().get(at).cloned().flatten()
+        self.thumbnails.pictures.get(at).cloned().flatten()
     }
 
     /// For each volume of the cine loop: true if it needs a thumbnail and has none in the present mode.
@@ -78,12 +74,14 @@ impl Reel {
         let kept = volumes.iter().map(|of| self.picture(of.volume)).collect();
         self.volumes = volumes.iter().map(|of| of.volume).collect();
         self.look = Some(look_of(settings));
-        self.thumbnails.begin_with(job, kept);
+        self.thumbnails.begin(job);
+        // `begin` discards the pictures that the job does not draw: they stay. The others stay until they are replaced.
+        self.thumbnails.pictures = kept;
     }
 
     /// Discards the thumbnails, because their device is lost or another source has other volumes.
     pub(super) fn forget(&mut self) {
-        self.thumbnails.clear();
+        self.thumbnails.keep_first(0);
         (self.volumes, self.look) = (Vec::new(), None);
     }
 
@@ -107,7 +105,7 @@ mod tests {
             };
             (0..count).map(numbered).collect()
         };
-        let reel = Reel::new(Arc::new(|| ()));
+        let reel = Reel::default();
         let settings = Settings::default();
         for (count, wanted) in [(0, 0), (1, 1), (20, 20), (48, 48), (49, 25), (480, 48), (481, 44)] {
             let missing = reel.missing(&volumes(count), &settings);

@@ -17,7 +17,7 @@ impl Console {
     /// Text for pictures that are not of a patient but of the phantom, also from a recording of it; None otherwise.
     pub(super) fn origin(&self) -> Option<&'static str> {
         let is_synthetic = self.stream.header().is_some_and(|header| header.synthetic);
-        (self.connection.kind() == SourceKind::Demo || is_synthetic).then_some(texts::DEMO_DATA)
+        (self.connection.kind == SourceKind::Demo || is_synthetic).then_some(texts::DEMO_DATA)
     }
 
     /// Saves the shown picture with its measurements, and with a bar of text if that is chosen.
@@ -33,7 +33,7 @@ impl Console {
             },
             None => Err(texts::WHY_NO_PICTURE.into()),
         };
-        let (has_bar, time) = (self.controls.settings().marks.bar, marked::time_line(SystemTime::now()));
+        let (has_bar, time) = (self.controls.settings().drawn.marks.bar, marked::time_line(SystemTime::now()));
         let (origin, volume) = (self.origin(), self.stream.drawn_volume());
         let saved = picture.and_then(|(picture, scene, start)| {
             self.exporter.picture(move || match has_bar {
@@ -86,18 +86,21 @@ impl Console {
             });
             return begun.unwrap_or_else(|fault| self.notify(&texts::not_exported(fault), true));
         }
-        let cine = self.stream.cine().volumes();
-        let shown = || self.stream.cine_position().and_then(|at| cine.get(at)).or(cine.back()).cloned();
-        let volumes = if format.work == Work::Loop { self.marked_volumes() } else { shown().into_iter().collect() };
+        let volumes = match format.work {
+            Work::Loop => self.marked_volumes(),
+            _ => self.shown_in_loop().into_iter().cloned().collect(),
+        };
         let rate = self.cine_loop().played_rate();
-        let origin = if format.work == Work::Report { self.numbered_origin() } else { None };
+        // A report needs a recording whose volumes have the numbers of those here.
+        let has_report = format.work == Work::Report && self.fixed.plays_once;
+        let origin = self.numbered_origin().filter(|origin| has_report && origin.recording.is_some());
         let begun = match self.stream.header().cloned() {
             _ if format.work == Work::Report && origin.is_none() => Err(texts::WHY_NO_REPORT.into()),
             Some(header) if !volumes.is_empty() => {
                 let mut settings = self.controls.settings().clone();
                 let numbers: Vec<u32> = volumes.iter().map(|volume| volume.volume).collect();
                 if origin.is_none() {
-                    settings.measure = renumbered(&settings.measure, &numbers);
+                    settings.drawn.measure = renumbered(&settings.drawn.measure, &numbers);
                 }
                 self.exporter.export(Job {
                     format,
@@ -117,11 +120,10 @@ impl Console {
         }
     }
 
-    /// The recording that is shown with the number of the volume, if numbers of volumes are those in the recording.
-    fn numbered_origin(&self) -> Option<Origin> {
-        let origin = self.fixed.origin.clone();
-        let mut origin = origin.filter(|origin| self.fixed.plays_once && origin.recording.is_some())?;
-        let shown = self.stream.cine_position().and_then(|at| self.stream.cine().volumes().get(at));
+    /// What a workspace stores of the source, with the number of the volume that is shown, if numbers of volumes are those in the recording.
+    pub(super) fn numbered_origin(&self) -> Option<Origin> {
+        let mut origin = self.fixed.origin.clone()?;
+        let shown = self.cine_volume().filter(|_| self.fixed.plays_once);
         origin.volume = shown.map_or(0, |kept| kept.volume as usize);
         Some(origin)
     }
@@ -134,7 +136,7 @@ impl Console {
                     self.request.exit |= self.leaving.saved(&saved.holds);
                     match saved.holds {
                         Holds::Work { kept: None, work } => self.controls.saved(work),
-                        Holds::Work { kept: Some(path), work } => self.opening.saved(&path, work),
+                        Holds::Work { kept: Some(path), work } => self.opening.recordings().saved(&path, work),
                         Holds::Loop(_) | Holds::Nothing => {}
                     }
                     if file.extension().is_some_and(|end| end == "toml") {
@@ -153,7 +155,7 @@ impl Console {
     /// A message about the export in progress, once its progress is known; None while the list of exports shows it.
     pub(super) fn export_note(&self) -> Option<Note> {
         let name = self.exporter.exporting().filter(|_| !self.visible.exports)?;
-        let Progress { done, of } = self.exporter.progress()?;
+        let Progress { done, of } = self.exporter.progress?;
         Some(Note { text: texts::export_so_far(name, done, of), is_fault: false })
     }
 }

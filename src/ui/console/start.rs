@@ -1,5 +1,6 @@
 //! The start of the view: the steps before the first picture, and the text about them on the screen.
 
+use super::first_steps::FirstSteps;
 use crate::live::StartStep;
 use crate::panels::Banner;
 use crate::texts;
@@ -9,7 +10,7 @@ use std::time::{Duration, Instant};
 const START_INTERVAL: Duration = Duration::from_millis(100);
 
 /// How far the start of the view is, and what the screen says about it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Debug)]
 pub(super) struct Start {
     /// The step that the screen names, and since when.
     step: Option<StartStep>,
@@ -17,16 +18,13 @@ pub(super) struct Start {
     /// Whether the screen says that the first picture is being drawn.
     tells_of_picture: bool,
     /// Whether a picture was drawn in full.
-    is_over: bool,
+    pub(super) is_over: bool,
+    pub(super) first_steps: FirstSteps,
 }
 
 impl Start {
-    pub(super) fn new(now: Instant) -> Start {
-        Start { step: None, step_at: now, tells_of_picture: false, is_over: false }
-    }
-
-    pub(super) fn is_over(&self) -> bool {
-        self.is_over
+    pub(super) fn new(first_steps: FirstSteps, now: Instant) -> Start {
+        Start { step: None, step_at: now, tells_of_picture: false, is_over: false, first_steps }
     }
 
     /// True once, before the first picture is drawn: the screen has to announce it first, because panels cannot be presented while the device
@@ -90,7 +88,7 @@ mod tests {
         let begin = Instant::now();
         let at = |ms: u64| begin + Duration::from_millis(ms);
         let frames = |done| Some(StartStep::Frames { done, count: 9 });
-        let mut start = Start::new(begin);
+        let mut start = Start::new(FirstSteps::default(), begin);
         assert!(start.banner("Waiting").is_none() && !start.follow(None, at(0)));
         assert!(start.follow(Some(StartStep::Source), at(1)) && start.follow(frames(0), at(2)));
         assert!(!start.follow(frames(1), at(50)), "a moment later");
@@ -100,9 +98,9 @@ mod tests {
         assert!(!start.tells_first(frames(9)) && start.tells_first(Some(StartStep::Picture)), "before it is drawn");
         assert!(!start.tells_first(Some(StartStep::Picture)), "once");
         start.picture_finished(true);
-        assert!(!start.is_over(), "it has few rays");
+        assert!(!start.is_over, "it has few rays");
         start.picture_finished(false);
         start.picture_finished(true);
-        assert!(start.is_over());
+        assert!(start.is_over);
     }
 }

@@ -16,7 +16,7 @@ impl Console {
             }
             let recording = self.fixed.origin.as_ref().and_then(|origin| origin.recording.as_deref());
             let beside = recording.and_then(Path::parent).filter(|folder| folder.is_dir());
-            self.opening.show_list(beside.unwrap_or(self.exporter.folder()));
+            self.opening.show_list(beside.unwrap_or(&self.exporter.folder));
         }
         self.presentation.redraw();
     }
@@ -31,11 +31,11 @@ impl Console {
     /// Notes a file that was dropped on the window. Of several dropped together the first will be shown, and the others are added to the open
     /// recordings.
     pub fn drop_file(&mut self, path: &Path) {
-        self.opening.drop_file(path);
+        self.opening.dropped.push(path.to_path_buf());
     }
 
     fn open_dropped(&mut self) {
-        let dropped = self.opening.take_dropped();
+        let dropped = std::mem::take(&mut self.opening.dropped);
         let Some((first, others)) = dropped.split_first() else { return };
         self.open_path(first);
         if self.opening.is_reading() && !self.opening.add(others) {
@@ -55,7 +55,7 @@ impl Console {
             return self.notify(texts::SAVE_THE_LOOP_FIRST, true);
         }
         // A pipe leaves the list.
-        if self.opening.is_offered() && self.connection.kind() == SourceKind::Pipe && self.controls.is_unsaved() {
+        if self.opening.is_offered() && self.connection.kind == SourceKind::Pipe && self.controls.is_unsaved() {
             return self.notify(texts::SAVE_THE_WORKSPACE_FIRST, true);
         }
         match self.opening.read(path, closes) {
@@ -70,9 +70,9 @@ impl Console {
             self.notify(&texts::not_read_further(name), false);
             return true;
         }
-        let is_cancelled = self.reads_source() && self.connection.cancel();
+        let is_cancelled = self.reads_source() && self.connection.source.cancel();
         if is_cancelled {
-            self.opening.cancel_source();
+            self.opening.source.cancel();
             self.presentation.redraw();
         }
         is_cancelled
@@ -81,7 +81,7 @@ impl Console {
     /// True while the console's own source is being opened in a way that the user can cancel.
     pub(super) fn reads_source(&self) -> bool {
         let is_opening = self.connection.is_opening() && !self.faults.prevents_view();
-        is_opening && self.connection.kind() == SourceKind::Recording && !self.fixed.is_kiosk
+        is_opening && self.connection.kind == SourceKind::Recording && !self.fixed.is_kiosk
     }
 
     /// Shows the n-th open recording.
@@ -108,18 +108,22 @@ impl Console {
     /// Closes the n-th recording and, if it was shown, shows the next one, or else the previous one. Measurements, marks or cuts on it that are
     /// in no file are discarded only if the user asks for it twice.
     pub(super) fn close_recording(&mut self, n: usize, now: Instant) {
-        if let Some((name, path, is_shown)) = self.opening.to_close(n) {
-            let is_kept = |(other, _): &(PathBuf, Kept)| *other == path;
-            let loses = if is_shown { self.controls.is_unsaved() } else { self.opening.unsaved().iter().any(is_kept) };
-            if loses && self.leaving.warns_of(&path, now) {
-                return self.notify(&texts::loses_work(name), true);
-            }
+        let Some((name, path, is_shown)) = self.opening.to_close(n) else { return };
+        let next = self.opening.in_its_place().filter(|_| is_shown);
+        if is_shown && next.is_none() {
+            return self.notify(texts::ONLY_RECORDING, false);
         }
-        match self.opening.close(n) {
-            Some(Ok(name)) => self.notify(&texts::is_closed(name), false),
-            Some(Err(Some(next))) => self.read(&next, true),
-            Some(Err(None)) => self.notify(texts::ONLY_RECORDING, false),
-            None => {}
+        let is_kept = |(other, _): &(PathBuf, Kept)| *other == path;
+        let loses = if is_shown { self.controls.is_unsaved() } else { self.opening.unsaved().iter().any(is_kept) };
+        if loses && self.leaving.warns_of(&path, now) {
+            return self.notify(&texts::loses_work(name), true);
+        }
+        match next {
+            Some(next) => self.read(&next, true),
+            None => {
+                self.opening.close(&path);
+                self.notify(&texts::is_closed(name), false);
+            }
         }
     }
 
@@ -147,15 +151,14 @@ impl Console {
         if !has_drawn && !self.fixed.is_kept {
             return None;
         }
-        let volumes = self.stream.cine().volumes();
-        let is_numbered = self.fixed.plays_once && self.connection.kind() == SourceKind::Recording;
-        let shown = self.stream.cine_position().and_then(|at| volumes.get(at)).map(|kept| kept.volume);
-        let frozen = self.replay.frozen().or(shown.filter(|_| self.stream.is_frozen() && is_numbered));
+        let is_numbered = self.fixed.plays_once && self.connection.kind == SourceKind::Recording;
+        let shown = self.cine_volume().map(|kept| kept.volume);
+        let frozen = self.replay.frozen.or(shown.filter(|_| self.stream.is_frozen() && is_numbered));
         Some(Kept { controls: self.controls.set_aside(), frozen })
     }
 
     fn display(&self) -> Display {
-        let (panels, times, bar) = (self.visible.panels, self.visible.times, self.controls.settings().marks.bar);
+        let (panels, times, bar) = (self.visible.panels, self.visible.times, self.controls.settings().drawn.marks.bar);
         Display { panels, times, bar, has_focus: self.panels.has_focus() }
     }
 

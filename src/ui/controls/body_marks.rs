@@ -1,6 +1,6 @@
 //! Body marks: adding, moving, rotating, changing and removing them. Controls refer to the last one that was touched.
 
-use super::{Change, Controls};
+use super::{Change, Controls, finite};
 use crate::command::Command;
 use crate::scene::{BODY_MARK_SIZES, BodyMark, MAX_BODY_MARKS};
 use crate::texts;
@@ -12,26 +12,26 @@ const PLACES: [[f64; 2]; MAX_BODY_MARKS] = [[0.12, 0.8], [0.88, 0.8], [0.12, 0.2
 impl Controls {
     /// The body marks, in the order in which they are drawn.
     pub fn body_marks(&self) -> &[BodyMark] {
-        &self.settings.body_marks
+        &self.settings.drawn.body_marks
     }
 
     /// The selected body mark, to which the controls refer, and its index; None if there are none.
     pub fn body_mark(&self) -> Option<(usize, BodyMark)> {
-        let last = self.settings.body_marks.len().checked_sub(1)?;
+        let last = self.settings.drawn.body_marks.len().checked_sub(1)?;
         let index = self.body_mark.min(last);
-        Some((index, self.settings.body_marks[index]))
+        Some((index, self.settings.drawn.body_marks[index]))
     }
 
     /// Applies a command about body marks. None if the command is about something else.
     pub(super) fn mark_body(&mut self, command: &Command) -> Option<Change> {
-        let marks = &self.settings.body_marks;
+        let marks = &self.settings.drawn.body_marks;
         Some(match *command {
             Command::AddBodyMark(_) if marks.len() >= MAX_BODY_MARKS => Change::Refused(texts::TOO_MANY_BODY_MARKS),
             Command::AddBodyMark(body) => {
                 let at = PLACES.into_iter().find(|at| marks.iter().all(|mark| mark.at != *at));
                 let new = BodyMark { body, at: at.unwrap_or(PLACES[0]), ..BodyMark::default() };
                 self.body_mark = marks.len();
-                self.mark(command, |settings| settings.body_marks.push(new))
+                self.mark(command, |settings| settings.drawn.body_marks.push(new))
             }
             Command::ChangeBodyMark(index, new) => {
                 let Some(valid) = marks.get(index).and_then(|_| checked(new)) else { return Some(Change::Nothing) };
@@ -40,7 +40,7 @@ impl Controls {
                 match is_same {
                     true if was_about == index => Change::Nothing,
                     true => Change::Marks,
-                    false => self.mark(command, |settings| settings.body_marks[index] = valid),
+                    false => self.mark(command, |settings| settings.drawn.body_marks[index] = valid),
                 }
             }
             Command::SelectBodyMark(index) if index < marks.len() => {
@@ -49,7 +49,7 @@ impl Controls {
                 Change::Marks
             }
             Command::RemoveBodyMark(index) if index < marks.len() => {
-                self.mark(command, |settings| _ = settings.body_marks.remove(index))
+                self.mark(command, |settings| _ = settings.drawn.body_marks.remove(index))
             }
             Command::SelectBodyMark(_) | Command::RemoveBodyMark(_) => Change::Nothing,
             _ => return None,
@@ -60,10 +60,7 @@ impl Controls {
 /// A mark within its limits; none if one of its numbers is none.
 fn checked(mark: BodyMark) -> Option<BodyMark> {
     let BodyMark { at, size, probe, angle, .. } = mark;
-    if !at.iter().chain(&probe).chain([&size, &angle]).all(|number| number.is_finite()) {
-        return None;
-    }
-    Some(BodyMark {
+    (finite(&at) && finite(&probe) && finite(&[size, angle])).then(|| BodyMark {
         at: at.map(|share| share.clamp(0.0, 1.0)),
         size: size.clamp(BODY_MARK_SIZES[0], BODY_MARK_SIZES[1]),
         probe: probe.map(|share| share.clamp(-1.0, 1.0)),

@@ -8,7 +8,7 @@ use crate::scene::Cine;
 impl Controls {
     /// Applies a command about playback that can be done without the volumes. None if the command is about something else.
     pub(super) fn play(&mut self, command: &Command) -> Option<Change> {
-        let now = self.settings.cine;
+        let now = self.settings.drawn.cine;
         let cine = match *command {
             Command::WholeCine => Cine { first: None, last: None, ..now },
             Command::CineSpeed(by) => Cine { speed: stepped(now.speed, by), ..now },
@@ -20,13 +20,13 @@ impl Controls {
 
     /// Makes the volume of this number the first (`end` false) or the last one of the cine loop that is played.
     pub(crate) fn mark_cine(&mut self, volume: u32, end: bool) -> Change {
-        self.play_as(marked(self.settings.cine, volume, end), &Command::MarkCine(end))
+        self.play_as(marked(self.settings.drawn.cine, volume, end), &Command::MarkCine(end))
     }
 
     fn play_as(&mut self, cine: Cine, command: &Command) -> Change {
-        if cine == self.settings.cine {
+        if cine == self.settings.drawn.cine {
             return Change::Nothing;
         }
-        self.mark(command, |settings| settings.cine = cine)
+        self.mark(command, |settings| settings.drawn.cine = cine)
     }
 }

@@ -1,6 +1,6 @@
 //! The curved plane: the points of its line, set one at a time, and measurements on it.
 
-use super::{Change, Controls, drawable};
+use super::{Change, Controls, finite, short};
 use crate::command::{Command, Tool};
 use crate::scene::{Curve, Layout, MAX_CURVE_POINTS, MeasureKind, Measurement, Mode, PlaneName, Scene, Settings};
 use crate::texts;
@@ -8,9 +8,9 @@ use crate::texts;
 /// Farthest coordinate of a point, mm.
 const FARTHEST: f64 = 1e5;
 
-/// Coordinates as they are kept: a tenth of a micrometre keeps files short.
+/// Coordinates as they are kept.
 fn kept<const N: usize>(point: [f64; N]) -> [f64; N] {
-    point.map(|mm| (mm.clamp(-FARTHEST, FARTHEST) * 1e4).round() / 1e4)
+    short(point.map(|mm| mm.clamp(-FARTHEST, FARTHEST)))
 }
 
 /// True if a picture has a plane on which a line can be drawn.
@@ -42,15 +42,12 @@ impl Controls {
     /// Applies a command about curved planes. None if the command is about something else.
     pub(super) fn curve(&mut self, command: &Command, scene: Option<&Scene>) -> Option<Change> {
         Some(match *command {
-            Command::CurvePoint(plane, point) if point.iter().all(|n| n.is_finite()) => {
+            Command::CurvePoint(plane, point) if finite(&point) => {
                 self.add_to_line(plane, point, scene.map_or(0.0, Scene::least_apart))
             }
             Command::CurvePoint(..) => Change::Nothing,
             Command::EndCurve => self.end_line(command, scene?),
-            Command::CancelCurve => match self.line.take() {
-                Some(_) => Change::Marks,
-                None => Change::Nothing,
-            },
+            Command::CancelCurve => self.line.take().map_or(Change::Nothing, |_| Change::Marks),
             Command::PointOnCurve(point) => self.point_on_curve(point, scene?),
             _ => return None,
         })
@@ -85,10 +82,7 @@ impl Controls {
             new.set_mode(Mode::Orthogonal);
         }
         let new = self.switched(new);
-        match self.current(scene).and_then(|now| drawable(&now, new)) {
-            Some(settings) => self.put(settings, command),
-            None => Change::Refused(texts::CURVE_NOT_DRAWN),
-        }
+        self.put_if_drawable(new, command, scene, texts::CURVE_NOT_DRAWN)
     }
 
     /// Sets a point of a measurement on the curved plane. A distance there is that along the line and perpendicular to the plane, as it is on the picture.

@@ -1,6 +1,6 @@
 //! Cuts: a contour drawn on a rendering removes what lies along the view inside or outside of it; a brush removes what is near its strokes.
 
-use super::{Change, Controls, drawable};
+use super::{Change, Controls, drawable, finite};
 use crate::command::{Command, Tool};
 use crate::scene::{Brush, Cut, KeptSide, MAX_BRUSH_POINTS, MAX_CUTS, Scene, Settings};
 use crate::texts;
@@ -56,11 +56,11 @@ impl Controls {
     /// Applies a command about cuts. None if the command is about something else; the contour that is being drawn is then discarded.
     pub(super) fn cut(&mut self, command: &Command, scene: Option<&Scene>) -> Option<Change> {
         Some(match *command {
-            Command::BeginCut(at) if is_position(at) => {
+            Command::BeginCut(at) if finite(&at) => {
                 self.outline = vec![at];
                 Change::Marks
             }
-            Command::CutAlong(at) if is_position(at) && !self.outline.is_empty() => {
+            Command::CutAlong(at) if finite(&at) && !self.outline.is_empty() => {
                 if self.outline.len() < MAX_OUTLINE {
                     self.outline.push(at);
                 }
@@ -146,14 +146,6 @@ impl Controls {
         if new.cuts.len() > MAX_CUTS {
             return Change::Refused(texts::TOO_MANY_CUTS);
         }
-        let now = self.current(scene);
-        match now.and_then(|now| drawable(&now, new)) {
-            Some(settings) => self.put(settings, command),
-            None => Change::Refused(texts::CANNOT_CUT_BOTH),
-        }
+        self.put_if_drawable(new, command, scene, texts::CANNOT_CUT_BOTH)
     }
-}
-
-fn is_position(at: [f64; 2]) -> bool {
-    at.iter().all(|n| n.is_finite())
 }

@@ -50,22 +50,22 @@ impl History {
         self.future.clear();
         let goes_on = self.last.as_ref().is_some_and(|last| command.continues(last));
         self.last = Some(*command);
-        if goes_on {
-            return;
+        if !goes_on {
+            self.push(Step::of(&before));
         }
-        if self.past.len() == MAX_STEPS {
+    }
+
+    fn push(&mut self, step: Step) {
+        self.past.push(step);
+        if self.past.len() > MAX_STEPS {
             self.past.remove(0);
         }
-        self.past.push(Step::of(&before));
     }
 
     /// Stores what an edit of labels changed. Where edits take too many bytes, the oldest can no longer be undone.
     pub(super) fn record_labels(&mut self, patch: Patch) {
         (self.last, self.future) = (None, Vec::new());
-        self.past.push(Step::Labels(patch));
-        while self.past.len() > MAX_STEPS {
-            self.past.remove(0);
-        }
+        self.push(Step::Labels(patch));
         while self.past.iter().map(Step::bytes).sum::<usize>() > MAX_BYTES {
             let oldest = self.past.iter().position(|step| step.bytes() > 0);
             oldest.into_iter().for_each(|n| _ = self.past.remove(n));

@@ -36,10 +36,9 @@ impl Controls {
 
     /// Lets the picture show the labels as they are now. Returns false if it shows them already.
     pub(crate) fn show_labels(&mut self) -> bool {
-        let shown = self.labelling.as_mut().and_then(Labelling::take_shown);
-        let is_other = shown.is_some();
-        shown.into_iter().for_each(|shown| self.settings.labels.volume = shown);
-        is_other
+        let Some(shown) = self.labelling.as_mut().and_then(Labelling::take_shown) else { return false };
+        self.settings.labels.volume = shown;
+        true
     }
 
     /// The labels and their segments; None until the tool was chosen, and if no voxel has a label.

@@ -1,6 +1,6 @@
 //! Measurements and annotations: their points are set one at a time; commands move, label and delete them.
 
-use super::{Change, Controls};
+use super::{Change, Controls, short};
 use crate::command::{Command, Tool};
 use crate::measure::outcome;
 use crate::scene::{MAX_ALL_POINTS, MAX_CONTOURS, MAX_MEASURES, MAX_POINTS, MAX_TEXT, Made, MeasureKind, Measurement};
@@ -12,7 +12,7 @@ const FARTHEST: f64 = 1e6;
 impl Controls {
     /// The measurements and annotations, in the order of their numbers.
     pub fn measures(&self) -> &[Measurement] {
-        &self.settings.measure
+        &self.settings.drawn.measure
     }
 
     /// The measurement whose points are being set; None if none is.
@@ -40,8 +40,8 @@ impl Controls {
             return Change::Refused(why);
         }
         let has_text = matches!(measured.kind, MeasureKind::Text | MeasureKind::Arrow);
-        self.mark(&Command::EndMeasure, |settings| settings.measure.push(measured));
-        self.typing = has_text.then(|| self.settings.measure.len() - 1);
+        self.mark(&Command::EndMeasure, |settings| settings.drawn.measure.push(measured));
+        self.typing = has_text.then(|| self.settings.drawn.measure.len() - 1);
         Change::Marks
     }
 
@@ -55,24 +55,25 @@ impl Controls {
                 _ => Change::Marks,
             },
             Command::MovePoint(index, point, to) if is_place(to) => {
-                let there = self.settings.measure.get(index).filter(|measured| measured.kind != MeasureKind::Surface);
+                let there =
+                    self.settings.drawn.measure.get(index).filter(|measured| measured.kind != MeasureKind::Surface);
                 match there.and_then(|measured| measured.points.get(point)) {
                     Some(was) if *was != to => {
-                        self.mark(command, |settings| settings.measure[index].points[point] = to)
+                        self.mark(command, |settings| settings.drawn.measure[index].points[point] = to)
                     }
                     _ => Change::Nothing,
                 }
             }
             Command::DeleteMeasure(index) => {
-                let last = self.settings.measure.len().checked_sub(1)?;
+                let last = self.settings.drawn.measure.len().checked_sub(1)?;
                 self.typing = None;
-                self.mark(command, |settings| _ = settings.measure.remove(index.min(last)))
+                self.mark(command, |settings| _ = settings.drawn.measure.remove(index.min(last)))
             }
-            Command::ClearMeasures if !self.settings.measure.is_empty() => {
+            Command::ClearMeasures if !self.settings.drawn.measure.is_empty() => {
                 self.typing = None;
-                self.mark(command, |settings| settings.measure.clear())
+                self.mark(command, |settings| settings.drawn.measure.clear())
             }
-            Command::LabelMeasure(index) if index < self.settings.measure.len() => {
+            Command::LabelMeasure(index) if index < self.settings.drawn.measure.len() => {
                 self.history.seal();
                 self.typing = Some(index);
                 Change::Marks
@@ -85,8 +86,8 @@ impl Controls {
             Command::Untype => self.change_text(command, |text| _ = text.pop()),
             Command::EndTyping => match self.typing.take() {
                 // A text that says nothing is none.
-                Some(index) if self.settings.measure.get(index).is_some_and(is_empty_text) => {
-                    self.mark(command, |settings| _ = settings.measure.remove(index))
+                Some(index) if self.settings.drawn.measure.get(index).is_some_and(is_empty_text) => {
+                    self.mark(command, |settings| _ = settings.drawn.measure.remove(index))
                 }
                 Some(_) => Change::Marks,
                 None => Change::Nothing,
@@ -117,13 +118,13 @@ impl Controls {
 
     /// True if so many more points are too many.
     fn is_full(&self, more: usize) -> bool {
-        let there: usize = self.settings.measure.iter().map(Measurement::count).sum();
-        self.settings.measure.len() >= MAX_MEASURES || there + more > MAX_ALL_POINTS
+        let there: usize = self.settings.drawn.measure.iter().map(Measurement::count).sum();
+        self.settings.drawn.measure.len() >= MAX_MEASURES || there + more > MAX_ALL_POINTS
     }
 
     fn change_text(&mut self, command: &Command, change: impl FnOnce(&mut String)) -> Change {
-        match self.typing.filter(|index| *index < self.settings.measure.len()) {
-            Some(index) => self.mark(command, |settings| change(&mut settings.measure[index].text)),
+        match self.typing.filter(|index| *index < self.settings.drawn.measure.len()) {
+            Some(index) => self.mark(command, |settings| change(&mut settings.drawn.measure[index].text)),
             None => Change::Nothing,
         }
     }
@@ -142,8 +143,7 @@ impl Controls {
         // It belongs to the volume on which it was begun, and to the plane that holds all of it.
         work.made = self.made.clone();
         self.typing = None;
-        // A tenth of a micrometre: files stay short.
-        let point = point.map(|mm| (mm * 1e4).round() / 1e4);
+        let point = short(point);
         if work.points.len() < MAX_POINTS && work.points.last() != Some(&point) {
             work.points.push(point);
         }

@@ -23,6 +23,7 @@ use crate::scene::{
     Settings, Shadow, SharedLabels, Tilt, Transfer,
 };
 use crate::segment::Patch;
+use crate::tree;
 pub(super) use cutting::BRUSH_RADII;
 use glam::DVec3;
 use history::History;
@@ -56,13 +57,13 @@ pub(super) struct Handiwork {
 
 impl Handiwork {
     fn of(settings: &Settings) -> Handiwork {
-        let Settings { measure, body_marks, cuts, labels, .. } = settings.clone();
-        Handiwork { measure, body_marks, cuts, labels: labels.volume }
+        let Settings { drawn, cuts, labels, .. } = settings.clone();
+        Handiwork { measure: drawn.measure, body_marks: drawn.body_marks, cuts, labels: labels.volume }
     }
 }
 
 /// What the user changes in the view: the settings and their history, the tool that a drag uses, and the measurement or line in progress.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, tree::Defaults)]
 pub struct Controls {
     settings: Settings,
     start: Settings,
@@ -86,6 +87,7 @@ pub struct Controls {
     outline: Vec<[f64; 2]>,
     kept_side: KeptSide,
     /// Radius of the brush, mm.
+    #[value(cutting::BRUSH_RADIUS)]
     brush_radius: f64,
     /// The index of the selected body mark.
     body_mark: usize,
@@ -96,24 +98,7 @@ impl Controls {
     /// `settings`: those at the start, which [`Command::Reset`] restores.
     pub(super) fn new(settings: Settings) -> Controls {
         let rendered = if settings.mode.is_flat() { Mode::default() } else { settings.mode };
-        Controls {
-            start: settings.clone(),
-            saved: Handiwork::of(&settings),
-            settings,
-            tool: Tool::default(),
-            rendered,
-            defaults: None,
-            history: History::default(),
-            work: None,
-            made: None,
-            typing: None,
-            line: None,
-            outline: Vec::new(),
-            kept_side: KeptSide::default(),
-            brush_radius: cutting::BRUSH_RADIUS,
-            body_mark: 0,
-            labelling: None,
-        }
+        Controls { start: settings.clone(), saved: Handiwork::of(&settings), settings, rendered, ..Controls::default() }
     }
 
     pub fn settings(&self) -> &Settings {
@@ -208,8 +193,8 @@ impl Controls {
         let (earlier, later) = match in_mode_of(&self.start, &self.settings) {
             same if same == self.start => (same, start.clone()),
             other => {
-                let earlier = self.defaults.as_ref().map(|earlier| earlier.switched(&self.start, other.clone()));
-                (earlier.unwrap_or_else(|| other.clone()), found.switched(&start, in_mode_of(&start, &other)))
+                let later = found.switched(&start, in_mode_of(&start, &other));
+                (self.switched_from(&self.start, other), later)
             }
         };
         if let Some(settings) = load::rebase(&self.settings, &earlier, &later) {
@@ -228,18 +213,13 @@ impl Controls {
 
     /// The settings `to`, which differ from the present ones in mode or layout, with the other settings that depend on these.
     pub(super) fn switched(&self, to: Settings) -> Settings {
-        match &self.defaults {
-            Some(defaults) => defaults.switched(&self.settings, to),
-            None => to,
-        }
+        self.switched_from(&self.settings, to)
     }
 
-    /// The settings of the start as they would be in the current mode.
-    fn switched_start(&self) -> Settings {
-        let other = in_mode_of(&self.start, &self.settings);
+    fn switched_from(&self, from: &Settings, to: Settings) -> Settings {
         match &self.defaults {
-            Some(defaults) => defaults.switched(&self.start, other),
-            None => other,
+            Some(defaults) => defaults.switched(from, to),
+            None => to,
         }
     }
 
@@ -254,30 +234,18 @@ impl Controls {
     /// Applies a command. `scene`: the one that is shown, which may be older than the settings. Without a scene only changes of the tool, the
     /// reset and commands for the caller have an effect.
     pub(super) fn apply(&mut self, command: &Command, scene: Option<&Scene>) -> Change {
-        use Command::{
-            Align, Back, CancelExport, CancelReading, CloseHints, CloseRecording, Compare, CompareFurther, CompareView,
-            CopyMeasures, DeletePreset, Discard, EndNaming, Exit, Export, Exports, Find, FocusPanels, Freeze,
-            InspectorTab, KeyboardPointer, MarkCine, MeasureBody, MoveCompared, MoveWipe, NamePreset, NextTab,
-            OpenFile, OpenFiles, PickSurface, PlayCine, Preset, Presets, RenamePreset, RestorePresets, SaveAndExit,
-            SaveLoop, SaveMeasures, SavePicture, SaveWorkspace, SeekCine, ShowControl, ShowRecording, StepCine,
-            StepRecording, ToggleDrawer, ToggleFullScreen, ToggleHelp, ToggleLink, TogglePanels, ToggleTimes, TrimCine,
-            Turntable, TypeValue,
-        };
         if let Some(change) = self.cut(command, scene).or_else(|| self.curve(command, scene)) {
             return change;
         }
         match command {
+            Command::Tool(tool) if *tool == self.tool => return Change::Nothing,
             Command::Tool(tool) => {
-                let changed = *tool != self.tool;
-                if changed {
-                    (self.work, self.typing, self.line) = (None, None, None);
-                }
+                (self.work, self.typing, self.line) = (None, None, None);
                 self.tool = *tool;
-                let mode = self.mode_for_line().filter(|_| changed && *tool == Tool::Curve);
+                let mode = self.mode_for_line().filter(|_| *tool == Tool::Curve);
                 return match mode.map(|mode| self.apply(&mode, scene)) {
                     Some(Change::Settings) => Change::Settings,
-                    _ if changed => Change::Tool,
-                    _ => Change::Nothing,
+                    _ => Change::Tool,
                 };
             }
             Command::Reset => {
@@ -300,16 +268,6 @@ impl Controls {
             Command::Sides(..) | Command::ExchangeLeftAndRight | Command::ProbeMarker(_) | Command::SavesBar(_) => {
                 return self.mark_sides(command);
             }
-            Freeze | StepCine(_) | SeekCine(_) | PlayCine | MarkCine(_) | TrimCine(..) | SavePicture | SaveLoop
-            | ToggleHelp | CloseHints | Find | ShowControl(_) | TypeValue(_) | ToggleTimes | TogglePanels
-            | FocusPanels | InspectorTab(_) | NextTab | ToggleDrawer | KeyboardPointer | ToggleFullScreen | Back
-            | Exit | SaveAndExit | Discard | PickSurface(_) | MeasureBody | CopyMeasures | SaveMeasures
-            | SaveWorkspace | OpenFiles | OpenFile(_) | Turntable | ShowRecording(_) | StepRecording(_)
-            | CloseRecording(_) | CancelReading | Compare | CompareView(_) | MoveWipe(_) | ToggleLink(_) | Align
-            | CompareFurther | MoveCompared(..) | Exports | Export(_) | CancelExport | Presets | Preset(_)
-            | NamePreset | RenamePreset(_) | EndNaming | DeletePreset(_) | RestorePresets => {
-                return Change::Caller(*command);
-            }
             _ => {}
         }
         if let Some(change) = self
@@ -317,6 +275,7 @@ impl Controls {
             .or_else(|| self.label(command))
             .or_else(|| self.mark_body(command))
             .or_else(|| self.play(command))
+            .or_else(|| of_caller(command))
         {
             return change;
         }
@@ -325,14 +284,12 @@ impl Controls {
         if let Some(why) = starting::refusal(command, &now) {
             return Change::Refused(why);
         }
-        let wanted = self.changed(command, &now).map(|settings| self.switched(settings));
-        match wanted.clone().and_then(|settings| drawable(&now, settings)) {
+        let Some(wanted) = self.changed(command, &now) else { return Change::Nothing };
+        let wanted = self.switched(wanted);
+        match drawable(&now, wanted.clone()) {
             Some(settings) if settings != self.settings => self.put(settings, command),
-            None => {
-                let why = wanted.and_then(|settings| cutting::in_the_way(&now, &settings));
-                why.map_or(Change::Nothing, Change::Refused)
-            }
             Some(_) => Change::Nothing,
+            None => cutting::in_the_way(&now, &wanted).map_or(Change::Nothing, Change::Refused),
         }
     }
 
@@ -344,6 +301,14 @@ impl Controls {
         let before = std::mem::replace(&mut self.settings, settings);
         self.history.record(before, command);
         Change::Settings
+    }
+
+    /// Does the same with settings that may not fit a scene; `why`: the reason then.
+    fn put_if_drawable(&mut self, new: Settings, command: &Command, scene: &Scene, why: &'static str) -> Change {
+        match self.current(scene).and_then(|now| drawable(&now, new)) {
+            Some(settings) => self.put(settings, command),
+            None => Change::Refused(why),
+        }
     }
 
     /// Changes what is drawn over the picture or how the loop is played, as a step that can be undone.
@@ -368,7 +333,6 @@ impl Controls {
 
     /// The settings after a command; none if it has no effect in this scene.
     fn changed(&self, command: &Command, now: &Scene) -> Option<Settings> {
-        let finite = |numbers: &[f64]| numbers.iter().all(|n| n.is_finite());
         let mut new = self.settings.clone();
         match *command {
             Command::Mode(mode) => new.set_mode(mode),
@@ -453,7 +417,8 @@ impl Controls {
                 set_slider(&mut new, now, index, sliders::from_shown(slider, now, value))?;
             }
             Command::ResetSlider(index) => {
-                let start = self.switched_start();
+                // In the current mode.
+                let start = self.switched_from(&self.start, in_mode_of(&self.start, &self.settings));
                 let slider = SLIDERS.get(index).filter(|slider| slider.applies(&start))?;
                 set_slider(&mut new, now, index, slider.get(&start))?;
             }
@@ -485,6 +450,31 @@ impl Controls {
         };
         Some(Shadow { strength, ..now.or(start).unwrap_or_default() })
     }
+}
+
+/// Passes a command that is not about settings on to the caller. None for other commands.
+fn of_caller(command: &Command) -> Option<Change> {
+    use Command::*;
+    match command {
+        Freeze | StepCine(_) | SeekCine(_) | PlayCine | MarkCine(_) | TrimCine(..) | SavePicture | SaveLoop
+        | ToggleHelp | CloseHints | Find | ShowControl(_) | TypeValue(_) | ToggleTimes | TogglePanels | FocusPanels
+        | InspectorTab(_) | NextTab | ToggleDrawer | KeyboardPointer | ToggleFullScreen | Back | Exit | SaveAndExit
+        | Discard | PickSurface(_) | MeasureBody | CopyMeasures | SaveMeasures | SaveWorkspace | OpenFiles
+        | OpenFile(_) | Turntable | ShowRecording(_) | StepRecording(_) | CloseRecording(_) | CancelReading
+        | Compare | CompareView(_) | MoveWipe(_) | ToggleLink(_) | Align | CompareFurther | MoveCompared(..)
+        | Exports | Export(_) | CancelExport | Presets | Preset(_) | NamePreset | RenamePreset(_) | EndNaming
+        | DeletePreset(_) | RestorePresets => Some(Change::Caller(*command)),
+        _ => None,
+    }
+}
+
+fn finite(numbers: &[f64]) -> bool {
+    numbers.iter().all(|n| n.is_finite())
+}
+
+/// A position as it is kept: a tenth of a micrometre keeps files short.
+fn short<const N: usize>(point: [f64; N]) -> [f64; N] {
+    point.map(|mm| (mm * 1e4).round() / 1e4)
 }
 
 /// Settings with the mode and the layout of others.

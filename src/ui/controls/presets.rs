@@ -16,18 +16,18 @@ pub(crate) struct Exam {
     is_framed: bool,
 }
 
-const fn exam(title: &'static str, preset: &'static str, is_framed: bool, hint: &'static str) -> Exam {
+const fn exam([title, hint]: [&'static str; 2], preset: &'static str, is_framed: bool) -> Exam {
     Exam { title, hint, preset, is_framed }
 }
 
 /// The built-in presets, in the order of the list of presets.
 pub(crate) const EXAMS: [Exam; 6] = [
-    exam(texts::FACE, "face", true, texts::FACE_HINT),
-    exam(texts::SKELETON, "skeleton", true, texts::SKELETON_HINT),
-    exam(texts::GLASS, "glass", true, texts::GLASS_HINT),
-    exam(texts::VESSELS, "vessel", true, texts::VESSELS_HINT),
-    exam(texts::BONE, "bone", false, texts::BONE_HINT),
-    exam(texts::B_MODE, "bmode", false, texts::B_MODE_HINT),
+    exam(texts::FACE, "face", true),
+    exam(texts::SKELETON, "skeleton", true),
+    exam(texts::GLASS, "glass", true),
+    exam(texts::VESSELS, "vessel", true),
+    exam([texts::BONE, texts::BONE_HINT], "bone", false),
+    exam(texts::B_MODE, "bmode", false),
 ];
 
 /// The base of what the phantom is drawn with.

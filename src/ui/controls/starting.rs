@@ -1,6 +1,6 @@
 //! The start line of the region: bent at three to five handles, or straight, which is the region's near face.
 
-use super::Controls;
+use super::{Controls, finite, short};
 use crate::command::Command;
 use crate::scene::start_curve::StartCurve;
 use crate::scene::{MAX_START_POINTS, MIN_START_POINTS, Scene, Settings};
@@ -38,9 +38,7 @@ pub(super) fn changed(command: &Command, now: &Scene) -> Option<Settings> {
     let curve = match (*command, points) {
         (Command::ToggleStartCurve, Some(_)) => None,
         (Command::ToggleStartCurve, None) => Some(straight(now)),
-        (Command::MoveStartHandle(index, to), Some(points)) if to.iter().all(|n| n.is_finite()) => {
-            Some(moved(now, points, index, to)?)
-        }
+        (Command::MoveStartHandle(index, to), Some(points)) if finite(&to) => Some(moved(now, points, index, to)?),
         (Command::AddStartHandle(lateral), Some(points)) => Some(with_handle(now, points, lateral)?),
         (Command::RemoveStartHandle(index), Some(points)) => Some(without_handle(points, index)?),
         _ => return None,
@@ -48,11 +46,6 @@ pub(super) fn changed(command: &Command, now: &Scene) -> Option<Settings> {
     let mut settings = now.settings.clone();
     settings.region.start_curve = curve;
     Some(settings)
-}
-
-/// A tenth of a micrometre: files stay short.
-fn short(point: [f64; 2]) -> [f64; 2] {
-    point.map(|mm| (mm * 1e4).round() / 1e4)
 }
 
 /// A straight line where rendering starts now.

@@ -181,10 +181,8 @@ fn read_devices(
         let _ = rustix::io::read(&shared.wake_event, &mut [0; 8]);
         // From the last one: removing a device shifts those behind it.
         ready.into_iter().rev().for_each(|place| opened.read(place, &mut out));
-        for message in out.drain(..) {
-            if send(message).is_err() {
-                return Ok(Stopped);
-            }
+        if out.drain(..).try_for_each(send).is_err() {
+            return Ok(Stopped);
         }
     }
     Ok(Stopped)

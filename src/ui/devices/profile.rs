@@ -36,9 +36,10 @@ pub(super) struct Abilities {
 }
 
 /// How a device moves the pointer. Spans are those of the horizontal and the vertical axis.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Pointing {
     /// It moves the pointer relative to its position, or not at all.
+    #[default]
     Relative,
     /// It sets the position of the pointer, as a pen does, or the tablet that a virtual machine uses as a mouse.
     Absolute([Span; 2]),
@@ -51,7 +52,7 @@ pub(super) enum Pointing {
 }
 
 /// What kind of device it is: how it points, and what its wheel reports.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Profile {
     pub(super) pointing: Pointing,
     /// True if the wheel also reports fractions of notches.

@@ -117,11 +117,10 @@ impl OpenDevices {
         let name = device.name().unwrap_or("unnamed").to_owned();
         tracing::info!("input: {} ({name})", path.display());
         let grab = if self.grab { Grab::Pending } else { Grab::Off };
-        self.readers.push(Reader { path: path.to_owned(), number: self.number, device, grab });
-        self.translate(out, |translator, number, inputs| translator.add(number, profile, &state, inputs), self.number);
-        if let Some(reader) = self.readers.last_mut() {
-            reader.try_grab(out);
-        }
+        let mut reader = Reader { path: path.to_owned(), number: self.number, device, grab };
+        self.translate(out, |translator, inputs| translator.add(reader.number, profile, &state, inputs));
+        reader.try_grab(out);
+        self.readers.push(reader);
         Ok(true)
     }
 
@@ -135,11 +134,10 @@ impl OpenDevices {
             .map(|events| events.map(|e| Event { kind: e.event_type().0, code: e.code(), value: e.value() }).collect());
         let read = events.and_then(|events| {
             for event in events {
-                self.translate(out, |translator, number, inputs| translator.event(number, event, inputs), number);
+                self.translate(out, |translator, inputs| translator.event(number, event, inputs));
                 if self.translator.needs_resync(number) {
-                    let state = self.readers.get(index).map(|reader| state(&reader.device)).transpose()?;
-                    let state = state.unwrap_or_default();
-                    self.translate(out, |translator, number, inputs| translator.resync(number, &state, inputs), number);
+                    let state = state(&self.readers[index].device)?;
+                    self.translate(out, |translator, inputs| translator.resync(number, &state, inputs));
                 }
             }
             Ok(())
@@ -148,25 +146,17 @@ impl OpenDevices {
             Ok(()) => self.readers[index].try_grab(out),
             Err(fault) if matches!(fault.kind(), ErrorKind::Interrupted | ErrorKind::WouldBlock) => {}
             // Usually unplugged. If it is still there, the next scan opens it again.
-            Err(fault) => self.remove(index, &fault, out),
+            Err(fault) => {
+                let reader = self.readers.remove(index);
+                tracing::info!("input: {} is gone ({fault})", reader.path.display());
+                self.translate(out, |translator, inputs| translator.remove(number, inputs));
+            }
         }
     }
 
-    /// Removes a device that was unplugged.
-    fn remove(&mut self, index: usize, fault: &io::Error, out: &mut Vec<DeviceMessage>) {
-        let reader = self.readers.remove(index);
-        tracing::info!("input: {} is gone ({fault})", reader.path.display());
-        self.translate(out, |translator, number, inputs| translator.remove(number, inputs), reader.number);
-    }
-
-    fn translate(
-        &mut self,
-        out: &mut Vec<DeviceMessage>,
-        what: impl FnOnce(&mut Translator, u32, &mut Vec<Input>),
-        number: u32,
-    ) {
+    fn translate(&mut self, out: &mut Vec<DeviceMessage>, what: impl FnOnce(&mut Translator, &mut Vec<Input>)) {
         let mut inputs = Vec::new();
-        what(&mut self.translator, number, &mut inputs);
+        what(&mut self.translator, &mut inputs);
         out.extend(inputs.into_iter().map(DeviceMessage::Input));
     }
 }

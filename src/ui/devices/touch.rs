@@ -66,9 +66,8 @@ impl Fingers {
 
     /// Sets a coordinate of the selected slot. `axis`: 0 horizontal, 1 vertical.
     pub(super) fn set_position(&mut self, axis: usize, value: i32) {
-        let raw = self.slots.get_mut(self.current).and_then(|slot| slot.raw.get_mut(axis));
-        if let Some(raw) = raw {
-            *raw = Some(value);
+        if let Some(slot) = self.slots.get_mut(self.current) {
+            slot.raw[axis] = Some(value);
         }
     }
 
@@ -138,9 +137,7 @@ pub(super) struct Pad {
 
 impl Pad {
     pub(super) fn set_position(&mut self, axis: usize, value: i32) {
-        if let Some(raw) = self.raw.get_mut(axis) {
-            *raw = Some(value);
-        }
+        self.raw[axis] = Some(value);
     }
 
     /// Notes a key code that says whether fingers touch the pad, and how many.

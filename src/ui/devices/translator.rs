@@ -29,6 +29,7 @@ pub(super) struct State {
 }
 
 /// What is known of a device from its events.
+#[derive(Default)]
 pub(super) struct Device {
     pub(super) profile: Profile,
     /// Codes of the keys and buttons of this device that are held.
@@ -53,19 +54,6 @@ pub(super) struct PendingReport {
 }
 
 impl Device {
-    pub(super) fn new(profile: Profile) -> Device {
-        Device {
-            profile,
-            held: BTreeSet::new(),
-            place: [None; 2],
-            fingers: Fingers::default(),
-            pad: Pad::default(),
-            pending: PendingReport::default(),
-            skips_report: false,
-            needs_resync: false,
-        }
-    }
-
     /// What a key or button of this device stands for; None if it is not used.
     pub(super) fn meaning(&self, code: u16) -> Option<Meaning> {
         match self.profile.pointing {
@@ -146,7 +134,7 @@ impl Translator {
     /// Adds a device with this number. Keys that are already down are ignored, except for modifiers.
     pub(super) fn add(&mut self, number: u32, profile: Profile, state: &State, out: &mut Vec<Input>) {
         self.remove(number, out);
-        self.devices.insert(number, Device::new(profile));
+        self.devices.insert(number, Device { profile, ..Device::default() });
         self.resync(number, state, out);
     }
 

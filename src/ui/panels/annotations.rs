@@ -28,7 +28,7 @@ const BAR_ROOM: (f32, f32) = (0.35, 46.0);
 pub(super) fn areas(state: &PanelState, scale: f32) -> [Vec<Rect>; 2] {
     let Some((shown, whole)) = shown(state, scale) else { return Default::default() };
     let (mut fixed, mut others) = (body_marks::areas(state, scale), Vec::new());
-    for tile in shown.scene.marks_with(&state.controls.settings().marks) {
+    for tile in shown.scene.marks_with(&state.controls.settings().drawn.marks) {
         let area = area_of(whole, &tile, scale);
         if !has_room(&area, MIN_FOR_SCALE) {
             continue;
@@ -81,7 +81,7 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32, messages: &[Rect]) 
     // The part of it that is in sight.
     let picture = whole.intersect(picture_rect(state, scale));
     let painter = ui.ctx().layer_painter(egui::LayerId::background()).with_clip_rect(picture);
-    let marks = scene.marks_with(&state.controls.settings().marks);
+    let marks = scene.marks_with(&state.controls.settings().drawn.marks);
     let tiles = || marks.iter().enumerate().map(|(n, tile)| (n, tile, area_of(whole, tile, scale)));
     let tiles = || tiles().filter(|(.., area)| has_room(area, MIN_FOR_SCALE));
     // What tells the sides goes before what tells sizes: that gives way.
@@ -158,16 +158,16 @@ pub(super) fn paint_origin(ui: &Ui, state: &PanelState, scale: f32) {
 /// Says near the upper left corner whether the picture is live, and which volume of the loop it shows, in as many words as have room.
 fn tell_state(painter: &Painter, taken: &mut Taken, picture: Rect, state: &PanelState) {
     let cine = &state.cine;
-    let (what, colour) = match (state.is_frozen, state.ended) {
+    let (what, colour) = match (state.timeliness.is_frozen, state.timeliness.ended) {
         (true, _) if cine.is_playing => (texts::STATE_PLAYING.to_string(), WARNING),
         (true, _) => (texts::STATE_FROZEN.to_string(), WARNING),
         (false, Some(ago)) => (texts::ended_for(ago), TEXT),
-        (false, None) if state.is_live || state.origin.is_some() => (texts::STATE_LIVE.to_string(), TEXT),
+        (false, None) if state.timeliness.is_live || state.origin.is_some() => (texts::STATE_LIVE.to_string(), TEXT),
         (false, None) => (String::new(), TEXT),
     };
     let volume = cine.shown.map(|at| texts::volume_in_loop(at + 1, cine.count));
     let time = cine.seconds.map(texts::seconds);
-    let drawing = state.is_late.then(|| texts::STATE_DRAWING.to_string());
+    let drawing = state.timeliness.is_late.then(|| texts::STATE_DRAWING.to_string());
     let parts = [drawing, Some(what).filter(|what| !what.is_empty()), volume, time];
     let lower = (0..12).map(|n| vec2(6.0, 26.0 + 10.0 * n as f32));
     let places = [vec2(12.0, 8.0), vec2(34.0, 6.0)].into_iter().chain(lower).map(|away| picture.left_top() + away);

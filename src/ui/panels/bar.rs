@@ -2,9 +2,9 @@
 //! widths whatever they show.
 
 use super::colours::{
-    ACCENT, BACKGROUND, BUTTON, CHOSEN, EDGE, ON_SELECTED, ON_WARNING, PANEL, SELECTED, TEXT, WARNING,
+    ACCENT, BACKGROUND, BUTTON, CHOSEN, EDGE, ON_SELECTED, ON_WARNING, PANEL, SELECTED, TEXT, UNCOLOURED, WARNING,
+    WEAK_TEXT,
 };
-use super::colours::{UNCOLOURED, WEAK_TEXT};
 use super::icons::{self, Icon};
 use super::names::{self, Tell};
 use super::rail::icon_button;
@@ -15,7 +15,7 @@ use crate::command::Command;
 use crate::texts;
 use egui::accesskit::{Action, Role};
 use egui::{
-    Align2, FontId, Frame, Key, Panel, Rect, Response, Sense, Stroke, StrokeKind, Ui, UiBuilder, Vec2, WidgetInfo,
+    Align2, FontId, Frame, Key, Panel, Rect, Response, Sense, Stroke, StrokeKind, Ui, UiBuilder, WidgetInfo,
     WidgetType, pos2, vec2,
 };
 use std::time::Duration;
@@ -30,9 +30,9 @@ const GAP: f32 = 8.0;
 /// Width of a button with an icon, points; the second in the smallest windows.
 const ICON: [f32; 2] = [44.0, 42.0];
 
-const EXPORTS: Item = (icons::EXPORT, texts::EXPORT, Command::Exports, texts::EXPORT_HINT);
-const SAVE_LOOP: Item = (icons::FILM, texts::SAVE_LOOP, Command::SaveLoop, texts::SAVE_LOOP_HINT);
-const SAVE_PICTURE: Item = (icons::CAMERA, texts::SAVE_PICTURE, Command::SavePicture, texts::SAVE_PICTURE_HINT);
+const EXPORTS: Item = (icons::EXPORT, texts::EXPORT, Command::Exports);
+const SAVE_LOOP: Item = (icons::FILM, texts::SAVE_LOOP, Command::SaveLoop);
+const SAVE_PICTURE: Item = (icons::CAMERA, texts::SAVE_PICTURE, Command::SavePicture);
 
 pub(super) fn show(ui: &mut Ui, state: &PanelState, height: f32, pictures: Pictures, execute: Execute) {
     let panel = Panel::bottom("bar").exact_size(height).resizable(false).show_separator_line(false);
@@ -67,27 +67,23 @@ pub(super) fn show(ui: &mut Ui, state: &PanelState, height: f32, pictures: Pictu
     });
 }
 
-fn part(ui: &mut Ui, area: Rect, add: impl FnOnce(&mut Ui, Vec2) -> Response) -> Response {
-    ui.scope_builder(UiBuilder::new().max_rect(area), |ui| add(ui, area.size())).inner
-}
-
 /// The button that freezes: what the picture is, and what a press does.
 fn freeze(ui: &mut Ui, state: &PanelState, area: Rect, execute: Execute) {
-    let (title, about, fill, colour) = match (state.is_frozen, state.ended) {
+    let (title, about, fill, colour) = match (state.timeliness.is_frozen, state.timeliness.ended) {
         (true, _) => (texts::FROZEN, texts::GO_LIVE, WARNING, ON_WARNING),
-        (false, None) if state.is_live || state.origin.is_some() => {
+        (false, None) if state.timeliness.is_live || state.origin.is_some() => {
             (texts::LIVE, texts::TO_FREEZE, SELECTED, ON_SELECTED)
         }
         (false, None) if state.cine.count == 0 => (texts::WAITING, texts::TO_FREEZE, BUTTON, TEXT),
         (false, None) => (texts::NEWEST, texts::TO_FREEZE, SELECTED, ON_SELECTED),
         (false, Some(_)) => (texts::HAS_ENDED_BUTTON, texts::TO_FREEZE, BUTTON, TEXT),
     };
-    let ended = state.ended.map(texts::ended_for);
+    let ended = state.timeliness.ended.map(texts::ended_for);
     if ended.is_some() {
         // It says another time then.
         ui.ctx().request_repaint_after(Duration::from_secs(1));
     }
-    let (name, hint) = match (state.is_frozen, &ended) {
+    let (name, hint) = match (state.timeliness.is_frozen, &ended) {
         (true, _) => (texts::UNFREEZE, texts::FREEZE_HINT),
         (false, None) => (texts::FREEZE, texts::FREEZE_HINT),
         (false, Some(ended)) => (ended.as_str(), texts::ENDED_HINT),
@@ -105,54 +101,41 @@ fn freeze(ui: &mut Ui, state: &PanelState, area: Rect, execute: Execute) {
     if has_two {
         painter.text(middle + vec2(0.0, up), Align2::CENTER_CENTER, about, small, colour);
     }
-    if response.tell(hint).named(name).clicked() {
-        execute(Command::Freeze);
-    }
+    response.tell(hint).named(name).gives(Command::Freeze, execute);
 }
 
 /// The cine loop in this area of a window so wide.
 fn cine(ui: &mut Ui, state: &PanelState, (area, window): (Rect, f32), pictures: Pictures, execute: Execute) {
     let cine = &state.cine;
     let mut left = area.left();
-    let mut buttons: Vec<(Icon, &str, &str, &str, Command, f32)> = Vec::new();
-    let play = match cine.is_playing {
-        true => (icons::STOP, "", texts::STOP, texts::PLAY_HINT, Command::PlayCine, ICON[0]),
-        false => (icons::PLAY, "", texts::PLAY, texts::PLAY_HINT, Command::PlayCine, ICON[0]),
-    };
+    // Each with its icon, its text, its name and hint, its command and its width.
+    let mut buttons: Vec<(Icon, &str, [&str; 2], Command, f32)> = Vec::new();
+    let with_icon = |icon, about, command| (icon, "", about, command, ICON[0]);
+    let (icon, name) = if cine.is_playing { (icons::STOP, texts::STOP) } else { (icons::PLAY, texts::PLAY) };
+    let play = with_icon(icon, [name, texts::PLAY_HINT], Command::PlayCine);
     let speed = format!("{}x", cine.speed);
     let of_speed = texts::speed(&speed);
     if window >= WITH_STEPS {
-        let (previous, next) = (Command::StepCine(-1), Command::StepCine(1));
-        let hints = [texts::PREVIOUS_VOLUME_HINT, texts::NEXT_VOLUME_HINT];
-        buttons.push((icons::PREVIOUS, "", texts::PREVIOUS_VOLUME, hints[0], previous, ICON[0]));
+        buttons.push(with_icon(icons::PREVIOUS, texts::PREVIOUS_VOLUME, Command::StepCine(-1)));
         buttons.push(play);
-        buttons.push((icons::NEXT, "", texts::NEXT_VOLUME, hints[1], next, ICON[0]));
+        buttons.push(with_icon(icons::NEXT, texts::NEXT_VOLUME, Command::StepCine(1)));
     } else if window >= WITH_LINE {
         buttons.push(play);
     }
     if window >= WITH_SPEED {
         // After the fastest comes the slowest.
         let faster = if cine.speed >= SPEEDS[SPEEDS.len() - 1] { -(SPEEDS.len() as i32) } else { 1 };
-        buttons.push((&[], &speed, &of_speed, texts::SPEED_HINT, Command::CineSpeed(faster), 56.0));
+        buttons.push((&[], &speed, [&of_speed, texts::SPEED_HINT], Command::CineSpeed(faster), 56.0));
         buttons.push(match cine.goes_back_and_forth {
-            true => {
-                let (name, hint) = (texts::BACK_AND_FORTH, texts::BACK_AND_FORTH_HINT);
-                (icons::BACK_AND_FORTH, "", name, hint, Command::BackAndForth(false), ICON[0])
-            }
-            false => {
-                let (name, hint) = (texts::FORWARDS, texts::FORWARDS_HINT);
-                (icons::FORWARDS, "", name, hint, Command::BackAndForth(true), ICON[0])
-            }
+            true => with_icon(icons::BACK_AND_FORTH, texts::BACK_AND_FORTH, Command::BackAndForth(false)),
+            false => with_icon(icons::FORWARDS, texts::FORWARDS, Command::BackAndForth(true)),
         });
     }
-    for (icon, text, name, hint, command, width) in buttons {
-        let is_enabled = cine.count > 0;
-        let response = part(ui, place(area, left, width), |ui, size| {
-            icon_button(ui, icon, (text, name), size, (is_enabled, false))
-        });
-        if response.tell(hint).named(name).clicked() {
-            execute(command);
-        }
+    for (icon, text, [name, hint], command, width) in buttons {
+        let place = place(area, left, width);
+        let add = |ui: &mut Ui| icon_button(ui, icon, (text, name), place.size(), (cine.count > 0, false));
+        let response = ui.scope_builder(UiBuilder::new().max_rect(place), add).inner;
+        response.tell(hint).named(name).gives(command, execute);
         left += width + GAP;
     }
     let line = area.with_min_x(left + 4.0).with_max_x(area.right() - 4.0);
@@ -318,9 +301,8 @@ fn react(ui: &Ui, cine: &CineState, response: Response, (strip, each, ends): (Re
             - i64::from(pressed(Key::ArrowLeft) || asked(Action::Decrement));
         set.or((by != 0).then_some(shown as i64 + by))
     });
-    if let Some(index) =
-        stepped.map(|index| index.clamp(0, last as i64) as usize).filter(|index| cine.shown != Some(*index))
-    {
+    let index = stepped.map(|index| index.clamp(0, last as i64) as usize);
+    if let Some(index) = index.filter(|_| cine.shown != index) {
         execute(Command::SeekCine(index));
     }
 }

@@ -1,9 +1,9 @@
 //! Body marks over the picture, and their controls while their tool is selected.
 
 use super::colours::{BODY, MEASURE, OUTLINE, SELECTED, TEXT, WEAK_TEXT};
-use super::names::{self, Tell};
-use super::widgets::{add_and_remove, say_step, scale_slider, switch};
-use super::{Execute, PanelState, ROW_HEIGHT, heading, picture_rect, shown};
+use super::names::Tell;
+use super::widgets::{add_and_remove, in_rows, say_step, scale_slider, switch};
+use super::{Execute, PanelState, ROW_HEIGHT, picture_rect, section, shown};
 use crate::command::{Command, Tool};
 use crate::measure::body_marks::{self, Drawn};
 use crate::scene::{BODY_MARK_SIZES, Body, BodyMark, MAX_BODY_MARKS};
@@ -22,8 +22,7 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
     for drawn in body_marks::drawn(state.controls.body_marks(), shown.scene.picture_size().map(f64::from)) {
         if is_chosen {
             let colour = if about == Some(drawn.index) { MEASURE } else { WEAK_TEXT };
-            let edge = vec2(1.0, 1.0) * drawn.edge as f32 / scale;
-            let area = Rect::from_min_size(at(&picture, scale, drawn.corner), edge);
+            let area = area_of(&drawn, &picture, scale);
             painter.rect_stroke(area, 3.0, Stroke::new(1.0, colour), StrokeKind::Inside);
         }
         draw(&painter, |place| at(&picture, scale, place), scale, &drawn);
@@ -34,10 +33,11 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
 pub(super) fn areas(state: &PanelState, scale: f32) -> Vec<Rect> {
     let Some((shown, picture)) = shown(state, scale) else { return Vec::new() };
     let marks = body_marks::drawn(state.controls.body_marks(), shown.scene.picture_size().map(f64::from));
-    let area = |drawn: Drawn| {
-        Rect::from_min_size(at(&picture, scale, drawn.corner), vec2(1.0, 1.0) * drawn.edge as f32 / scale)
-    };
-    marks.into_iter().map(area).collect()
+    marks.iter().map(|drawn| area_of(drawn, &picture, scale)).collect()
+}
+
+fn area_of(drawn: &Drawn, picture: &Rect, scale: f32) -> Rect {
+    Rect::from_min_size(at(picture, scale, drawn.corner), vec2(1.0, 1.0) * drawn.edge as f32 / scale)
 }
 
 fn at(picture: &Rect, scale: f32, [x, y]: [f64; 2]) -> Pos2 {
@@ -66,44 +66,35 @@ pub(super) fn show(ui: &mut Ui, state: &PanelState, width: f32, execute: Execute
         return;
     }
     let about = state.controls.body_mark();
-    names::group(ui, texts::BODY_MARK, |ui| {
-        heading(ui, texts::BODY_MARK);
+    section(ui, texts::BODY_MARK, |ui| {
         ui.set_max_width(width);
         let step = if about.is_some() { texts::BODY_MARK_STEP } else { texts::BODY_MARK_FIRST_STEP };
         say_step(ui, step, TEXT);
         bodies(ui, about, width, execute);
         let Some((index, mark)) = about else { return };
-        let mut is_mirrored = mark.mirrored;
-        if switch(ui, &mut is_mirrored, texts::MIRRORED, texts::MIRRORED_HINT) {
-            execute(Command::ChangeBodyMark(index, BodyMark { mirrored: is_mirrored, ..mark }));
-        }
-        let whole = |value: f64, unit: &str| format!("{value:.0}{unit}");
-        let mut change = |new: BodyMark| execute(Command::ChangeBodyMark(index, new));
-        let (turn, hint) = (texts::TURN_OF_PROBE, texts::TURN_OF_PROBE_HINT);
-        if let Some(angle) = scale_slider(ui, turn, mark.angle, ([-180.0, 180.0], 5.0), whole(mark.angle, "°"), hint) {
-            change(BodyMark { angle, ..mark });
-        }
-        let percent = |share: f64| whole(share * 100.0, " %");
+        let change = |new: BodyMark| Command::ChangeBodyMark(index, new);
+        let mirror = |mirrored| change(BodyMark { mirrored, ..mark });
+        switch(ui, mark.mirrored, texts::MIRRORED, mirror, execute);
+        let words = [texts::TURN_OF_PROBE, texts::TURN_OF_PROBE_HINT];
+        let turned = (mark.angle, format!("{:.0}°", mark.angle));
+        let turn = |angle| change(BodyMark { angle, ..mark });
+        scale_slider(ui, words, turned, ([-180.0, 180.0], 5.0), turn, execute);
+        let in_percent = |share: f64| (share, format!("{:.0} %", share * 100.0));
+        let with = |mut shares: [f64; 2], axis: usize, share: f64| {
+            shares[axis] = share;
+            shares
+        };
         for (axis, name) in [texts::PROBE_ACROSS, texts::PROBE_DOWN].into_iter().enumerate() {
-            let (value, hint) = (mark.probe[axis], texts::PROBE_ON_BODY_HINT);
-            if let Some(value) = scale_slider(ui, name, value, ([-1.0, 1.0], 0.05), percent(value), hint) {
-                let mut probe = mark.probe;
-                probe[axis] = value;
-                change(BodyMark { probe, ..mark });
-            }
+            let (words, share) = ([name, texts::PROBE_ON_BODY_HINT], in_percent(mark.probe[axis]));
+            let to = |share| change(BodyMark { probe: with(mark.probe, axis, share), ..mark });
+            scale_slider(ui, words, share, ([-1.0, 1.0], 0.05), to, execute);
         }
-        let hint = texts::SIZE_OF_MARK_HINT;
-        let size = percent(mark.size);
-        if let Some(size) = scale_slider(ui, texts::SIZE_OF_MARK, mark.size, (BODY_MARK_SIZES, 0.01), size, hint) {
-            change(BodyMark { size, ..mark });
-        }
+        let resize = |size| change(BodyMark { size, ..mark });
+        scale_slider(ui, texts::SIZE_OF_MARK, in_percent(mark.size), (BODY_MARK_SIZES, 0.01), resize, execute);
         for (axis, name) in [texts::MARK_ACROSS, texts::MARK_DOWN].into_iter().enumerate() {
-            let (value, hint) = (mark.at[axis], texts::PLACE_OF_MARK_HINT);
-            if let Some(value) = scale_slider(ui, name, value, ([0.0, 1.0], 0.01), percent(value), hint) {
-                let mut at = mark.at;
-                at[axis] = value;
-                change(BodyMark { at, ..mark });
-            }
+            let (words, share) = ([name, texts::PLACE_OF_MARK_HINT], in_percent(mark.at[axis]));
+            let to = |share| change(BodyMark { at: with(mark.at, axis, share), ..mark });
+            scale_slider(ui, words, share, ([0.0, 1.0], 0.01), to, execute);
         }
         others(ui, state, (index, mark), width, execute);
     });
@@ -113,37 +104,32 @@ pub(super) fn show(ui: &mut Ui, state: &PanelState, width: f32, execute: Execute
 fn bodies(ui: &mut Ui, about: Option<(usize, BodyMark)>, width: f32, execute: Execute) {
     let gap = ui.spacing().item_spacing.x;
     let edge = ((width - gap * (COLUMNS - 1) as f32) / COLUMNS as f32).min(52.0);
-    for some in Body::ALL.chunks(COLUMNS) {
-        ui.horizontal(|ui| {
-            for body in some {
-                let is_on = about.is_some_and(|(_, mark)| mark.body == *body);
-                let (area, response) = ui.allocate_exact_size(vec2(edge, edge), Sense::click());
-                let name = body.title();
-                response.widget_info(|| WidgetInfo::selected(WidgetType::SelectableLabel, true, is_on, name));
-                let response = response.tell(name);
-                let visuals = ui.style().interact_selectable(&response, is_on);
-                let painter = ui.painter();
-                let fill = if is_on { SELECTED } else { visuals.weak_bg_fill };
-                painter.rect(area, 4.0, fill, visuals.bg_stroke, StrokeKind::Inside);
-                let inner = area.shrink(edge * 0.1);
-                // As the mark will be: alone in a picture that it fills.
-                let mirrored = about.is_some_and(|(_, mark)| mark.mirrored);
-                let shown = BodyMark { body: *body, mirrored, at: [0.5; 2], size: 1.0, ..BodyMark::default() };
-                for drawn in body_marks::drawn(&[shown], [f64::from(inner.width()); 2]) {
-                    for line in &drawn.outline {
-                        let line = line.iter().map(|place| at(&inner, 1.0, *place)).collect();
-                        painter.line(line, Stroke::new(1.0, visuals.text_color()));
-                    }
-                }
-                if response.clicked() {
-                    execute(match about {
-                        Some((index, mark)) => Command::ChangeBodyMark(index, BodyMark { body: *body, ..mark }),
-                        None => Command::AddBodyMark(*body),
-                    });
-                }
+    in_rows(ui, Body::ALL, COLUMNS, |ui, body| {
+        let is_on = about.is_some_and(|(_, mark)| mark.body == body);
+        let (area, response) = ui.allocate_exact_size(vec2(edge, edge), Sense::click());
+        let name = body.title();
+        response.widget_info(|| WidgetInfo::selected(WidgetType::SelectableLabel, true, is_on, name));
+        let response = response.tell(name);
+        let visuals = ui.style().interact_selectable(&response, is_on);
+        let painter = ui.painter();
+        let fill = if is_on { SELECTED } else { visuals.weak_bg_fill };
+        painter.rect(area, 4.0, fill, visuals.bg_stroke, StrokeKind::Inside);
+        let inner = area.shrink(edge * 0.1);
+        // As the mark will be: alone in a picture that it fills.
+        let mirrored = about.is_some_and(|(_, mark)| mark.mirrored);
+        let shown = BodyMark { body, mirrored, at: [0.5; 2], size: 1.0, ..BodyMark::default() };
+        for drawn in body_marks::drawn(&[shown], [f64::from(inner.width()); 2]) {
+            for line in &drawn.outline {
+                let line = line.iter().map(|place| at(&inner, 1.0, *place)).collect();
+                painter.line(line, Stroke::new(1.0, visuals.text_color()));
             }
-        });
-    }
+        }
+        let command = match about {
+            Some((index, mark)) => Command::ChangeBodyMark(index, BodyMark { body, ..mark }),
+            None => Command::AddBodyMark(body),
+        };
+        response.gives(command, execute);
+    });
 }
 
 /// The numbers of several marks, and buttons that add one and remove this one.
@@ -155,15 +141,14 @@ fn others(ui: &mut Ui, state: &PanelState, (index, mark): (usize, BodyMark), wid
             for n in 0..count {
                 let name = texts::body_mark(n + 1);
                 let button = Button::selectable(n == index, (n + 1).to_string()).frame_when_inactive(true);
-                if ui.add(button.min_size(each)).tell(texts::SELECT_BODY_MARK_HINT).named(&name).clicked() {
-                    execute(Command::SelectBodyMark(n));
-                }
+                let response = ui.add(button.min_size(each)).tell(texts::SELECT_BODY_MARK_HINT);
+                response.named(&name).gives(Command::SelectBodyMark(n), execute);
             }
         });
     }
     let both = [
-        (Command::AddBodyMark(mark.body), texts::ADD_BODY_MARK, count < MAX_BODY_MARKS, texts::ADD_BODY_MARK_HINT),
-        (Command::RemoveBodyMark(index), texts::REMOVE_BODY_MARK, true, texts::REMOVE_BODY_MARK_HINT),
+        (Command::AddBodyMark(mark.body), texts::ADD_BODY_MARK, count < MAX_BODY_MARKS),
+        (Command::RemoveBodyMark(index), texts::REMOVE_BODY_MARK, true),
     ];
     add_and_remove(ui, width, both, execute);
 }

@@ -28,6 +28,17 @@ impl Canvas {
         self.origin + vec2(near(x), near(y))
     }
 
+    /// The place under the pointer, points; None if it is not over the picture.
+    pub(super) fn hovered(&self, ui: &Ui) -> Option<Pos2> {
+        ui.ctx().pointer_hover_pos().filter(|at| self.painter.clip_rect().contains(*at))
+    }
+
+    /// The position in the picture at a place, pixels.
+    pub(super) fn pixel(&self, at: Pos2) -> [f64; 2] {
+        let at: [f32; 2] = ((at - self.origin) * self.scale).into();
+        at.map(f64::from)
+    }
+
     /// Draws where a tile is in sight: its upper left corner and its size, pixels.
     pub(super) fn within(&self, corner: [f64; 2], size: [f64; 2]) -> Painter {
         let end = [corner[0] + size[0], corner[1] + size[1]];

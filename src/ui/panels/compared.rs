@@ -2,7 +2,7 @@
 
 use super::colours::{BACKING, MARK, TEXT, UNCOLOURED, WEAK_TEXT};
 use super::names::{self, Tell};
-use super::{Execute, PanelState, Pictures, ROW_HEIGHT, SMALL_TEXT, TOUCH_SIZE, picture_rect};
+use super::{Execute, PanelState, Pictures, ROW_HEIGHT, SMALL_TEXT, TOUCH_SIZE, picture_rect, tile_rect};
 use crate::command::Command;
 use crate::compare::{DIFFERENCE, MAX_TILES, tile_name};
 use crate::comparison::{CompareView, Link, Shown};
@@ -14,19 +14,19 @@ use egui::{
 };
 
 /// The views with their names and hints.
-const VIEWS: [(CompareView, &str, &str); 3] = [
-    (CompareView::Tiles, texts::COMPARED_TILES, texts::COMPARED_TILES_HINT),
-    (CompareView::Difference, texts::COMPARED_DIFFERENCE, texts::COMPARED_DIFFERENCE_HINT),
-    (CompareView::Wipe, texts::COMPARED_WIPE, texts::COMPARED_WIPE_HINT),
+const VIEWS: [(CompareView, [&str; 2]); 3] = [
+    (CompareView::Tiles, texts::COMPARED_TILES),
+    (CompareView::Difference, texts::COMPARED_DIFFERENCE),
+    (CompareView::Wipe, texts::COMPARED_WIPE),
 ];
 
 /// The links with their names and hints.
-fn about(link: Link) -> (&'static str, &'static str) {
+fn about(link: Link) -> [&'static str; 2] {
     match link {
-        Link::View => (texts::LINK_VIEW, texts::LINK_VIEW_HINT),
-        Link::Planes => (texts::LINK_PLANES, texts::LINK_PLANES_HINT),
-        Link::Look => (texts::LINK_LOOK, texts::LINK_LOOK_HINT),
-        Link::Volume => (texts::LINK_VOLUME, texts::LINK_VOLUME_HINT),
+        Link::View => texts::LINK_VIEW,
+        Link::Planes => texts::LINK_PLANES,
+        Link::Look => texts::LINK_LOOK,
+        Link::Volume => texts::LINK_VOLUME,
     }
 }
 
@@ -50,7 +50,7 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, textures: Pictures, scale: f32)
     }
     let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
     for n in 1..=shown.visible() {
-        let tile = tile(state, n as u32, scale);
+        let tile = tile_rect(state, n as u32, scale);
         match texture(n) {
             Some(texture) => _ = painter.image(texture, tile, whole, UNCOLOURED),
             None => {
@@ -60,15 +60,8 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, textures: Pictures, scale: f32)
         }
     }
     if let Some(texture) = texture(0).filter(|_| shown.view == CompareView::Difference) {
-        painter.image(texture, tile(state, 2, scale), whole, UNCOLOURED);
+        painter.image(texture, tile_rect(state, 2, scale), whole, UNCOLOURED);
     }
-}
-
-/// A tile in points; 0 is the picture.
-fn tile(state: &PanelState, n: u32, scale: f32) -> Rect {
-    let ([x, y], [w, h]) = state.room.tile(n);
-    let [x, y, w, h] = [x, y, w, h].map(|n| n as f32 / scale);
-    Rect::from_min_size(pos2(x, y), vec2(w, h))
 }
 
 /// Shows the names of the tiles, the handle of the wipe, and the buttons.
@@ -78,10 +71,10 @@ pub(super) fn show(ui: &Ui, state: &PanelState, scale: f32, execute: Execute) {
     let is_wipe = shown.view == CompareView::Wipe;
     let second = match is_wipe {
         true => first.with_min_x(first.left() + shown.wipe as f32 * first.width()),
-        false => tile(state, 1, scale),
+        false => tile_rect(state, 1, scale),
     };
     for (n, other) in shown.others.iter().take(shown.visible()).enumerate() {
-        let area = if is_wipe { second } else { tile(state, n as u32 + 1, scale) };
+        let area = if is_wipe { second } else { tile_rect(state, n as u32 + 1, scale) };
         let mut text = tile_name(char::from(b'B' + n as u8), &other.name, other.is_synthetic);
         other.moved.iter().for_each(|moved| text += &texts::moved_by(*moved));
         if !is_wipe {
@@ -91,7 +84,7 @@ pub(super) fn show(ui: &Ui, state: &PanelState, scale: f32, execute: Execute) {
     }
     name(painter, first, &tile_name('A', &shown.first, false), !is_wipe);
     match shown.view {
-        CompareView::Difference => name(painter, tile(state, 2, scale), DIFFERENCE, true),
+        CompareView::Difference => name(painter, tile_rect(state, 2, scale), DIFFERENCE, true),
         CompareView::Wipe => handle(ui, first, second.left(), execute),
         CompareView::Tiles => {}
     }
@@ -129,25 +122,17 @@ fn hand(ui: &Ui, n: usize, tile: Rect, scale: f32, execute: Execute) {
 /// Shows the handle on the line of the wipe, which is at `at` in an area.
 fn handle(ui: &Ui, area: Rect, at: f32, execute: Execute) {
     let handle = Rect::from_center_size(pos2(at, area.center().y), vec2(0.5 * TOUCH_SIZE, TOUCH_SIZE));
-    Area::new(Id::new(texts::WIPE_LINE)).order(Order::Middle).fixed_pos(handle.min).constrain(false).show(
-        ui.ctx(),
-        |ui| {
-            let (area_of_handle, response) = ui.allocate_exact_size(handle.size(), Sense::drag());
-            response.widget_info(|| WidgetInfo::labeled(WidgetType::Slider, true, texts::WIPE_LINE));
-            let painter = ui.painter();
-            painter.rect(
-                area_of_handle.shrink2(vec2(6.0, 4.0)),
-                6.0,
-                MARK,
-                Stroke::new(1.0, TEXT),
-                egui::StrokeKind::Inside,
-            );
-            let response = response.on_hover_cursor(CursorIcon::ResizeHorizontal).tell(texts::WIPE_LINE_HINT);
-            if let Some(place) = response.interact_pointer_pos().filter(|_| response.dragged()) {
-                execute(Command::MoveWipe(f64::from((place.x - area.left()) / area.width())));
-            }
-        },
-    );
+    let around = Area::new(Id::new(texts::WIPE_LINE)).order(Order::Middle).fixed_pos(handle.min).constrain(false);
+    around.show(ui.ctx(), |ui| {
+        let (drawn, response) = ui.allocate_exact_size(handle.size(), Sense::drag());
+        response.widget_info(|| WidgetInfo::labeled(WidgetType::Slider, true, texts::WIPE_LINE));
+        let drawn = drawn.shrink2(vec2(6.0, 4.0));
+        ui.painter().rect(drawn, 6.0, MARK, Stroke::new(1.0, TEXT), egui::StrokeKind::Inside);
+        let response = response.on_hover_cursor(CursorIcon::ResizeHorizontal).tell(texts::WIPE_LINE_HINT);
+        if let Some(place) = response.interact_pointer_pos().filter(|_| response.dragged()) {
+            execute(Command::MoveWipe(f64::from((place.x - area.left()) / area.width())));
+        }
+    });
 }
 
 /// Shows the buttons of the comparison at the upper edge of an area.
@@ -160,33 +145,27 @@ fn buttons(ui: &Ui, shown: &Shown, over: Rect, execute: Execute) {
             ui.set_max_width((over.width() - 2.0 * EDGE).max(80.0));
             ui.spacing_mut().item_spacing = vec2(4.0, 4.0);
             ui.horizontal_wrapped(|ui| {
-                let mut button =
-                    |ui: &mut Ui, text: &str, (name, hint): (&str, &str), is_on: bool, command: Command| {
-                        let words = RichText::new(text).size(SMALL_TEXT);
-                        let size = vec2(0.0, ROW_HEIGHT - 6.0);
-                        let response = ui.add(Button::selectable(is_on, words).min_size(size));
-                        if response.tell(hint).named(name).clicked() {
-                            execute(command);
-                        }
-                    };
-                for (view, name, hint) in VIEWS {
-                    button(ui, name, (name, hint), shown.view == view, Command::CompareView(view));
+                let mut button = |ui: &mut Ui, text: &str, [name, hint]: [&str; 2], is_on: bool, command: Command| {
+                    let words = RichText::new(text).size(SMALL_TEXT);
+                    let button = Button::selectable(is_on, words).min_size(vec2(0.0, ROW_HEIGHT - 6.0));
+                    ui.add(button).tell(hint).named(name).gives(command, execute);
+                };
+                for (view, about) in VIEWS {
+                    button(ui, about[0], about, shown.view == view, Command::CompareView(view));
                 }
                 ui.label(RichText::new(texts::LINKED).size(SMALL_TEXT).color(WEAK_TEXT));
                 for (link, is_on) in Link::ALL.into_iter().zip(shown.links) {
-                    let (name, hint) = about(link);
-                    button(ui, name, (name, hint), is_on, Command::ToggleLink(link));
+                    button(ui, about(link)[0], about(link), is_on, Command::ToggleLink(link));
                 }
                 let visible = &shown.others[..shown.visible()];
                 let is_aligning = visible.iter().any(|other| other.is_aligning);
                 let is_on = is_aligning || visible.iter().all(|other| other.is_aligned);
                 let align = if is_aligning { texts::ALIGNING } else { texts::ALIGN };
-                button(ui, align, (texts::ALIGN, texts::ALIGN_HINT), is_on, Command::Align);
+                button(ui, align, [texts::ALIGN, texts::ALIGN_HINT], is_on, Command::Align);
                 if shown.others.len() + 1 < MAX_TILES {
-                    let about = (texts::ADD_COMPARED, texts::ADD_COMPARED_HINT);
-                    button(ui, texts::ADD_COMPARED, about, false, Command::CompareFurther);
+                    button(ui, texts::ADD_COMPARED[0], texts::ADD_COMPARED, false, Command::CompareFurther);
                 }
-                button(ui, texts::CLOSE, (texts::END_COMPARISON, texts::END_COMPARISON_HINT), false, Command::Compare);
+                button(ui, texts::CLOSE, texts::END_COMPARISON, false, Command::Compare);
             });
         });
     });

@@ -26,10 +26,9 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
         canvas.within(tile.corner.map(f64::from), tile.size.map(f64::from))
     };
     let draw = |line: &CurveLine, has_points: bool| draw(&within(line), &canvas, line, has_points);
-    let hover = ui.ctx().pointer_hover_pos().filter(|at| canvas.painter.clip_rect().contains(*at));
-    let hover = hover.map(|at| ((at - canvas.origin) * scale).into()).map(|[x, y]: [f32; 2]| [x, y].map(f64::from));
     // The tile under the pointer, and the place in space.
-    let under = hover.and_then(|at| {
+    let under = canvas.hovered(ui).and_then(|at| {
+        let at = canvas.pixel(at);
         let tile = tiling.tile_at(at[0].max(0.0) as usize, at[1].max(0.0) as usize)?;
         let number = tiling.tiles.iter().position(|other| other.corner == tile.corner)?;
         Some((number, tiling.point(tile, at)))
@@ -40,11 +39,9 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
         if let Some((_, place)) = under.filter(|(number, _)| tiling.tiles[*number].section.is_some()) {
             let [x, y] = tiling.project(&tiling.tiles[line.tile], place).0.map(|v| v as f32);
             let (at, painter) = (canvas.origin + vec2(x, y) / scale, within(&line));
-            [Stroke::new(4.0, OUTLINE), Stroke::new(2.0, colours::of_scene(CURVE_COLOUR))].into_iter().for_each(
-                |stroke| {
-                    painter.circle_stroke(at, POINT + 2.0, stroke);
-                },
-            );
+            for (width, colour) in [(4.0, OUTLINE), (2.0, colours::of_scene(CURVE_COLOUR))] {
+                painter.circle_stroke(at, POINT + 2.0, Stroke::new(width, colour));
+            }
         }
     }
     let Some(work) = work else { return };

@@ -3,6 +3,7 @@
 use super::annotations::MIN_FOR_AXES;
 use super::colours::{ACCENT, MESSAGE, TEXT};
 use super::names::{self, Tell};
+use super::widgets::cell;
 use super::{Execute, PanelState, ROW_HEIGHT, SMALL_TEXT, TEXT_SIZE, picture_rect};
 use crate::command::Command;
 use crate::texts;
@@ -40,19 +41,13 @@ pub(super) fn show(ui: &Ui, state: &PanelState, scale: f32, execute: Execute) {
             ui.spacing_mut().interact_size.y = TEXT_SIZE;
             for (action, effect) in texts::HINTS {
                 ui.horizontal(|ui| {
-                    let size = vec2(64.0, TEXT_SIZE + 4.0);
                     let action = RichText::new(action).color(ACCENT).size(SMALL_TEXT);
-                    ui.allocate_ui_with_layout(size, egui::Layout::left_to_right(egui::Align::Center), |ui| {
-                        ui.set_min_width(size.x);
-                        ui.add(Label::new(action));
-                    });
+                    cell(ui, vec2(64.0, TEXT_SIZE + 4.0), |ui| _ = ui.add(Label::new(action)));
                     ui.add(Label::new(RichText::new(effect).color(TEXT).size(SMALL_TEXT)));
                 });
             }
             let close = Button::new(texts::CLOSE_BUTTON).min_size(vec2(WIDTH, ROW_HEIGHT));
-            if ui.add(close).tell(texts::CLOSE_HINTS_HINT).named(texts::CLOSE).clicked() {
-                execute(Command::CloseHints);
-            }
+            ui.add(close).tell(texts::CLOSE_HINTS_HINT).named(texts::CLOSE).gives(Command::CloseHints, execute);
         });
     });
 }

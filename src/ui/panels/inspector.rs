@@ -3,11 +3,8 @@
 
 use super::colours::{ACCENT, EDGE, PANEL, TEXT, WEAK_TEXT};
 use super::names::{self, Tell};
-use super::{
-    Edges, Execute, INSPECTOR_WIDTH, PanelState, Pictures, Room, SMALL_TEXT, TEXT_SIZE, body_marks, labels, look,
-    measures,
-};
-use super::{planes, presets, rail, recordings, sides, tools, top};
+use super::{Edges, Execute, INSPECTOR_WIDTH, PanelState, Pictures, Room, SMALL_TEXT, TEXT_SIZE};
+use super::{body_marks, labels, look, measures, planes, presets, rail, recordings, sides, tools, top};
 use crate::command::{Command, InspectorTab, Tool};
 use crate::scene::{Group, MeasureKind};
 use crate::sliders::SLIDERS;
@@ -18,12 +15,12 @@ use egui::{
     vec2,
 };
 
-const TABS: [(InspectorTab, &str, &str); 5] = [
-    (InspectorTab::Tools, texts::TAB_TOOLS, texts::TAB_TOOLS_HINT),
-    (InspectorTab::Look, texts::TAB_LOOK, texts::TAB_LOOK_HINT),
-    (InspectorTab::Planes, texts::PLANES, texts::TAB_PLANES_HINT),
-    (InspectorTab::Measure, texts::MEASURE, texts::TAB_MEASURE_HINT),
-    (InspectorTab::Marks, texts::TAB_MARKS, texts::TAB_MARKS_HINT),
+const TABS: [(InspectorTab, [&str; 2]); 5] = [
+    (InspectorTab::Tools, texts::TAB_TOOLS),
+    (InspectorTab::Look, texts::TAB_LOOK),
+    (InspectorTab::Planes, [texts::PLANES, texts::TAB_PLANES_HINT]),
+    (InspectorTab::Measure, [texts::MEASURE, texts::TAB_MEASURE_HINT]),
+    (InspectorTab::Marks, texts::TAB_MARKS),
 ];
 /// Of the tabs, points; the second in a low drawer.
 const TABS_HEIGHT: [f32; 2] = [40.0, 28.0];
@@ -63,7 +60,7 @@ impl Inspector {
             Command::InspectorTab(tab) => (self.tab, self.is_open) = (tab, true),
             Command::ToggleDrawer => self.is_open = !self.is_open,
             Command::NextTab => {
-                let there: Vec<_> = tabs(room).map(|(tab, ..)| tab).collect();
+                let there: Vec<_> = tabs(room).map(|(tab, _)| tab).collect();
                 let at = there.iter().position(|tab| *tab == self.tab(room)).unwrap_or_default();
                 match (room.has_drawer, self.is_open) {
                     (true, false) => (self.is_open, self.tab) = (true, there[0]),
@@ -94,9 +91,9 @@ impl Inspector {
     }
 }
 
-fn tabs(room: &Room) -> impl Iterator<Item = (InspectorTab, &'static str, &'static str)> {
+fn tabs(room: &Room) -> impl Iterator<Item = (InspectorTab, [&'static str; 2])> {
     let has_tools = room.has_tools_tab;
-    TABS.into_iter().filter(move |(tab, ..)| has_tools || *tab != InspectorTab::Tools)
+    TABS.into_iter().filter(move |(tab, _)| has_tools || *tab != InspectorTab::Tools)
 }
 
 /// Shows the inspector as a column beside the picture. `looks`: thumbnails of the presets.
@@ -180,7 +177,7 @@ fn show(ui: &mut Ui, state: &PanelState, width: f32, tabs_height: f32, looks: Pi
 }
 
 fn name_of(tab: InspectorTab) -> &'static str {
-    TABS.iter().find(|(other, ..)| *other == tab).map_or("", |(_, name, _)| name)
+    TABS.iter().find(|(other, _)| *other == tab).map_or("", |(_, [name, _])| name)
 }
 
 fn show_tabs(ui: &mut Ui, state: &PanelState, [width, height]: [f32; 2], execute: Execute) {
@@ -190,7 +187,7 @@ fn show_tabs(ui: &mut Ui, state: &PanelState, [width, height]: [f32; 2], execute
     ui.horizontal(|ui| {
         names::name(ui, Role::TabList, texts::INSPECTOR);
         ui.spacing_mut().item_spacing.x = 0.0;
-        for (tab, name, hint) in tabs(&state.room) {
+        for (tab, [name, hint]) in tabs(&state.room) {
             let is_chosen = tab == shown;
             let (area, tab_shown) = ui.allocate_exact_size(vec2(width / count, height), Sense::click());
             tab_shown.widget_info(|| WidgetInfo::selected(WidgetType::SelectableLabel, true, is_chosen, name));
@@ -198,15 +195,17 @@ fn show_tabs(ui: &mut Ui, state: &PanelState, [width, height]: [f32; 2], execute
             let painter = ui.painter();
             let size = if count > 4.0 || width < 260.0 { SMALL_TEXT } else { TEXT_SIZE };
             let colour = if is_marked { TEXT } else { WEAK_TEXT };
-            let number =
-                if tab == InspectorTab::Measure && measured > 0 { format!(" {measured}") } else { String::new() };
-            let text = format!("{name}{number}");
+            let has_number = tab == InspectorTab::Measure && measured > 0;
+            let text = if has_number { format!("{name} {measured}") } else { name.into() };
             painter.text(area.center(), Align2::CENTER_CENTER, text, FontId::proportional(size), colour);
             let line = if is_chosen { Stroke::new(2.0, ACCENT) } else { Stroke::new(1.0, EDGE) };
             painter.hline(area.x_range(), area.bottom() - line.width / 2.0, line);
-            if tab_shown.tell(hint).with_role(Role::Tab).chosen(is_chosen).clicked() {
-                execute(Command::InspectorTab(tab));
-            }
+            // A tab is selected, not toggled as egui says.
+            let tab_shown = tab_shown.tell(hint).with_role(Role::Tab).with(|node| {
+                node.clear_toggled();
+                node.set_selected(is_chosen);
+            });
+            tab_shown.gives(Command::InspectorTab(tab), execute);
         }
     });
 }

@@ -2,19 +2,19 @@
 
 use super::colours::{self, EDGE};
 use super::names::{self, Tell};
-use super::widgets::{row_of, switch};
+use super::widgets::{command_button, row_of, switch};
 use super::{Execute, PanelState, ROW_HEIGHT, TEXT_SIZE, tools};
 use crate::command::{Command, Effect, LabelCommand, Tool};
-use crate::scene::MeasureKind;
+use crate::scene::{MeasureKind, Measurement};
 use crate::texts;
 use egui::{Align2, Button, FontId, Rect, RichText, Stroke, StrokeKind, Ui, vec2};
 
-/// Each effect with its hint and its name.
-const EFFECTS: [((Effect, &str), &str); 4] = [
-    ((Effect::Paint, texts::PAINT_HINT), texts::PAINT),
-    ((Effect::Erase, texts::ERASE_HINT), texts::ERASE),
-    ((Effect::GrowDark, texts::GROW_DARK_HINT), texts::GROW_DARK),
-    ((Effect::GrowBright, texts::GROW_BRIGHT_HINT), texts::GROW_BRIGHT),
+/// Each effect with its name and its hint.
+const EFFECTS: [(Effect, [&str; 2]); 4] = [
+    (Effect::Paint, texts::PAINT),
+    (Effect::Erase, texts::ERASE),
+    (Effect::GrowDark, texts::GROW_DARK),
+    (Effect::GrowBright, texts::GROW_BRIGHT),
 ];
 
 /// Shows, while the tool for labels is selected, what it does, the brush, and the labels.
@@ -23,15 +23,13 @@ pub(super) fn show(ui: &mut Ui, state: &PanelState, width: f32, execute: Execute
     let Some(labels) = state.controls.labelling().filter(|_| is_chosen) else { return };
     names::group(ui, texts::LABELS, |ui| {
         ui.set_max_width(width);
-        let is_chosen = |(effect, _)| effect == labels.effect;
-        let choose = |(effect, _)| execute(Command::Labels(LabelCommand::Effect(effect)));
-        row_of(ui, texts::LABELS, &EFFECTS, (2, width), is_chosen, |(_, hint)| hint, choose);
+        let choose = |effect| Command::Labels(LabelCommand::Effect(effect));
+        let effects = EFFECTS.map(|(effect, about)| (choose(effect), about));
+        row_of(ui, texts::LABELS, &effects, (2, width), |command| command == choose(labels.effect), execute);
         if matches!(labels.effect, Effect::Paint | Effect::Erase) {
             tools::brush_radius(ui, state, execute);
-            let mut is_ball = labels.is_ball;
-            if switch(ui, &mut is_ball, texts::SPHERE_BRUSH, texts::SPHERE_BRUSH_HINT) {
-                execute(Command::Labels(LabelCommand::Ball(is_ball)));
-            }
+            let about = [texts::SPHERE_BRUSH, texts::SPHERE_BRUSH_HINT];
+            switch(ui, labels.is_ball, about, |is_ball| Command::Labels(LabelCommand::Ball(is_ball)), execute);
         }
         let size = vec2(width, ROW_HEIGHT);
         for (segment, volume) in labels.volumes() {
@@ -46,19 +44,15 @@ pub(super) fn show(ui: &mut Ui, state: &PanelState, width: f32, execute: Execute
             let text = ui.visuals().widgets.inactive.fg_stroke.color;
             ui.painter().text(at, Align2::RIGHT_CENTER, &volume, FontId::proportional(TEXT_SIZE), text);
             let name = format!("{} {volume}", segment.name);
-            if row.tell(texts::CHOOSE_LABEL_HINT).named(&name).clicked() {
-                execute(Command::Labels(LabelCommand::Choose(segment.label)));
-            }
+            row.tell(texts::CHOOSE_LABEL_HINT)
+                .named(&name)
+                .gives(Command::Labels(LabelCommand::Choose(segment.label)), execute);
         }
-        if ui.add_sized(size, Button::new(texts::ADD_LABEL)).tell(texts::ADD_LABEL_HINT).clicked() {
-            execute(Command::Labels(LabelCommand::Add));
-        }
-        for (n, measured) in state.controls.measures().iter().enumerate() {
-            let name = texts::label_measured(n + 1);
-            let has_contours = measured.kind == MeasureKind::Volume;
-            if has_contours && ui.add_sized(size, Button::new(&name)).tell(texts::LABEL_MEASURED_HINT).clicked() {
-                execute(Command::Labels(LabelCommand::Fill(n)));
-            }
+        command_button(ui, size, texts::ADD_LABEL, Command::Labels(LabelCommand::Add), execute);
+        let has_contours = |(_, measured): &(usize, &Measurement)| measured.kind == MeasureKind::Volume;
+        for (n, _) in state.controls.measures().iter().enumerate().filter(has_contours) {
+            let (name, fill) = (texts::label_measured(n + 1), Command::Labels(LabelCommand::Fill(n)));
+            command_button(ui, size, [&name, texts::LABEL_MEASURED_HINT], fill, execute);
         }
     });
 }

@@ -1,18 +1,16 @@
 //! Lists over the window from which an entry is chosen: the files to open, and the formats of an export.
 
-use super::colours::{ACCENT, FAULT, PANEL, TEXT, WEAK_TEXT};
+use super::colours::{FAULT, TEXT, WEAK_TEXT};
 use super::names::{self, Tell};
 use super::overlays::LOW_WINDOW;
 use super::walking::Walk;
+use super::widgets::dialog;
 use super::{Execute, SMALL_TEXT, TOUCH_SIZE, heading};
 use crate::command::Command;
 use crate::progress_lines::Progress;
 use crate::texts;
 use crate::volume_export::FORMATS;
-use egui::accesskit::Role;
-use egui::{
-    Align2, Area, Button, Color32, FontId, Frame, Id, Label, Margin, Order, RichText, ScrollArea, Stroke, Ui, vec2,
-};
+use egui::{Align2, Button, Color32, FontId, Label, RichText, ScrollArea, Ui, vec2};
 use std::ffi::OsStr;
 use std::path::Path;
 
@@ -40,8 +38,8 @@ struct List<'a> {
     headings: &'a [(usize, &'a str)],
     /// The close button: its tooltip and command.
     close: (&'a str, Command),
-    /// The text of an empty list.
-    empty: &'a str,
+    /// True if a button before the entries cancels the running export.
+    can_cancel: bool,
 }
 
 /// Shows the list of files to open.
@@ -54,13 +52,13 @@ pub(super) fn show_files(ui: &Ui, files: &FilesShown, execute: Execute) {
     let folder = Path::new(files.folder).file_name().and_then(OsStr::to_str).unwrap_or(files.folder);
     let headings = [(0, texts::RECENT), (files.recent, folder)];
     let list = List {
-        title: texts::OPEN,
+        title: texts::OPEN[0],
         about: files.folder,
         typed: files.typed.map(|typed| typed.0),
         line: Some(line),
         headings: &headings[usize::from(files.recent == 0)..],
         close: (texts::CLOSE_OPEN_HINT, Command::OpenFiles),
-        empty: texts::NO_RECORDING_HERE,
+        can_cancel: false,
     };
     let hint = |name: &String| match name.as_str() {
         texts::FOLDER_ABOVE => texts::FOLDER_ABOVE_HINT.into(),
@@ -69,7 +67,7 @@ pub(super) fn show_files(ui: &Ui, files: &FilesShown, execute: Execute) {
     };
     let hints: Vec<String> = files.names.iter().map(hint).collect();
     let entries = files.names.iter().zip(&hints).map(|(name, hint)| (name.as_str(), hint.as_str()));
-    list.show(ui, entries, |n, execute| execute(Command::OpenFile(n)), |_, _| {}, execute);
+    list.show(ui, entries, Command::OpenFile, execute);
 }
 
 /// Shows the list of export formats. `running`: name and progress of the running export.
@@ -79,16 +77,11 @@ pub(super) fn show_exports(ui: &Ui, running: Option<(&str, Option<Progress>)>, e
         Some((name, None)) => texts::is_being_exported(name),
         None => texts::VOLUME_SHOWN.into(),
     };
-    let close = (texts::CLOSE_EXPORT_HINT, Command::Exports);
-    let list = List { title: texts::EXPORT, about: &about, typed: None, line: None, headings: &[], close, empty: "" };
+    let (close, can_cancel) = ((texts::CLOSE_EXPORT_HINT, Command::Exports), running.is_some());
+    let list =
+        List { title: texts::EXPORT[0], about: &about, typed: None, line: None, headings: &[], close, can_cancel };
     let entries = FORMATS.iter().map(|format| (format.name, format.hint));
-    let cancel = |ui: &mut Ui, execute: Execute| {
-        let hint = texts::CANCEL_EXPORT_HINT;
-        if running.is_some() && ui.button(texts::CANCEL_EXPORT).tell(hint).clicked() {
-            execute(Command::CancelExport);
-        }
-    };
-    list.show(ui, entries, |n, execute| execute(Command::Export(n)), cancel, execute);
+    list.show(ui, entries, Command::Export, execute);
 }
 
 /// A text that is being typed, with a mark where it goes on; without its beginning, if that has no room.
@@ -106,70 +99,60 @@ fn end_of(ui: &Ui, typed: &str, width: f32) -> String {
 }
 
 impl List<'_> {
-    /// `entries`: names and tooltips. `more` is drawn before them.
+    /// `entries`: names and tooltips; `choose`: the command of the n-th one.
     fn show<'a>(
         &self,
         ui: &Ui,
         entries: impl ExactSizeIterator<Item = (&'a str, &'a str)>,
-        choose: impl Fn(usize, Execute),
-        more: impl Fn(&mut Ui, Execute),
+        choose: impl Fn(usize) -> Command,
         execute: Execute,
     ) {
         let screen = ui.ctx().content_rect();
-        let area =
-            Area::new(Id::new(self.title)).order(Order::Foreground).anchor(Align2::CENTER_CENTER, vec2(0.0, 0.0));
-        area.show(ui.ctx(), |ui| {
-            names::name(ui, Role::Dialog, self.title);
-            let is_low = screen.height() < LOW_WINDOW;
-            let margin = if is_low { 6 } else { 16 };
-            let frame = Frame::new().fill(PANEL).inner_margin(Margin::same(margin)).corner_radius(10);
-            frame.stroke(Stroke::new(2.0, ACCENT)).show(ui, |ui| {
-                let width = (screen.width() - 2.0 * f32::from(margin) - 12.0).clamp(120.0, 720.0);
-                ui.set_width(width);
-                ui.horizontal(|ui| {
-                    ui.heading(self.title);
-                    ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                        if ui.button(texts::CLOSE_BUTTON).tell(self.close.0).named(texts::CLOSE).clicked() {
-                            execute(self.close.1);
-                        }
-                    });
+        let is_low = screen.height() < LOW_WINDOW;
+        let margin = if is_low { 6 } else { 16 };
+        dialog(ui, self.title, (Align2::CENTER_CENTER, 0.0), margin, [120.0, 720.0], |ui, width| {
+            ui.horizontal(|ui| {
+                ui.heading(self.title);
+                ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                    let close = ui.button(texts::CLOSE_BUTTON).tell(self.close.0).named(texts::CLOSE);
+                    close.gives(self.close.1, execute);
                 });
-                let small =
-                    |text: &str, colour| Label::new(RichText::new(text).size(SMALL_TEXT).color(colour)).truncate();
-                match self.typed {
-                    Some(typed) => {
-                        let label = small(&end_of(ui, typed, width), TEXT);
-                        ui.add(label).named(texts::PATH).with_value(typed);
+            });
+            let small = |text: &str, colour| Label::new(RichText::new(text).size(SMALL_TEXT).color(colour)).truncate();
+            match self.typed {
+                Some(typed) => {
+                    let label = small(&end_of(ui, typed, width), TEXT);
+                    ui.add(label).named(texts::PATH).with_value(typed);
+                }
+                None => _ = ui.add(small(self.about, WEAK_TEXT)),
+            }
+            // Below the title and what it is about.
+            let mut height = (screen.height() - if is_low { 100.0 } else { 160.0 }).max(30.0);
+            if let Some((line, colour)) = self.line {
+                ui.add(small(line, colour));
+                height = (height - 30.0).min(screen.height() * SHARE).max(20.0);
+            }
+            // Another folder is seen from its beginning.
+            let area = ScrollArea::vertical().id_salt(self.about).max_height(height).min_scrolled_height(0.0);
+            area.auto_shrink([true, self.line.is_none()]).show(ui, |ui| {
+                if self.can_cancel {
+                    let [name, hint] = texts::CANCEL_EXPORT;
+                    ui.button(name).tell(hint).gives(Command::CancelExport, execute);
+                }
+                names::list(ui, self.about, |ui| {
+                    if entries.len() == 0 {
+                        ui.label(texts::NO_RECORDING_HERE);
                     }
-                    None => _ = ui.add(small(self.about, WEAK_TEXT)),
-                }
-                // Below the title and what it is about.
-                let mut height = (screen.height() - if is_low { 100.0 } else { 160.0 }).max(30.0);
-                if let Some((line, colour)) = self.line {
-                    ui.add(small(line, colour));
-                    height = (height - 30.0).min(screen.height() * SHARE).max(20.0);
-                }
-                // Another folder is seen from its beginning.
-                let area = ScrollArea::vertical().id_salt(self.about).max_height(height).min_scrolled_height(0.0);
-                area.auto_shrink([true, self.line.is_none()]).show(ui, |ui| {
-                    more(ui, execute);
-                    names::list(ui, self.about, |ui| {
-                        if entries.len() == 0 {
-                            ui.label(self.empty);
-                        }
-                        let walk = Walk::new(ui, self.title, entries.len(), 1);
-                        for (n, (name, hint)) in entries.enumerate() {
-                            self.headings.iter().filter(|(at, _)| *at == n).for_each(|(_, text)| heading(ui, text));
-                            let key = if n < 9 { format!("{}   ", n + 1) } else { "     ".into() };
-                            let button = Button::new(format!("{key}{name}")).truncate();
-                            let button = button.min_size(vec2(width - 20.0, TOUCH_SIZE * 0.7));
-                            let entry = ui.add(button).tell(hint).named(name);
-                            walk.entry(n, &entry);
-                            if entry.clicked() {
-                                choose(n, execute);
-                            }
-                        }
-                    });
+                    let walk = Walk::new(ui, self.title, entries.len(), 1);
+                    for (n, (name, hint)) in entries.enumerate() {
+                        self.headings.iter().filter(|(at, _)| *at == n).for_each(|(_, text)| heading(ui, text));
+                        let key = if n < 9 { format!("{}   ", n + 1) } else { "     ".into() };
+                        let button = Button::new(format!("{key}{name}")).truncate();
+                        let button = button.min_size(vec2(width - 20.0, TOUCH_SIZE * 0.7));
+                        let entry = ui.add(button).tell(hint).named(name);
+                        walk.entry(n, &entry);
+                        entry.gives(choose(n), execute);
+                    }
                 });
             });
         });

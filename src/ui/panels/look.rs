@@ -3,7 +3,7 @@
 use super::colours::{self, EDGE, ON_SELECTED, OUTLINE, TEXT};
 use super::names::{self, Tell};
 use super::widgets::{absent, front, row_of, slider, switch};
-use super::{Execute, PanelState, ROW_HEIGHT, heading, tools};
+use super::{Execute, PanelState, ROW_HEIGHT, heading, section, tools};
 use crate::command::Command;
 use crate::scene::Slider as Control;
 use crate::scene::{ColourMap, Group, Mode, Settings, Transfer, TransferName};
@@ -36,23 +36,22 @@ const TRANSFERS: [(TransferName, &str); 6] = [
     (TransferName::Warm, texts::WARM),
 ];
 
-const OF_PICTURE: [(Command, &str); 5] = [
-    (Command::ColourMap(ColourMap::None), texts::AS_IS),
-    (Command::ColourMap(ColourMap::Grey), texts::GREY),
-    (Command::ColourMap(ColourMap::Sepia), texts::SEPIA),
-    (Command::ColourMap(ColourMap::Skin), texts::SKIN),
-    (Command::ColourMap(ColourMap::Ice), texts::ICE),
+const OF_PICTURE: [(ColourMap, &str); 5] = [
+    (ColourMap::None, texts::AS_IS),
+    (ColourMap::Grey, texts::GREY),
+    (ColourMap::Sepia, texts::SEPIA),
+    (ColourMap::Skin, texts::SKIN),
+    (ColourMap::Ice, texts::ICE),
 ];
 
 /// Shows this tab of the inspector, `width` points wide.
 pub(super) fn show(ui: &mut Ui, state: &PanelState, width: f32, execute: Execute) {
     let settings = state.controls.settings();
-    let modes = RENDERED.map(|mode| (mode, mode.title()));
-    let of_mode = |mode| settings.mode == mode;
-    row_of(ui, texts::RENDERING, &modes, (4, width), of_mode, hints::of_mode, |mode| execute(Command::Mode(mode)));
+    let modes = RENDERED.map(|mode| (Command::Mode(mode), [mode.title(), hints::of_mode(mode)]));
+    let is_chosen = |command| command == Command::Mode(settings.mode);
+    row_of(ui, texts::RENDERING, &modes, (4, width), is_chosen, execute);
     let in_front = FRONT.map(|(name, sliders)| (name, front(sliders, settings)));
-    names::group(ui, texts::CONTROLS, |ui| {
-        heading(ui, texts::CONTROLS);
+    section(ui, texts::CONTROLS, |ui| {
         for (name, number) in in_front {
             match number {
                 Some(number) if name == texts::LAMP => {
@@ -70,16 +69,13 @@ pub(super) fn show(ui: &mut Ui, state: &PanelState, width: f32, execute: Execute
             }
         }
         if front(&["light.shadow.strength"], settings).is_some() {
-            let mut on = settings.light.shadow.is_some_and(|shadow| shadow.strength > 0.0);
-            if switch(ui, &mut on, texts::CAST_SHADOWS, texts::CAST_SHADOWS_HINT) {
-                execute(Command::Shadow(on));
-            }
+            let is_on = settings.light.shadow.is_some_and(|shadow| shadow.strength > 0.0);
+            switch(ui, is_on, texts::CAST_SHADOWS, Command::Shadow, execute);
         }
     });
     let start = ["unveil.enabled", "unveil.offset"].map(|key| front(&[key], settings));
     if start.iter().any(Option::is_some) {
-        names::group(ui, texts::RENDER_START, |ui| {
-            heading(ui, texts::RENDER_START);
+        section(ui, texts::RENDER_START, |ui| {
             for number in start.iter().flatten() {
                 slider(ui, state, *number, SLIDERS[*number].name, execute);
             }
@@ -90,9 +86,8 @@ pub(super) fn show(ui: &mut Ui, state: &PanelState, width: f32, execute: Execute
         views(ui, state, width, execute);
     }
     ui.add_space(8.0);
-    if ui.add(Button::new(texts::RESET).min_size(vec2(width, ROW_HEIGHT))).tell(texts::RESET_HINT).clicked() {
-        execute(Command::Reset);
-    }
+    let reset = Button::new(texts::RESET).min_size(vec2(width, ROW_HEIGHT));
+    ui.add(reset).tell(texts::RESET_HINT).gives(Command::Reset, execute);
     ui.add_space(4.0);
     heading(ui, texts::ADVANCED);
     let elsewhere = [&start[..], &tools::of_clip(settings)[..], &[tools::depth_of_cut(state)]].concat();
@@ -122,19 +117,20 @@ pub(super) fn show(ui: &mut Ui, state: &PanelState, width: f32, execute: Execute
 
 /// Where a rendering is seen from.
 fn views(ui: &mut Ui, state: &PanelState, width: f32, execute: Execute) {
-    let is_there = |v| state.scene.is_some_and(|scene| view::is_seen_from(scene, v));
-    let views = names::VIEWPOINTS;
-    row_of(ui, texts::VIEW_FROM, &views, (4, width), is_there, hints::of_viewpoint, |v| execute(Command::LookFrom(v)));
+    let is_seen_from = |v| state.scene.is_some_and(|scene| view::is_seen_from(scene, v));
+    let is_there = |command| matches!(command, Command::LookFrom(v) if is_seen_from(v));
+    let views = names::VIEWPOINTS.map(|(v, name)| (Command::LookFrom(v), [name, hints::of_viewpoint(v)]));
+    row_of(ui, texts::VIEW_FROM, &views, (4, width), is_there, execute);
     let turntable = Button::selectable(state.is_turning, texts::TURNTABLE).frame_when_inactive(true);
-    if ui.add(turntable.min_size(vec2(width, ROW_HEIGHT))).tell(texts::TURNTABLE_HINT).clicked() {
-        execute(Command::Turntable);
-    }
+    let turntable = ui.add(turntable.min_size(vec2(width, ROW_HEIGHT)));
+    turntable.tell(texts::TURNTABLE_HINT).gives(Command::Turntable, execute);
 }
 
 /// Shows the colours: of a volume those of its transfer function, and whose opacities it has; of other modes those of the picture.
 fn show_colours(ui: &mut Ui, settings: &Settings, width: f32, execute: Execute) {
     let is_volume = matches!(settings.mode, Mode::Volume | Mode::Mixed);
-    let of_volume = TRANSFERS.map(|(transfer, name)| (Command::Transfer(transfer), name));
+    let of_volume = TRANSFERS.map(|(transfer, name)| (Command::Transfer(transfer), [name, texts::COLOUR_HINT]));
+    let of_picture = OF_PICTURE.map(|(map, name)| (Command::ColourMap(map), [name, texts::COLOUR_HINT]));
     let is_chosen = |colour| match colour {
         Command::Transfer(name) => match settings.volume.colour {
             Some(colour) => colour == name,
@@ -142,13 +138,14 @@ fn show_colours(ui: &mut Ui, settings: &Settings, width: f32, execute: Execute) 
         },
         colour => colour == Command::ColourMap(settings.post.colour_map),
     };
-    let colours = if is_volume { &of_volume[..] } else { &OF_PICTURE };
-    row_of(ui, texts::COLOUR, colours, (3, width), is_chosen, |_| texts::COLOUR_HINT, &mut *execute);
+    let colours = if is_volume { &of_volume[..] } else { &of_picture };
+    row_of(ui, texts::COLOUR, colours, (3, width), is_chosen, execute);
     if is_volume {
-        let mut opacities = vec![(Command::Opacity(None), texts::SAME_AS_COLOUR)];
-        opacities.extend(TRANSFERS.map(|(transfer, name)| (Command::Opacity(Some(transfer)), name)));
+        let about = |(of, name)| (Command::Opacity(of), [name, texts::OPACITY_OF_HINT]);
+        let named = TRANSFERS.map(|(transfer, name)| (Some(transfer), name));
+        let opacities: Vec<_> = [(None, texts::SAME_AS_COLOUR)].into_iter().chain(named).map(about).collect();
         let is_chosen = |opacity| opacity == Command::Opacity(settings.volume.opacity);
-        row_of(ui, texts::OPACITY_OF, &opacities, (4, width), is_chosen, |_| texts::OPACITY_OF_HINT, execute);
+        row_of(ui, texts::OPACITY_OF, &opacities, (4, width), is_chosen, execute);
     }
 }
 

@@ -4,8 +4,8 @@ use super::canvas::Canvas;
 use super::colours::{ACCENT, BACKING, MEASURE, OUTLINE, TEXT, WARNING, WEAK_TEXT};
 use super::names::{self, Tell};
 use super::overlays::first;
-use super::widgets::say_step;
-use super::{Execute, PanelState, ROW_HEIGHT, SMALL_TEXT, ShownPicture, TEXT_SIZE, heading, icons, rail};
+use super::widgets::{cell, say_step};
+use super::{Execute, PanelState, ROW_HEIGHT, SMALL_TEXT, ShownPicture, TEXT_SIZE, icons, rail, section};
 use crate::command::{Command, Effect, Tool};
 use crate::measure::outcome::{self, Quantity};
 use crate::measure::overlay::{self, Drawn};
@@ -26,7 +26,11 @@ const MEASURING: [(MeasureKind, &str); 7] = [
     (MeasureKind::Volume, texts::CONTOURS),
     (MeasureKind::Threshold, texts::AUTOMATIC_VOLUME),
 ];
-const MARKING: [(MeasureKind, &str); 2] = [(MeasureKind::Text, texts::TEXT), (MeasureKind::Arrow, texts::ARROW)];
+const MARKING: [(Tool, &str); 3] = [
+    (Tool::Measure(MeasureKind::Text), texts::TEXT),
+    (Tool::Measure(MeasureKind::Arrow), texts::ARROW),
+    (Tool::BodyMark, texts::BODY_MARK),
+];
 
 /// Half the size of a cross, and the length of an arrow's head, points.
 const CROSS: f32 = 5.0;
@@ -40,40 +44,35 @@ pub(super) fn show_tools(ui: &mut Ui, state: &PanelState, width: f32, execute: E
             let gaps = ui.spacing().item_spacing.x * (row.len() - 1) as f32;
             // What counts at once has the longest name, alone in its row.
             let size = vec2((width - gaps) / row.len() as f32, ROW_HEIGHT);
-            ui.horizontal(|ui| row.iter().for_each(|(kind, name)| kind_button(ui, state, *kind, name, size, execute)));
+            ui.horizontal(|ui| {
+                row.iter().for_each(|(kind, name)| tool_button(ui, state, Tool::Measure(*kind), name, size, execute));
+            });
         }
     });
 }
 
 /// Shows the buttons of the tools for texts, arrows and body marks.
 pub(super) fn show_marks(ui: &mut Ui, state: &PanelState, width: f32, execute: Execute) {
-    names::group(ui, texts::TAB_MARKS, |ui| {
+    names::group(ui, texts::TAB_MARKS[0], |ui| {
         ui.add_space(2.0);
         let size = vec2((width - 2.0 * ui.spacing().item_spacing.x) / 3.0, ROW_HEIGHT);
-        ui.horizontal(|ui| {
-            MARKING.iter().for_each(|(kind, name)| kind_button(ui, state, *kind, name, size, execute));
-            let is_on = state.controls.tool() == Tool::BodyMark;
-            let marks = Button::selectable(is_on, texts::BODY_MARK).frame_when_inactive(true).min_size(size);
-            if ui.add(marks).tell(hints::of_tool(Tool::BodyMark)).clicked() {
-                execute(Command::Tool(if is_on { Tool::default() } else { Tool::BodyMark }));
-            }
-        });
+        ui.horizontal(|ui| MARKING.iter().for_each(|(tool, name)| tool_button(ui, state, *tool, name, size, execute)));
         if let Tool::Measure(kind @ (MeasureKind::Text | MeasureKind::Arrow)) = state.controls.tool() {
             say_next_step(ui, state, kind);
         }
     });
 }
 
-fn kind_button(ui: &mut Ui, state: &PanelState, kind: MeasureKind, name: &str, size: egui::Vec2, execute: Execute) {
-    let (command, is_on) = match kind {
-        MeasureKind::Threshold => (Command::MeasureBody, false),
-        kind => (Command::Tool(Tool::Measure(kind)), state.controls.tool() == Tool::Measure(kind)),
+fn tool_button(ui: &mut Ui, state: &PanelState, tool: Tool, name: &str, size: egui::Vec2, execute: Execute) {
+    let is_on = state.controls.tool() == tool && tool != Tool::Measure(MeasureKind::Threshold);
+    let command = match tool {
+        // It counts at once.
+        Tool::Measure(MeasureKind::Threshold) => Command::MeasureBody,
+        // A second click leaves the tool.
+        tool => Command::Tool(if is_on { Tool::default() } else { tool }),
     };
     let button = Button::selectable(is_on, name).frame_when_inactive(true).min_size(size);
-    if ui.add(button).tell(hints::of_measure(kind)).clicked() {
-        // A second click leaves the tool.
-        execute(if is_on { Command::Tool(Tool::default()) } else { command });
-    }
+    ui.add(button).tell(hints::of_tool(tool)).gives(command, execute);
 }
 
 /// Shows the list of results, `width` points wide, or a line that says that there are none.
@@ -84,25 +83,19 @@ pub(super) fn show_results(ui: &mut Ui, state: &PanelState, width: f32, execute:
         ui.add(Label::new(RichText::new(texts::NO_MEASUREMENTS).size(SMALL_TEXT).color(WEAK_TEXT)).wrap());
         return;
     }
-    names::group(ui, texts::MEASUREMENTS, |ui| results(ui, state, width, execute));
+    section(ui, texts::MEASUREMENTS, |ui| results(ui, state, width, execute));
 }
 
 fn results(ui: &mut Ui, state: &PanelState, width: f32, execute: Execute) {
     let measures = state.controls.measures();
-    heading(ui, texts::MEASUREMENTS);
     if let Tool::Measure(kind) = state.controls.tool() {
         say_next_step(ui, state, kind);
     }
     if let Some(work) = state.controls.work().filter(|work| work.kind.complete_at().is_none()) {
-        let name = if work.kind == MeasureKind::Volume && work.points.is_empty() {
-            texts::END_VOLUME
-        } else {
-            texts::CLOSE_CONTOUR
-        };
-        let size = vec2(width, ROW_HEIGHT);
-        if ui.add_sized(size, first(RichText::new(name))).tell(texts::END_TRACING_HINT).clicked() {
-            execute(Command::EndMeasure);
-        }
+        let is_between = work.kind == MeasureKind::Volume && work.points.is_empty();
+        let name = if is_between { texts::END_VOLUME } else { texts::CLOSE_CONTOUR };
+        let button = ui.add_sized(vec2(width, ROW_HEIGHT), first(RichText::new(name)));
+        button.tell(texts::END_TRACING_HINT).gives(Command::EndMeasure, execute);
     }
     for (n, measured) in measures.iter().enumerate() {
         ui.horizontal(|ui| {
@@ -117,8 +110,7 @@ fn results(ui: &mut Ui, state: &PanelState, width: f32, execute: Execute) {
             let text = RichText::new(format!("{} {name}{typing}", n + 1)).size(SMALL_TEXT);
             ui.spacing_mut().item_spacing.x = 4.0;
             let row = vec2((width - 32.0).max(40.0), ROW_HEIGHT);
-            ui.allocate_ui_with_layout(row, egui::Layout::left_to_right(egui::Align::Center), |ui| {
-                ui.set_min_width(row.x);
+            cell(ui, row, |ui| {
                 let rest = found.iter().map(|q| format!("{}: {}", q.name, q.shown()));
                 let hint: Vec<String> = rest.chain([texts::TYPE_TEXT_HINT.to_string()]).collect();
                 ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
@@ -127,32 +119,25 @@ fn results(ui: &mut Ui, state: &PanelState, width: f32, execute: Execute) {
                         let label = ui.add(Label::new(text).truncate().sense(egui::Sense::click()));
                         let spoken = format!("{} {name} {main}", n + 1);
                         let label = label.tell(&hint.join("\n")).with_role(Role::Button);
-                        if label.named(spoken.trim_end()).clicked() {
-                            execute(Command::LabelMeasure(n));
-                        }
+                        label.named(spoken.trim_end()).gives(Command::LabelMeasure(n), execute);
                     });
                 });
             });
             let delete = rail::icon_button(ui, icons::CLOSE, ("", texts::DELETE), vec2(26.0, 28.0), (true, false));
             let delete = delete.tell(texts::DELETE_MEASUREMENT_HINT);
-            if delete.named(&texts::delete_measurement(n + 1)).clicked() {
-                execute(Command::DeleteMeasure(n));
-            }
+            delete.named(&texts::delete_measurement(n + 1)).gives(Command::DeleteMeasure(n), execute);
         });
     }
     if !measures.is_empty() {
-        let gap = ui.spacing().item_spacing.x;
-        let third = vec2((width - 2.0 * gap) / 3.0, ROW_HEIGHT);
+        let third = vec2((width - 2.0 * ui.spacing().item_spacing.x) / 3.0, ROW_HEIGHT);
         ui.horizontal(|ui| {
-            for (command, name, hint) in [
-                (Command::CopyMeasures, texts::COPY, texts::COPY_HINT),
-                (Command::SaveMeasures, texts::SAVE, texts::SAVE_RESULTS_HINT),
-                (Command::ClearMeasures, texts::CLEAR, texts::CLEAR_HINT),
+            for (command, [name, hint]) in [
+                (Command::CopyMeasures, texts::COPY),
+                (Command::SaveMeasures, [texts::SAVE, texts::SAVE_RESULTS_HINT]),
+                (Command::ClearMeasures, texts::CLEAR),
             ] {
                 let button = Button::new(RichText::new(name).size(SMALL_TEXT + 1.0)).min_size(third);
-                if ui.add(button).tell(hint).clicked() {
-                    execute(command);
-                }
+                ui.add(button).tell(hint).gives(command, execute);
             }
         });
     }
@@ -180,7 +165,7 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
     if is_empty {
         return;
     }
-    let hover = ui.ctx().pointer_hover_pos().filter(|at| canvas.painter.clip_rect().contains(*at));
+    let hover = canvas.hovered(ui);
     for mut drawn in overlay::drawn(scene, Some(*volume), measures) {
         if state.controls.typing() == Some(drawn.index) {
             drawn.label.push('_');
@@ -191,8 +176,7 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
         let place = outline.last().map(|at| canvas.at(*at)).or(hover);
         // On a plane in its scale.
         let on_plane = place.and_then(|at| {
-            let pixel: [f32; 2] = ((at - canvas.origin) * scale).into();
-            let [x, y] = pixel.map(|n| n.max(0.0) as usize);
+            let [x, y] = canvas.pixel(at).map(|n| n.max(0.0) as usize);
             scene.cuts_planes().then(|| scene.tiling().tile_at(x, y).map(|tile| tile.pixel)).flatten()
         });
         let place = place.filter(|_| on_plane.is_some() == (state.controls.tool() == Tool::Labels) || !scene.is_flat());
@@ -211,7 +195,7 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
         canvas.lines(&canvas.painter, &ends.map(|ends| ends.map(|at| canvas.at(at))).collect::<Vec<_>>(), MEASURE);
     }
     if let Some(work) = state.controls.work() {
-        let hover = hover.and_then(|at| place_at(scene, ((at - canvas.origin) * scale).into()));
+        let hover = hover.and_then(|at| place_at(scene, canvas.pixel(at)));
         let hover = hover.filter(|_| !work.on_surface);
         let is_curved = hover.is_some_and(|(_, is_curved)| is_curved);
         overlay::preview(scene, measures.len() + 1, work, hover.map(|(point, _)| point), is_curved)
@@ -221,12 +205,8 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
 }
 
 /// The point of the settings that a plane shows at a position on the picture, mm; and whether that is a curved plane.
-fn place_at(scene: &Scene, at: [f32; 2]) -> Option<([f64; 3], bool)> {
-    if !scene.cuts_planes() {
-        return None;
-    }
-    let tiling = scene.tiling();
-    let at = at.map(f64::from);
+fn place_at(scene: &Scene, at: [f64; 2]) -> Option<([f64; 3], bool)> {
+    let tiling = scene.cuts_planes().then(|| scene.tiling())?;
     let tile = tiling.tile_at(at[0].max(0.0) as usize, at[1].max(0.0) as usize)?;
     Some((scene.point_of(tiling.point(tile, at)), tile.section.is_some()))
 }

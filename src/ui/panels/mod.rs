@@ -96,6 +96,7 @@ impl PanelOutput {
 }
 
 /// The panels of one window: controls, messages and annotations around and over the picture.
+#[derive(Default)]
 pub(super) struct Panels {
     context: egui::Context,
     egui_input: EguiInput,
@@ -111,17 +112,9 @@ pub(super) struct Panels {
 impl Panels {
     /// `scale`: pixels per point, limited to 0.5..=4; a larger one enlarges everything.
     pub(super) fn new(scale: f32) -> Panels {
-        let context = egui::Context::default();
-        apply_theme(&context);
-        let scale = scale.clamp(0.5, 4.0);
-        Panels {
-            context,
-            egui_input: EguiInput::default(),
-            scale,
-            is_described: false,
-            gets_focus: false,
-            thumbnails: presets::Textures::default(),
-        }
+        let panels = Panels { scale: scale.clamp(0.5, 4.0), ..Panels::default() };
+        apply_theme(&panels.context);
+        panels
     }
 
     pub(super) fn scale(&self) -> f32 {
@@ -244,7 +237,7 @@ impl Panels {
         let listed = state.presets.as_ref().map_or(Vec::new(), |shown| pictures(&shown.tiles));
         let compared = state.compared.map(Shown::pictures).unwrap_or_default();
         let [looks, thumbnails, of_loop, compared] =
-            self.thumbnails.of(&self.context, [&pictures(&state.looks), &listed, state.loop_pictures, &compared]);
+            self.thumbnails.of(&self.context, [&pictures(&state.small.looks), &listed, state.small.of_loop, &compared]);
         // egui may lay out twice, to place what it sees for the first time: the inputs are in the first.
         let output = self.context.run_ui(input, |ui| {
             let from_panels = commands.len();
@@ -275,12 +268,11 @@ impl Panels {
             compared::paint(ui, state, &compared, self.scale);
             let taken = recordings::show_reading(ui, state, self.scale, execute);
             let messages = overlays::show_notes(ui, state, self.scale, taken);
-            match state.visible.panels {
-                true if state.picture.is_some() => annotations::paint(ui, state, self.scale, &messages),
-                false if state.picture.is_some() => annotations::paint_origin(ui, state, self.scale),
-                _ => {}
-            }
             if state.picture.is_some() {
+                match state.visible.panels {
+                    true => annotations::paint(ui, state, self.scale, &messages),
+                    false => annotations::paint_origin(ui, state, self.scale),
+                }
                 region::paint(ui, state, self.scale);
                 curve::paint(ui, state, self.scale);
                 measures::paint(ui, state, self.scale);
@@ -494,23 +486,12 @@ pub(super) struct PanelState<'a> {
     pub(super) reading: Option<&'a Reading>,
     /// The list of presets; None while it is not shown.
     pub(super) presets: Option<PresetsShown<'a>>,
-    /// True if thumbnails of presets and volumes are drawn.
-    pub(super) has_small_pictures: bool,
-    /// All presets, with their thumbnails, for the inspector.
-    pub(super) looks: Vec<PresetTile<'a>>,
-    /// The thumbnail of each volume of the cine loop; None for one that is not drawn yet.
-    pub(super) loop_pictures: &'a [Option<Arc<Picture>>],
+    pub(super) small: SmallPictures<'a>,
     /// True if the turntable runs.
     pub(super) is_turning: bool,
     /// Name and progress of the running export; None if none runs.
     pub(super) exporting: Option<(&'a str, Option<Progress>)>,
-    pub(super) is_frozen: bool,
-    /// True if frames come from a probe or a pipe.
-    pub(super) is_live: bool,
-    /// True if the picture with the effect of the user's last action takes long.
-    pub(super) is_late: bool,
-    /// Time since the probe or the pipe ended, since when the picture is not live; None if it has not.
-    pub(super) ended: Option<Duration>,
+    pub(super) timeliness: Timeliness,
     pub(super) cine: CineState,
     /// Name of the current rung of the quality ladder, and the frame budget (None: no limit).
     pub(super) quality: (&'a str, Option<Duration>),
@@ -518,18 +499,47 @@ pub(super) struct PanelState<'a> {
     pub(super) notes: &'a [Note],
     /// Name of the key combination that ends the program, for the help.
     pub(super) exit_key: &'a str,
-    /// Where the pointer is drawn, pixels of the window; `None` if the window system draws it.
-    pub(super) pointer: Option<[f64; 2]>,
-    /// How the pointer that keys move is drawn; None while it is off.
-    pub(super) keyboard_pointer: Option<PointerMark>,
+    pub(super) pointers: Pointers,
     /// The volume that is compared with the shown one; None if none is.
     pub(super) compared: Option<&'a Shown>,
+}
+
+/// Whether the picture shows what is there now.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Timeliness {
+    pub(super) is_frozen: bool,
+    /// True if frames come from a probe or a pipe.
+    pub(super) is_live: bool,
+    /// True if the picture with the effect of the user's last action takes long.
+    pub(super) is_late: bool,
+    /// Time since the probe or the pipe ended, since when the picture is not live; None if it has not.
+    pub(super) ended: Option<Duration>,
+}
+
+/// The pointers that the panels draw.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Pointers {
+    /// Where that of the mouse is drawn, pixels of the window; None if the window system draws it.
+    pub(super) of_mouse: Option<[f64; 2]>,
+    /// How the pointer that keys move is drawn; None while it is off.
+    pub(super) of_keys: Option<PointerMark>,
+}
+
+/// Thumbnails in the panels.
+pub(super) struct SmallPictures<'a> {
+    /// True if thumbnails of presets and volumes are drawn.
+    pub(super) are_drawn: bool,
+    /// All presets, with their thumbnails, for the inspector.
+    pub(super) looks: Vec<PresetTile<'a>>,
+    /// The thumbnail of each volume of the cine loop; None for one that is not drawn yet.
+    pub(super) of_loop: &'a [Option<Arc<Picture>>],
 }
 
 impl PanelState<'_> {
     /// How far a live picture is behind what arrives, in words, if it is by more than a second.
     fn delay(&self) -> Option<String> {
-        let is_live = self.is_live && !self.is_frozen && self.ended.is_none();
+        let Timeliness { is_live, is_frozen, ended, .. } = self.timeliness;
+        let is_live = is_live && !is_frozen && ended.is_none();
         self.times.delay().filter(|_| is_live).map(|s| texts::behind(format!("{s:.1} s")))
     }
 }
@@ -585,12 +595,10 @@ impl Room {
             columns: 1,
             has_top: above > 0.0,
             has_drawer: right == 0.0 && below > 0.0,
-            has_tools_tab: below > 0.0 && (left == 0.0 || !rail::has_all(points[1] - above - below)),
+            has_tools_tab: below > 0.0 && (left == 0.0 || rail::button_height(points[1] - above - below).is_none()),
         }
     }
-}
 
-impl Room {
     /// This room with its picture divided into up to four tiles.
     pub(super) fn divided(self, tiles: usize) -> Room {
         if tiles < 2 {
@@ -616,9 +624,22 @@ fn heading(ui: &mut egui::Ui, text: &str) {
     ui.label(egui::RichText::new(text).size(SMALL_TEXT).color(WEAK_TEXT));
 }
 
+/// A group of controls below its name.
+fn section(ui: &mut egui::Ui, title: &str, add: impl FnOnce(&mut egui::Ui)) {
+    names::group(ui, title, |ui| {
+        heading(ui, title);
+        add(ui);
+    });
+}
+
 /// The area of the picture in points.
 fn picture_rect(state: &PanelState, scale: f32) -> Rect {
-    let ([x, y], [w, h]) = state.room.picture;
+    tile_rect(state, 0, scale)
+}
+
+/// The area of a tile in points; 0 is the picture.
+fn tile_rect(state: &PanelState, n: u32, scale: f32) -> Rect {
+    let ([x, y], [w, h]) = state.room.tile(n);
     let [x, y, w, h] = [x, y, w, h].map(|n| n as f32 / scale);
     Rect::from_min_size(pos2(x, y), vec2(w, h))
 }

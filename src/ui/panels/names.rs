@@ -2,9 +2,9 @@
 //! which is served to the desktop's screen readers; this adds what egui cannot know.
 
 use super::colours::{FOCUS, FOCUS_EDGE};
-use super::{PanelState, picture_rect};
-use crate::command::Viewpoint;
-use crate::scene::{Layout, PlaneName, Scene};
+use super::{Execute, PanelState, picture_rect};
+use crate::command::{Command, Viewpoint};
+use crate::scene::{Layout, Scene};
 use crate::texts;
 use crate::view;
 use egui::accesskit::{Action, Live, Node, Rect as Bounds, Role};
@@ -23,55 +23,53 @@ fn node(context: &Context, id: Id, change: impl FnOnce(&mut Node)) {
     _ = context.accesskit_node_builder(id, change);
 }
 
-/// Adds to a control what a screen reader says about it.
-pub(super) trait Tell {
+/// Adds to a control what a screen reader says about it, and what it does.
+pub(super) trait Tell: Sized {
+    /// Changes the node of the tree that stands for the control.
+    fn with(self, change: impl FnOnce(&mut Node)) -> Response;
     /// Adds a tooltip, which is also the description of the control.
     fn tell(self, hint: &str) -> Response;
+    /// Gives this command when the control is clicked.
+    fn gives(self, command: Command, execute: Execute);
+
     /// Sets a name that takes the place of the text on the control.
-    fn named(self, name: &str) -> Response;
-    fn with_role(self, role: Role) -> Response;
-    /// Sets the value of the control in words, with its unit.
-    fn with_value(self, value: &str) -> Response;
-    /// Says whether the list or panel that the control opens is open.
-    fn expanded(self, is_open: bool) -> Response;
-    /// Says whether the control is the tab whose content is shown.
-    fn chosen(self, is_chosen: bool) -> Response;
-}
-
-impl Tell for Response {
-    fn tell(self, hint: &str) -> Response {
-        keep_in_view(&self);
-        node(&self.ctx, self.id, |node| node.set_description(hint));
-        self.on_hover_text(hint)
-    }
-
     fn named(self, name: &str) -> Response {
-        node(&self.ctx, self.id, |node| node.set_label(name));
-        self
+        self.with(|node| node.set_label(name))
     }
 
     fn with_role(self, role: Role) -> Response {
-        node(&self.ctx, self.id, |node| node.set_role(role));
-        self
+        self.with(|node| node.set_role(role))
     }
 
+    /// Sets the value of the control in words, with its unit.
     fn with_value(self, value: &str) -> Response {
-        node(&self.ctx, self.id, |node| node.set_value(value));
-        self
+        self.with(|node| node.set_value(value))
     }
 
+    /// Says whether the list or panel that the control opens is open.
     fn expanded(self, is_open: bool) -> Response {
-        keep_in_view(&self);
-        node(&self.ctx, self.id, |node| node.set_expanded(is_open));
+        self.with(|node| node.set_expanded(is_open))
+    }
+}
+
+impl Tell for Response {
+    fn with(self, change: impl FnOnce(&mut Node)) -> Response {
+        node(&self.ctx, self.id, change);
         self
     }
 
-    fn chosen(self, is_chosen: bool) -> Response {
-        node(&self.ctx, self.id, |node| {
-            node.clear_toggled();
-            node.set_selected(is_chosen);
-        });
-        self
+    fn tell(self, hint: &str) -> Response {
+        // A control that just got the keyboard comes into sight.
+        if self.gained_focus() {
+            self.scroll_to_me(None);
+        }
+        self.with(|node| node.set_description(hint)).on_hover_text(hint)
+    }
+
+    fn gives(self, command: Command, execute: Execute) {
+        if self.clicked() {
+            execute(command);
+        }
     }
 }
 
@@ -106,21 +104,20 @@ pub(super) fn name(ui: &Ui, role: Role, name: &str) {
 }
 
 /// Adds a list with this name for screen readers. `add` adds its entries.
-pub(super) fn list<R>(ui: &mut Ui, title: &str, add: impl FnOnce(&mut Ui) -> R) -> R {
-    ui.scope(|ui| {
-        name(ui, Role::List, title);
-        add(ui)
-    })
-    .inner
+pub(super) fn list(ui: &mut Ui, title: &str, add: impl FnOnce(&mut Ui)) {
+    part(ui, Role::List, title, add);
 }
 
 /// Adds a group with this name for screen readers. `add` adds its controls.
-pub(super) fn group<R>(ui: &mut Ui, title: &str, add: impl FnOnce(&mut Ui) -> R) -> R {
+pub(super) fn group(ui: &mut Ui, title: &str, add: impl FnOnce(&mut Ui)) {
+    part(ui, Role::Group, title, add);
+}
+
+fn part(ui: &mut Ui, role: Role, title: &str, add: impl FnOnce(&mut Ui)) {
     ui.scope(|ui| {
-        name(ui, Role::Group, title);
-        add(ui)
-    })
-    .inner
+        name(ui, role, title);
+        add(ui);
+    });
 }
 
 /// Announces a message to a screen reader, which reads a fault at once and others when it has finished.
@@ -154,7 +151,7 @@ fn in_words(state: &PanelState) -> (String, String) {
         Layout::Four | Layout::Beside => texts::WITH_THREE_PLANES,
         Layout::Pair => texts::BESIDE_THE_VOLUME,
     };
-    let time = match (state.is_frozen, state.ended) {
+    let time = match (state.timeliness.is_frozen, state.timeliness.ended) {
         (true, _) => texts::IS_FROZEN,
         (false, None) => texts::IS_LIVE,
         (false, Some(_)) => texts::HAS_ENDED,
@@ -167,33 +164,28 @@ fn in_words(state: &PanelState) -> (String, String) {
         _ => String::new(),
     };
     let count = state.controls.measures().len();
-    let drawn = if state.is_late { texts::IS_DRAWN } else { "" };
+    let drawn = if state.timeliness.is_late { texts::IS_DRAWN } else { "" };
     (name, format!("{drawn}{volume}{}", texts::count_of_measurements(count)))
 }
 
 fn view_in_words(scene: &Scene) -> String {
     let settings = &scene.settings;
     if scene.is_flat() {
-        let plane = match settings.planes.plane {
-            PlaneName::A => "A",
-            PlaneName::B => "B",
-            PlaneName::C => "C",
-        };
+        let plane = settings.planes.plane.letter();
         let curved = scene.curve().map_or(String::new(), |curve| texts::with_curved_plane(curve.plane.letter()));
         return if scene.shows_three() { curved } else { texts::of_plane(plane) + &curved };
     }
-    let side = VIEWPOINTS.iter().find(|(viewpoint, _)| view::is_seen_from(scene, *viewpoint));
-    match side {
+    match VIEWPOINTS.iter().find(|(viewpoint, _)| view::is_seen_from(scene, *viewpoint)) {
         Some((_, side)) => texts::seen_from(side.to_lowercase()),
-        None => {
-            let camera = &settings.camera;
-            texts::turned_to(camera.azimuth, camera.elevation)
-        }
+        None => texts::turned_to(settings.camera.azimuth, settings.camera.elevation),
     }
 }
 
-/// True if a slider was changed by the keyboard or a screen reader. (egui also reports changes without any input.)
+/// True if the pointer, the keyboard or a screen reader moves a slider. egui also reports a change when it rounds a value to the step, without any input.
 pub(super) fn asks_for_value(ui: &Ui, slider: &Response) -> bool {
+    if slider.dragged() || slider.clicked() || slider.is_pointer_button_down_on() {
+        return true;
+    }
     let has_focus = slider.has_focus();
     ui.input(|input| {
         let is_stepped = has_focus && (input.key_pressed(Key::ArrowLeft) || input.key_pressed(Key::ArrowRight));
@@ -202,19 +194,16 @@ pub(super) fn asks_for_value(ui: &Ui, slider: &Response) -> bool {
     })
 }
 
-/// Scrolls to a control that just got the keyboard.
-fn keep_in_view(control: &Response) {
-    if control.gained_focus() {
-        control.scroll_to_me(None);
-    }
-}
+/// The frame of the focused control, and the ring around the pointer by keyboard: bright with a dark outline, so that they are visible on every colour.
+pub(super) const FOCUS_STROKES: [Stroke; 2] =
+    [Stroke { width: 5.0, color: FOCUS_EDGE }, Stroke { width: 2.5, color: FOCUS }];
 
-/// Draws the frame around the focused control: bright with a dark outline, so that it is visible on every colour.
+/// Draws the frame around the focused control.
 pub(super) fn mark_focus(context: &Context) {
     let focused = context.memory(|memory| memory.focused()).and_then(|id| context.read_response(id));
     let Some(control) = focused else { return };
     let painter = context.layer_painter(control.layer_id);
-    let area = control.rect.expand(1.0);
-    painter.rect_stroke(area, 6.0, Stroke::new(5.0, FOCUS_EDGE), StrokeKind::Middle);
-    painter.rect_stroke(area, 6.0, Stroke::new(2.5, FOCUS), StrokeKind::Middle);
+    for stroke in FOCUS_STROKES {
+        painter.rect_stroke(control.rect.expand(1.0), 6.0, stroke, StrokeKind::Middle);
+    }
 }

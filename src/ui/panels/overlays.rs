@@ -2,15 +2,16 @@
 
 use super::annotations;
 use super::colours::{
-    ACCENT, BAR, FAULT, FOCUS, FOCUS_EDGE, GOOD, MESSAGE, ON_SELECTED, PANEL, POINTER, SELECTED, SHADE, TEXT, WARNING,
+    ACCENT, BAR, FAULT, FOCUS_EDGE, GOOD, MESSAGE, ON_SELECTED, PANEL, POINTER, SELECTED, SHADE, TEXT, WARNING,
     WEAK_TEXT, WHOLE_BAR,
 };
 use super::names::{self, Tell};
-use super::widgets::{BETWEEN_MESSAGES, MESSAGE_EDGES, message_frame};
+use super::widgets::{BETWEEN_MESSAGES, MESSAGE_EDGES, cell, message_frame};
 use super::{Execute, LARGE_TEXT, Note, PanelState, SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE, picture_rect};
 use crate::command::Command;
 use crate::texts::keys;
 use crate::texts::{self, Unsaved};
+use crate::times::RecentTimes;
 use egui::accesskit::Role;
 use egui::text::LayoutJob;
 use egui::{
@@ -37,14 +38,7 @@ struct Message {
 
 impl Message {
     /// Lays texts out in so much room for a message, each with its size and colour. What has no room ends in dots.
-    fn new(
-        ui: &Ui,
-        texts: &[(&str, f32, Color32)],
-        room: Vec2,
-        edge: Color32,
-        spoken: String,
-        is_fault: bool,
-    ) -> Message {
+    fn new(ui: &Ui, texts: &[(&str, f32, Color32)], room: Vec2, edge: Color32, is_fault: bool) -> Message {
         let [across, down] = MESSAGE_FRAME;
         let width = (room.x - across).clamp(60.0, 760.0);
         let mut left = room.y - down;
@@ -62,17 +56,15 @@ impl Message {
             left -= galley.size().y + BETWEEN_MESSAGES;
             parts.push(galley);
         }
+        let spoken = texts.iter().map(|(text, ..)| *text).collect::<Vec<_>>().join(". ");
         Message { parts, edge, spoken, is_fault }
     }
 
-    fn height(&self) -> f32 {
-        let gaps = self.parts.len().saturating_sub(1) as f32 * BETWEEN_MESSAGES;
-        self.parts.iter().map(|part| part.size().y).sum::<f32>() + gaps + MESSAGE_FRAME[1]
-    }
-
     fn size(&self) -> Vec2 {
-        let width = self.parts.iter().map(|part| part.size().x).fold(0.0, f32::max);
-        vec2(width + MESSAGE_FRAME[0], self.height())
+        let gaps = self.parts.len().saturating_sub(1) as f32 * BETWEEN_MESSAGES;
+        let sizes = self.parts.iter().map(|part| part.size());
+        let size = sizes.fold(Vec2::ZERO, |all, one| vec2(all.x.max(one.x), all.y + one.y));
+        vec2(size.x + MESSAGE_FRAME[0], size.y + gaps + MESSAGE_FRAME[1])
     }
 
     fn show(self, ui: &mut Ui) {
@@ -94,19 +86,17 @@ pub(super) fn show_notes(ui: &mut Ui, state: &PanelState, scale: f32, taken: f32
     let marks = if state.visible.panels { annotations::areas(state, scale) } else { Default::default() };
     // Messages are narrower where whole ones would cover a mark; and the newest one is alone where all would.
     let attempts = [usize::MAX, 1].into_iter().flat_map(|count| WIDTHS.map(|share| (count, share)));
-    let placed = attempts.map(|(count, share)| messages(ui, state, picture, taken, (count, share), &marks));
-    let mut least: Option<Messages> = None;
-    for messages in placed {
-        if least.as_ref().is_none_or(|least| messages.covered < least.covered) {
-            least = Some(messages);
-        }
-        if least.as_ref().is_some_and(|least| least.covered == 0.0) {
-            break;
+    let mut placed = attempts.map(|(count, share)| messages(ui, state, picture, taken, (count, share), &marks));
+    let Some(mut least) = placed.next() else { return Vec::new() };
+    while least.covered != 0.0
+        && let Some(messages) = placed.next()
+    {
+        if messages.covered < least.covered {
+            least = messages;
         }
     }
-    let Some(Messages { banner, notes, .. }) = least else { return Vec::new() };
     let mut areas = Vec::new();
-    for (name, place, messages) in [("banner", banner.0, banner.1), ("notes", notes.0, notes.1)] {
+    for (name, (place, messages)) in [("banner", least.banner), ("notes", least.notes)] {
         if messages.is_empty() {
             continue;
         }
@@ -146,22 +136,21 @@ fn messages(
     let room = vec2((picture.width() - 24.0) * share, picture.height() - above - below);
     let note = |note: &Note| {
         let texts = [(note.text.as_str(), text_size, TEXT)];
-        Message::new(ui, &texts, room, if note.is_fault { FAULT } else { ACCENT }, note.text.clone(), note.is_fault)
+        Message::new(ui, &texts, room, if note.is_fault { FAULT } else { ACCENT }, note.is_fault)
     };
-    let newest = state.notes.last().map_or(0.0, |newest| note(newest).height() + BETWEEN_MESSAGES);
+    let newest = state.notes.last().map_or(0.0, |newest| note(newest).size().y + BETWEEN_MESSAGES);
     let banner = state.banner.as_ref().map(|banner| {
         let colour = if banner.is_fault { FAULT } else { WARNING };
         let texts = [(banner.title.as_str(), title_size, colour), (banner.text.as_str(), text_size, TEXT)];
-        let spoken = format!("{}. {}", banner.title, banner.text);
-        Message::new(ui, &texts, vec2(room.x, room.y - newest), colour, spoken, banner.is_fault)
+        Message::new(ui, &texts, vec2(room.x, room.y - newest), colour, banner.is_fault)
     });
-    let banner = banner.filter(|banner| banner.height() + newest <= room.y);
-    let mut left = room.y - banner.as_ref().map_or(0.0, |banner| banner.height() + BETWEEN_MESSAGES);
+    let banner = banner.filter(|banner| banner.size().y + newest <= room.y);
+    let mut left = room.y - banner.as_ref().map_or(0.0, |banner| banner.size().y + BETWEEN_MESSAGES);
     // In the centre without a picture and without notes, at the top over one.
     let is_at_top = state.picture.is_some() || !state.notes.is_empty();
     let mut shown: Vec<Message> = Vec::new();
     for message in state.notes.iter().rev().take(count).map(note) {
-        left -= message.height() + BETWEEN_MESSAGES;
+        left -= message.size().y + BETWEEN_MESSAGES;
         if left < -BETWEEN_MESSAGES && !shown.is_empty() {
             break;
         }
@@ -226,7 +215,7 @@ const MAX_PASSES: usize = 9;
 pub(super) fn show_times(ui: &mut Ui, state: &PanelState, scale: f32) {
     let at = picture_rect(state, scale).left_top() + vec2(12.0, 12.0);
     Area::new(Id::new("times")).order(Order::Middle).fixed_pos(at).interactable(false).show(ui.ctx(), |ui| {
-        names::name(ui, Role::Group, texts::TIMES);
+        names::name(ui, Role::Group, texts::TIMES[0]);
         let frame = Frame::new().fill(MESSAGE).inner_margin(Margin::same(12)).corner_radius(8);
         frame.show(ui, |ui| {
             ui.set_width(WIDTH);
@@ -241,6 +230,7 @@ pub(super) fn show_times(ui: &mut Ui, state: &PanelState, scale: f32) {
 fn figures(ui: &mut Ui, state: &PanelState) {
     let times = state.times;
     let ms = |value: Option<f64>| value.map_or("-".into(), texts::milliseconds);
+    let percentiles = |of: &RecentTimes| [0.5, 0.95].map(|share| ms(of.percentile(share)));
     let (quality, budget) = state.quality;
     let colour_of_time = match (budget, times.pictures.percentile(0.95)) {
         (Some(budget), Some(p95)) if p95 > budget.as_secs_f64() * 1e3 => WARNING,
@@ -249,11 +239,8 @@ fn figures(ui: &mut Ui, state: &PanelState) {
     };
     ui.label(RichText::new(texts::picture_time(ms(times.pictures.newest()))).size(LARGE_TEXT).color(colour_of_time));
     let budget = budget.map_or(texts::NO_BUDGET.into(), |b| texts::budget(b.as_secs_f64() * 1e3));
-    small(
-        ui,
-        texts::picture_times(ms(times.pictures.percentile(0.5)), ms(times.pictures.percentile(0.95)), budget),
-        WEAK_TEXT,
-    );
+    let [p50, p95] = percentiles(&times.pictures);
+    small(ui, texts::picture_times(p50, p95, budget), WEAK_TEXT);
     small(ui, quality.to_string(), ACCENT);
     small(ui, texts::rates(times.volumes, times.frames, times.shown), TEXT);
     if let Some(acquisition_time) = times.acquisition_time.filter(|f| *f > 0.0) {
@@ -261,13 +248,10 @@ fn figures(ui: &mut Ui, state: &PanelState) {
         small(ui, texts::acquisition(acquisition_time * 1e3, share), WEAK_TEXT);
     }
     small(ui, texts::frame_to_picture(ms(times.latency)), TEXT);
-    small(
-        ui,
-        texts::input_to_picture(ms(times.input_latency.percentile(0.5)), ms(times.input_latency.percentile(0.95))),
-        TEXT,
-    );
+    let [p50, p95] = percentiles(&times.input_latency);
+    small(ui, texts::input_to_picture(p50, p95), TEXT);
     if times.scan_out.newest().is_some() {
-        let [p50, p95] = [0.5, 0.95].map(|share| ms(times.scan_out.percentile(share)));
+        let [p50, p95] = percentiles(&times.scan_out);
         small(ui, texts::presentation_to_monitor(p50, p95), TEXT);
     }
     let colour = if times.dropped + times.lost > 0 { WARNING } else { WEAK_TEXT };
@@ -275,23 +259,21 @@ fn figures(ui: &mut Ui, state: &PanelState) {
 }
 
 fn bars(ui: &mut Ui, state: &PanelState) {
-    let mut passes: Vec<(&str, f64)> =
-        state.times.passes.iter().map(|(name, mean, runs)| (*name, mean * *runs as f64)).collect();
-    let all: f64 = passes.iter().map(|p| p.1).sum();
+    // Each with its mean time, and with that of all its runs.
+    let mut passes: Vec<(&str, f64, f64)> =
+        state.times.passes.iter().map(|(name, mean, runs)| (*name, *mean, mean * *runs as f64)).collect();
+    let all: f64 = passes.iter().map(|p| p.2).sum();
     if all <= 0.0 {
-        small(ui, texts::NO_TIMES.into(), WEAK_TEXT);
-        return;
+        return small(ui, texts::NO_TIMES.into(), WEAK_TEXT);
     }
-    passes.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let rest: f64 = passes.iter().skip(MAX_PASSES).map(|p| p.1).sum();
-    let more = passes.len().saturating_sub(MAX_PASSES);
-    passes.truncate(MAX_PASSES);
-    for (name, time) in &passes {
-        let mean = state.times.passes.iter().find(|(n, ..)| n == name).map_or(0.0, |p| p.1);
+    passes.sort_by(|a, b| b.2.total_cmp(&a.2));
+    let (listed, others) = passes.split_at(passes.len().min(MAX_PASSES));
+    for (name, mean, time) in listed {
         bar(ui, name, time / all, format!("{mean:.2}"));
     }
-    if more > 0 {
-        bar(ui, &texts::more_passes(more), rest / all, String::new());
+    if !others.is_empty() {
+        let rest: f64 = others.iter().map(|p| p.2).sum();
+        bar(ui, &texts::more_passes(others.len()), rest / all, String::new());
     }
     small(ui, texts::TIMES_LEGEND.into(), WEAK_TEXT);
 }
@@ -333,51 +315,40 @@ fn help_rows(exit_key: &str, has_keyboard_pointer: bool) -> Vec<HelpRow> {
 
 pub(super) fn show_help(ui: &mut Ui, state: &PanelState, execute: Execute) {
     let screen = ui.ctx().content_rect();
-    let mut is_closed = false;
-    Area::new(Id::new("help")).order(Order::Foreground).anchor(Align2::CENTER_CENTER, vec2(0.0, 0.0)).show(
-        ui.ctx(),
-        |ui| {
-            let frame = Frame::new()
-                .fill(PANEL)
-                .inner_margin(Margin::same(14))
-                .corner_radius(10)
-                .stroke(Stroke::new(1.0, WEAK_TEXT));
-            names::name(ui, Role::Dialog, texts::KEYS_AND_GESTURES);
-            frame.show(ui, |ui| {
-                let width = (screen.width() - 48.0).clamp(100.0, 1400.0);
-                ui.set_width(width);
-                ui.spacing_mut().item_spacing.y = 3.0;
-                ui.horizontal(|ui| {
-                    ui.heading(texts::KEYS_AND_GESTURES);
-                    ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                        is_closed = ui.button(texts::CLOSE).tell(texts::CLOSE_HELP_HINT).clicked();
-                        let find = ui.button(texts::FIND).tell(texts::FIND_HINT);
-                        if find.clicked() {
-                            execute(Command::ToggleHelp);
-                            execute(Command::Find);
-                        }
-                    });
-                });
-                let height = (screen.height() - 110.0).max(0.0);
-                let lines = help_rows(state.exit_key, state.keyboard_pointer.is_some());
-                ScrollArea::vertical().max_height(height).min_scrolled_height(height).show(ui, |ui| {
-                    let columns = ((width / 330.0) as usize).clamp(1, 3);
-                    let each = lines.len().div_ceil(columns).max(1);
-                    // As small as it has to be for one page, and no smaller than can be read.
-                    let size = (height / (each as f32 + 1.0) - 4.0).clamp(MIN_HELP_TEXT, TEXT_SIZE - 2.0);
-                    ui.columns(columns, |columns| {
-                        for (column, lines) in columns.iter_mut().zip(lines.chunks(each)) {
-                            lines.iter().for_each(|line| help_line(column, line, size));
-                        }
-                    });
-                    ui.label(RichText::new(texts::NO_MEDICAL_DEVICE).size(MIN_HELP_TEXT).color(WEAK_TEXT));
+    let area = Area::new(Id::new("help")).order(Order::Foreground).anchor(Align2::CENTER_CENTER, vec2(0.0, 0.0));
+    area.show(ui.ctx(), |ui| {
+        names::name(ui, Role::Dialog, texts::KEYS_AND_GESTURES);
+        let frame = Frame::new().fill(PANEL).inner_margin(Margin::same(14)).corner_radius(10);
+        frame.stroke(Stroke::new(1.0, WEAK_TEXT)).show(ui, |ui| {
+            let width = (screen.width() - 48.0).clamp(100.0, 1400.0);
+            ui.set_width(width);
+            ui.spacing_mut().item_spacing.y = 3.0;
+            ui.horizontal(|ui| {
+                ui.heading(texts::KEYS_AND_GESTURES);
+                ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                    ui.button(texts::CLOSE).tell(texts::CLOSE_HELP_HINT).gives(Command::ToggleHelp, execute);
+                    if ui.button(texts::FIND).tell(texts::FIND_HINT).clicked() {
+                        execute(Command::ToggleHelp);
+                        execute(Command::Find);
+                    }
                 });
             });
-        },
-    );
-    if is_closed {
-        execute(Command::ToggleHelp);
-    }
+            let height = (screen.height() - 110.0).max(0.0);
+            let lines = help_rows(state.exit_key, state.pointers.of_keys.is_some());
+            ScrollArea::vertical().max_height(height).min_scrolled_height(height).show(ui, |ui| {
+                let columns = ((width / 330.0) as usize).clamp(1, 3);
+                let each = lines.len().div_ceil(columns).max(1);
+                // As small as it has to be for one page, and no smaller than can be read.
+                let size = (height / (each as f32 + 1.0) - 4.0).clamp(MIN_HELP_TEXT, TEXT_SIZE - 2.0);
+                ui.columns(columns, |columns| {
+                    for (column, lines) in columns.iter_mut().zip(lines.chunks(each)) {
+                        lines.iter().for_each(|line| help_line(column, line, size));
+                    }
+                });
+                ui.label(RichText::new(texts::NO_MEDICAL_DEVICE).size(MIN_HELP_TEXT).color(WEAK_TEXT));
+            });
+        });
+    });
 }
 
 /// Smallest text of the help, points.
@@ -397,14 +368,7 @@ fn help_line(ui: &mut Ui, row: &HelpRow, size: f32) {
             ui.horizontal(|ui| {
                 let width = (ui.available_width() * 0.4).min(190.0);
                 let key = egui::Label::new(RichText::new(key).color(ACCENT).size(size)).truncate();
-                ui.allocate_ui_with_layout(
-                    vec2(width, size + 2.0),
-                    egui::Layout::left_to_right(egui::Align::Center),
-                    |ui| {
-                        ui.set_min_width(width);
-                        ui.add(key);
-                    },
-                );
+                cell(ui, vec2(width, size + 2.0), |ui| _ = ui.add(key));
                 ui.add(egui::Label::new(RichText::new(*label).size(size)).truncate()).on_hover_text(*label);
             });
         }
@@ -450,17 +414,15 @@ pub(super) fn ask_to_leave(ui: &Ui, unsaved: &Unsaved, execute: Execute) {
                 ui.add_space(8.0);
             }
             let answers = [
-                (texts::SAVE_AND_LEAVE, unsaved.save, true, Command::SaveAndExit),
-                (texts::LEAVE_WITHOUT_SAVING, unsaved.discard, false, Command::Discard),
-                (texts::STAY, texts::STAY_HINT, false, Command::Back),
+                ([texts::SAVE_AND_LEAVE, unsaved.save], Command::SaveAndExit),
+                ([texts::LEAVE_WITHOUT_SAVING, unsaved.discard], Command::Discard),
+                (texts::STAY, Command::Back),
             ];
-            for (answer, hint, is_first, command) in answers {
+            for ([answer, hint], command) in answers {
                 let shown = RichText::new(answer).size(text);
-                let button = if is_first { first(shown) } else { Button::new(shown) };
+                let button = if command == Command::SaveAndExit { first(shown) } else { Button::new(shown) };
                 let button = button.truncate().min_size(vec2(ui.available_width(), height));
-                if ui.add(button).tell(hint).clicked() {
-                    execute(command);
-                }
+                ui.add(button).tell(hint).gives(command, execute);
             }
         });
     });
@@ -486,15 +448,15 @@ pub(super) fn paint_pointer(ui: &Ui, state: &PanelState, scale: f32) {
     let at = |[x, y]: [f64; 2]| pos2(x as f32 / scale, y as f32 / scale);
     // On top of everything, in a layer that receives no clicks.
     let painter = ui.ctx().layer_painter(LayerId::new(Order::Debug, Id::new("pointer")));
-    if let Some(mark) = state.keyboard_pointer {
+    if let Some(mark) = state.pointers.of_keys {
         for radius in &RING[..=usize::from(mark.is_held)] {
-            for stroke in [Stroke::new(5.0, FOCUS_EDGE), Stroke::new(2.5, FOCUS)] {
+            for stroke in names::FOCUS_STROKES {
                 painter.circle_stroke(at(mark.at), *radius, stroke);
             }
         }
     }
-    let by_keyboard = state.keyboard_pointer.filter(|mark| mark.has_arrow).map(|mark| mark.at);
-    let Some(tip) = by_keyboard.or(state.pointer).map(at) else { return };
+    let by_keyboard = state.pointers.of_keys.filter(|mark| mark.has_arrow).map(|mark| mark.at);
+    let Some(tip) = by_keyboard.or(state.pointers.of_mouse).map(at) else { return };
     let corners = CORNERS.map(|corner| tip + corner);
     let mut mesh = Mesh::default();
     corners.iter().for_each(|corner| mesh.colored_vertex(*corner, POINTER));

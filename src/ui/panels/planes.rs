@@ -9,31 +9,25 @@ use crate::sliders::SLIDERS;
 use crate::texts;
 use egui::{Button, Label, RichText, Ui, vec2};
 
-const PLANES: [(PlaneName, &str); 3] = [(PlaneName::A, "A"), (PlaneName::B, "B"), (PlaneName::C, "C")];
-
 pub(super) fn show(ui: &mut Ui, state: &PanelState, width: f32, execute: Execute) {
     let settings = state.controls.settings();
     let has_planes = settings.mode.is_flat() || settings.layout.has_planes();
     tools::curve(ui, state, width, execute);
     if has_planes && settings.mode != Mode::Orthogonal {
-        let is_chosen = |plane| settings.planes.plane == plane;
-        let hint = |_| texts::PLANE_HINT;
-        row_of(ui, texts::PLANE, &PLANES, (3, width), is_chosen, hint, |plane| execute(Command::Plane(plane)));
+        let about = |plane: PlaneName| (Command::Plane(plane), [plane.letter(), texts::PLANE_HINT]);
+        let planes = [PlaneName::A, PlaneName::B, PlaneName::C].map(about);
+        let is_chosen = |command| command == Command::Plane(settings.planes.plane);
+        row_of(ui, texts::PLANE, &planes, (3, width), is_chosen, execute);
     }
     if has_planes {
         let recentre = Button::new(texts::RECENTRE_PLANES).min_size(vec2(width, ROW_HEIGHT));
-        if ui.add(recentre).tell(texts::RECENTRE_PLANES_HINT).clicked() {
-            execute(Command::Recentre);
-        }
+        ui.add(recentre).tell(texts::RECENTRE_PLANES_HINT).gives(Command::Recentre, execute);
     } else {
         let text = RichText::new(texts::NO_PLANES).size(SMALL_TEXT).color(super::colours::WEAK_TEXT);
         ui.add(Label::new(text).wrap());
     }
     if settings.mode == Mode::Tomography {
-        let mut on = settings.planes.reference;
-        if switch(ui, &mut on, texts::REFERENCE_PICTURE, texts::REFERENCE_PICTURE_HINT) {
-            execute(Command::Reference(on));
-        }
+        switch(ui, settings.planes.reference, texts::REFERENCE_PICTURE, Command::Reference, execute);
     }
     names::group(ui, texts::PLANES, |ui| {
         for (number, control) in SLIDERS.iter().enumerate() {

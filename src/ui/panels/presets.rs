@@ -1,18 +1,17 @@
 //! The list of presets: a tile with a thumbnail of the present volume for each, and buttons to save, rename and delete the user's.
 
-use super::colours::{ACCENT, BACKGROUND, BUTTON, EDGE, FAULT, PANEL, TEXT, UNCOLOURED, WEAK_TEXT};
+use super::colours::{ACCENT, BACKGROUND, BUTTON, EDGE, FAULT, TEXT, UNCOLOURED, WEAK_TEXT};
 use super::names::{self, Tell};
 use super::overlays::{LOW_WINDOW, first};
 use super::walking::Walk;
+use super::widgets::{dialog, in_rows, truncated};
 use super::{Execute, PanelState, Pictures, ROW_HEIGHT, SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE};
 use crate::command::Command;
 use crate::picture::Picture;
 use crate::texts;
-use egui::accesskit::Role;
 use egui::{
-    Align2, Area, Button, ColorImage, Context, FontId, Frame, Id, Label, Margin, Order, Pos2, Rect, Response, RichText,
-    ScrollArea, Sense, Stroke, StrokeKind, TextureHandle, TextureId, TextureOptions, Ui, WidgetInfo, WidgetType, pos2,
-    vec2,
+    Align2, Button, ColorImage, Context, FontId, Label, Pos2, Rect, Response, RichText, ScrollArea, Sense, Stroke,
+    StrokeKind, TextureHandle, TextureId, TextureOptions, Ui, WidgetInfo, WidgetType, pos2, vec2,
 };
 use std::sync::Arc;
 
@@ -88,58 +87,41 @@ pub(super) fn show_strip(ui: &mut Ui, state: &PanelState, textures: Pictures, wi
             ui.label(RichText::new(texts::LOOKS).size(SMALL_TEXT).color(WEAK_TEXT));
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                 let manage = Button::new(RichText::new(texts::MANAGE_LOOKS).size(SMALL_TEXT).color(ACCENT));
-                if ui.add(manage.frame(false)).tell(texts::PRESETS_HINT).named(texts::PRESETS).clicked() {
-                    execute(Command::Presets);
-                }
+                let manage = ui.add(manage.frame(false)).tell(texts::PRESETS_HINT);
+                manage.named(texts::PRESETS).gives(Command::Presets, execute);
             });
         });
         ui.spacing_mut().item_spacing = vec2(6.0, 4.0);
-        if !state.has_small_pictures {
+        if !state.small.are_drawn {
             return names_of_looks(ui, state, width, execute);
         }
         let each = (width - 6.0 * (COLUMNS - 1) as f32) / COLUMNS as f32;
         // The others are in the list.
-        let all: Vec<(usize, &PresetTile)> = state.looks.iter().enumerate().take(ROWS * COLUMNS).collect();
-        for row in all.chunks(COLUMNS) {
-            ui.horizontal(|ui| {
-                for (n, tile) in row {
-                    let picture = vec2(each, each / SHAPE);
-                    let (area, response) = ui.allocate_exact_size(picture + vec2(0.0, SMALL_NAME), Sense::click());
-                    response.widget_info(|| WidgetInfo::labeled(WidgetType::Button, true, tile.name));
-                    let inside = Rect::from_min_size(area.min, picture);
-                    paint_picture(ui, inside, textures.get(*n).copied().flatten());
-                    let is_over = response.hovered() || response.has_focus();
-                    let stroke = Stroke::new(if is_over { 2.0 } else { 1.0 }, if is_over { TEXT } else { EDGE });
-                    ui.painter().rect_stroke(inside, 4.0, stroke, StrokeKind::Inside);
-                    let font = FontId::proportional(SMALL_TEXT);
-                    let mut job = egui::text::LayoutJob::simple_singleline(tile.name.to_string(), font, TEXT);
-                    job.wrap = egui::text::TextWrapping::truncate_at_width(each);
-                    let galley = ui.painter().layout_job(job);
-                    let at = pos2(area.center().x - galley.size().x / 2.0, inside.bottom() + 1.0);
-                    ui.painter().galley(at, galley, TEXT);
-                    if response.tell(tile.hint).named(tile.name).clicked() {
-                        execute(Command::Preset(*n));
-                    }
-                }
-            });
-        }
+        let all = state.small.looks.iter().enumerate().take(ROWS * COLUMNS);
+        in_rows(ui, all, COLUMNS, |ui, (n, tile)| {
+            let picture = vec2(each, each / SHAPE);
+            let (area, response) = ui.allocate_exact_size(picture + vec2(0.0, SMALL_NAME), Sense::click());
+            response.widget_info(|| WidgetInfo::labeled(WidgetType::Button, true, tile.name));
+            let inside = Rect::from_min_size(area.min, picture);
+            paint_picture(ui, inside, textures.get(n).copied().flatten());
+            let is_over = response.hovered() || response.has_focus();
+            let stroke = Stroke::new(if is_over { 2.0 } else { 1.0 }, if is_over { TEXT } else { EDGE });
+            ui.painter().rect_stroke(inside, 4.0, stroke, StrokeKind::Inside);
+            let galley = truncated(ui, tile.name, SMALL_TEXT, each);
+            let at = pos2(area.center().x - galley.size().x / 2.0, inside.bottom() + 1.0);
+            ui.painter().galley(at, galley, TEXT);
+            response.tell(tile.hint).named(tile.name).gives(Command::Preset(n), execute);
+        });
     });
 }
 
 /// The looks by their names, where no pictures are made.
 fn names_of_looks(ui: &mut Ui, state: &PanelState, width: f32, execute: Execute) {
     let size = vec2((width - 12.0) / 3.0, ROW_HEIGHT);
-    let all: Vec<(usize, &PresetTile)> = state.looks.iter().enumerate().take(9).collect();
-    for row in all.chunks(3) {
-        ui.horizontal(|ui| {
-            for (n, tile) in row {
-                let button = Button::new(tile.name).truncate().min_size(size);
-                if ui.add_sized(size, button).tell(tile.hint).named(tile.name).clicked() {
-                    execute(Command::Preset(*n));
-                }
-            }
-        });
-    }
+    in_rows(ui, state.small.looks.iter().enumerate().take(9), 3, |ui, (n, tile)| {
+        let button = Button::new(tile.name).truncate().min_size(size);
+        ui.add_sized(size, button).tell(tile.hint).named(tile.name).gives(Command::Preset(n), execute);
+    });
 }
 
 /// A picture, or a dark area while there is none.
@@ -153,72 +135,53 @@ fn paint_picture(ui: &Ui, area: Rect, texture: Option<TextureId>) {
 
 pub(super) fn show(ui: &Ui, shown: &PresetsShown, textures: Pictures, execute: Execute) {
     let screen = ui.ctx().content_rect();
-    let area =
-        Area::new(Id::new(texts::PRESETS)).order(Order::Foreground).anchor(Align2::CENTER_CENTER, vec2(0.0, 0.0));
-    area.show(ui.ctx(), |ui| {
-        names::name(ui, Role::Dialog, texts::PRESETS);
-        let is_low = screen.height() < LOW_WINDOW;
-        let margin = if is_low { 6 } else { 12 };
-        let frame = Frame::new().fill(PANEL).inner_margin(Margin::same(margin)).corner_radius(10);
-        frame.stroke(Stroke::new(2.0, ACCENT)).show(ui, |ui| {
-            let width = (screen.width() - 2.0 * f32::from(margin) - 12.0).clamp(120.0, 720.0);
-            ui.set_width(width);
-            // In a low window all of it scrolls.
-            if !is_low {
+    let is_low = screen.height() < LOW_WINDOW;
+    let margin = if is_low { 6 } else { 12 };
+    dialog(ui, texts::PRESETS, (Align2::CENTER_CENTER, 0.0), margin, [120.0, 720.0], |ui, width| {
+        // In a low window all of it scrolls.
+        if !is_low {
+            header(ui, shown, execute);
+        }
+        let height = (screen.height() - ui.min_rect().height() - 2.0 * f32::from(margin) - 24.0).max(30.0);
+        // The area takes its place from its size of the layout before, which tells nothing of the room that there is.
+        ScrollArea::vertical().max_height(height).min_scrolled_height(height).show(ui, |ui| {
+            if is_low {
                 header(ui, shown, execute);
             }
-            let height = (screen.height() - ui.min_rect().height() - 2.0 * f32::from(margin) - 24.0).max(30.0);
-            // The area takes its place from its size of the layout before, which tells nothing of the room that there is.
-            ScrollArea::vertical().max_height(height).min_scrolled_height(height).show(ui, |ui| {
-                if is_low {
-                    header(ui, shown, execute);
-                }
-                names::list(ui, texts::LOOKS, |ui| tiles(ui, shown, textures, width - 20.0, execute));
-            });
+            names::list(ui, texts::LOOKS, |ui| tiles(ui, shown, textures, width - 20.0, execute));
         });
     });
 }
 
+/// The title, and what closes the list and saves a preset; or the name that is being typed. Below it the fault.
 fn header(ui: &mut Ui, shown: &PresetsShown, execute: Execute) {
-    title(ui, shown, execute);
-    if let Some(fault) = shown.fault {
-        ui.add(Label::new(RichText::new(fault).size(SMALL_TEXT).color(FAULT)).truncate()).on_hover_text(fault);
-    }
-}
-
-/// The title, and what closes the list and saves a preset; or the name that is being typed.
-fn title(ui: &mut Ui, shown: &PresetsShown, execute: Execute) {
     ui.horizontal_wrapped(|ui| {
+        let mut add = |ui: &mut Ui, button: Button, [name, hint]: [&str; 2], command: Command| {
+            ui.add(button).tell(hint).named(name).gives(command, execute);
+        };
         if let Some((text, is_rename)) = shown.naming {
             let about = if is_rename { texts::NEW_NAME } else { texts::NAME };
             let typed = ui.add(Label::new(RichText::new(format!("{about}: {text}_")).size(TEXT_SIZE)).wrap());
             typed.named(about).with_value(text);
-            let hint = texts::KEEP_PRESET_HINT;
-            if ui.add(first(RichText::new(texts::KEEP_BUTTON))).tell(hint).named(texts::KEEP).clicked() {
-                execute(Command::EndNaming);
-            }
-            if ui.button(texts::CANCEL_BUTTON).tell(texts::CANCEL_NAMING_HINT).named(texts::CANCEL).clicked() {
-                execute(Command::Back);
-            }
+            let (keep, cancel) = (first(RichText::new(texts::KEEP_BUTTON)), Button::new(texts::CANCEL_BUTTON));
+            add(ui, keep, [texts::KEEP, texts::KEEP_PRESET_HINT], Command::EndNaming);
+            add(ui, cancel, [texts::CANCEL, texts::CANCEL_NAMING_HINT], Command::Back);
             return;
         }
         ui.heading(texts::PRESETS);
         if shown.can_save {
-            let hint = texts::SAVE_PRESENT_LOOK_HINT;
-            if ui.button(texts::SAVE_PRESENT_LOOK_BUTTON).tell(hint).named(texts::SAVE_PRESENT_LOOK).clicked() {
-                execute(Command::NamePreset);
-            }
+            let about = [texts::SAVE_PRESENT_LOOK, texts::SAVE_PRESENT_LOOK_HINT];
+            add(ui, Button::new(texts::SAVE_PRESENT_LOOK_BUTTON), about, Command::NamePreset);
         }
         if shown.can_restore {
-            let hint = texts::UNDO_PRESETS_HINT;
-            if ui.button(texts::UNDO_PRESETS_BUTTON).tell(hint).named(texts::UNDO).clicked() {
-                execute(Command::RestorePresets);
-            }
+            let about = [texts::UNDO[0], texts::UNDO_PRESETS_HINT];
+            add(ui, Button::new(texts::UNDO_PRESETS_BUTTON), about, Command::RestorePresets);
         }
-        if ui.button(texts::CLOSE_BUTTON).tell(texts::CLOSE_PRESETS_HINT).named(texts::CLOSE).clicked() {
-            execute(Command::Presets);
-        }
+        add(ui, Button::new(texts::CLOSE_BUTTON), [texts::CLOSE, texts::CLOSE_PRESETS_HINT], Command::Presets);
     });
+    if let Some(fault) = shown.fault {
+        ui.add(Label::new(RichText::new(fault).size(SMALL_TEXT).color(FAULT)).truncate()).on_hover_text(fault);
+    }
 }
 
 fn tiles(ui: &mut Ui, shown: &PresetsShown, textures: Pictures, width: f32, execute: Execute) {
@@ -234,9 +197,7 @@ fn tiles(ui: &mut Ui, shown: &PresetsShown, textures: Pictures, width: f32, exec
                     ui.set_width(each);
                     let entry = button(ui, *n, tile, textures.get(*n).copied().flatten(), each);
                     walk.entry(*n, &entry);
-                    if entry.clicked() {
-                        execute(Command::Preset(*n));
-                    }
+                    entry.gives(Command::Preset(*n), execute);
                     if let Some(own) = tile.own {
                         own_buttons(ui, own, tile.name, each, execute);
                     }
@@ -273,14 +234,12 @@ fn button(ui: &mut Ui, n: usize, tile: &PresetTile, texture: Option<TextureId>, 
 fn own_buttons(ui: &mut Ui, own: usize, name: &str, width: f32, execute: Execute) {
     let size = vec2((width - GAP) / 2.0, BUTTONS.min(TOUCH_SIZE * 0.7));
     ui.horizontal(|ui| {
-        for (command, label, hint) in [
-            (Command::RenamePreset(own), texts::RENAME, texts::RENAME_HINT),
-            (Command::DeletePreset(own), texts::DELETE, texts::DELETE_PRESET_HINT),
+        for (command, [label, hint]) in [
+            (Command::RenamePreset(own), texts::RENAME),
+            (Command::DeletePreset(own), [texts::DELETE, texts::DELETE_PRESET_HINT]),
         ] {
-            let text = RichText::new(label).size(SMALL_TEXT);
-            if ui.add(Button::new(text).min_size(size)).tell(hint).named(&format!("{label} {name}")).clicked() {
-                execute(command);
-            }
+            let button = Button::new(RichText::new(label).size(SMALL_TEXT)).min_size(size);
+            ui.add(button).tell(hint).named(&format!("{label} {name}")).gives(command, execute);
         }
     });
 }

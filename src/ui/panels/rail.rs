@@ -3,7 +3,8 @@
 use super::colours::{ACCENT, BUTTON, CHOSEN, EDGE, PANEL, TEXT, WEAK_TEXT};
 use super::icons::{self, Icon};
 use super::names::{self, Tell};
-use super::{Execute, PanelState, RAIL_WIDTH, SMALL_TEXT, heading};
+use super::widgets::in_rows;
+use super::{Execute, PanelState, RAIL_WIDTH, SMALL_TEXT, section};
 use crate::command::{Command, InspectorTab, Tool};
 use crate::scene::MeasureKind;
 use crate::texts;
@@ -13,41 +14,33 @@ use egui::{
     Align2, FontId, Frame, Panel, Rect, Response, Sense, Stroke, StrokeKind, Ui, Vec2, WidgetInfo, WidgetType, vec2,
 };
 
-/// A button of the rail: what it is called, the tools that it stands for (the first is chosen by it), and the explanation.
-struct Place {
-    name: &'static str,
-    icon: Icon,
-    tools: &'static [Tool],
-}
-
-const fn place(name: &'static str, icon: Icon, tools: &'static [Tool]) -> Place {
-    Place { name, icon, tools }
-}
+/// A button of the rail: what it is called, its icon, and the tools that it stands for (the first is chosen by it).
+type Place = (&'static str, Icon, &'static [Tool]);
 
 /// In the order of the rail; measuring begins with the second part.
 const PLACES: [&[Place]; 2] = [
     &[
-        place(texts::TURN, icons::TURN, &[Tool::Rotate]),
-        place(texts::LIGHT, icons::LIGHT, &[Tool::Light]),
-        place(texts::REGION, icons::REGION, &[Tool::Region]),
-        place(texts::CLIP, icons::CLIP, &[Tool::Clip]),
-        place(texts::CUT, icons::CUT, &[Tool::Cut]),
-        place(texts::BRUSH, icons::BRUSH, &[Tool::Brush]),
-        place(texts::CROSSHAIR, icons::CROSSHAIR, &[Tool::Plane]),
-        place(texts::CURVE, icons::CURVE, &[Tool::Curve]),
+        (texts::TURN, icons::TURN, &[Tool::Rotate]),
+        (texts::LIGHT, icons::LIGHT, &[Tool::Light]),
+        (texts::REGION, icons::REGION, &[Tool::Region]),
+        (texts::CLIP, icons::CLIP, &[Tool::Clip]),
+        (texts::CUT, icons::CUT, &[Tool::Cut]),
+        (texts::BRUSH, icons::BRUSH, &[Tool::Brush]),
+        (texts::CROSSHAIR, icons::CROSSHAIR, &[Tool::Plane]),
+        (texts::CURVE, icons::CURVE, &[Tool::Curve]),
     ],
     &[
-        place(
+        (
             texts::DISTANCE,
             icons::DISTANCE,
             &[Tool::Measure(MeasureKind::Distance), Tool::Measure(MeasureKind::Surface)],
         ),
-        place(texts::AREA, icons::AREA, &[Tool::Measure(MeasureKind::Ellipse), Tool::Measure(MeasureKind::Trace)]),
-        place(texts::ANGLE, icons::ANGLE, &[Tool::Measure(MeasureKind::Angle)]),
-        place(texts::MEASURED_VOLUME, icons::VOLUME, &[Tool::Measure(MeasureKind::Volume)]),
-        place(texts::LABELS, icons::LABELS, &[Tool::Labels]),
-        place(texts::TEXT, icons::TEXT, &[Tool::Measure(MeasureKind::Text), Tool::Measure(MeasureKind::Arrow)]),
-        place(texts::BODY, icons::BODY, &[Tool::BodyMark]),
+        (texts::AREA, icons::AREA, &[Tool::Measure(MeasureKind::Ellipse), Tool::Measure(MeasureKind::Trace)]),
+        (texts::ANGLE, icons::ANGLE, &[Tool::Measure(MeasureKind::Angle)]),
+        (texts::MEASURED_VOLUME, icons::VOLUME, &[Tool::Measure(MeasureKind::Volume)]),
+        (texts::LABELS, icons::LABELS, &[Tool::Labels]),
+        (texts::TEXT, icons::TEXT, &[Tool::Measure(MeasureKind::Text), Tool::Measure(MeasureKind::Arrow)]),
+        (texts::BODY, icons::BODY, &[Tool::BodyMark]),
     ],
 ];
 
@@ -56,19 +49,11 @@ const HEIGHTS: [f32; 3] = [52.0, 37.0, 28.0];
 /// Between the two parts, and above and below all, points.
 const GAPS: f32 = 16.0;
 
-fn count() -> usize {
-    PLACES.iter().map(|part| part.len()).sum()
-}
-
-/// Height of a button in a rail of this height, points; none if not all of them have room.
-fn button_height(height: f32) -> Option<f32> {
-    let each = (height - GAPS) / count() as f32;
+/// Height of a button in a rail (the column of tools) of this height, points; none if not all of them have room.
+pub(super) fn button_height(height: f32) -> Option<f32> {
+    let count: usize = PLACES.iter().map(|part| part.len()).sum();
+    let each = (height - GAPS) / count as f32;
     (each >= HEIGHTS[2]).then(|| each.min(HEIGHTS[0]).floor())
-}
-
-/// True if a rail (the column of tools) of this height, points, has room for every tool.
-pub(super) fn has_all(height: f32) -> bool {
-    button_height(height).is_some()
 }
 
 pub(super) fn show(ui: &mut Ui, state: &PanelState, height: f32, execute: Execute) {
@@ -85,10 +70,9 @@ pub(super) fn show(ui: &mut Ui, state: &PanelState, height: f32, execute: Execut
             for place in PLACES.into_iter().flatten().take(shown.saturating_sub(1)) {
                 tool(ui, state, place, size(HEIGHTS[0]), execute);
             }
-            let more = button(ui, icons::TOOLS, texts::TAB_TOOLS, size(HEIGHTS[0]), false);
-            if more.tell(texts::TAB_TOOLS_HINT).clicked() {
-                execute(Command::InspectorTab(InspectorTab::Tools));
-            }
+            let [name, hint] = texts::TAB_TOOLS;
+            let more = button(ui, icons::TOOLS, name, size(HEIGHTS[0]), false);
+            more.tell(hint).gives(Command::InspectorTab(InspectorTab::Tools), execute);
             return;
         };
         for (n, part) in PLACES.into_iter().enumerate() {
@@ -103,26 +87,21 @@ pub(super) fn show(ui: &mut Ui, state: &PanelState, height: f32, execute: Execut
 
 /// Shows the tools as a grid in the inspector, `width` points wide.
 pub(super) fn show_grid(ui: &mut Ui, state: &PanelState, width: f32, execute: Execute) {
-    names::group(ui, texts::TOOLS, |ui| {
-        heading(ui, texts::TOOLS);
+    section(ui, texts::TOOLS, |ui| {
         let columns = (width / RAIL_WIDTH).floor().max(1.0);
         let size = vec2(width / columns, HEIGHTS[0]);
-        let all: Vec<&Place> = PLACES.into_iter().flatten().collect();
         ui.spacing_mut().item_spacing = Vec2::ZERO;
-        for row in all.chunks(columns as usize) {
-            ui.horizontal(|ui| row.iter().for_each(|place| tool(ui, state, place, size, execute)));
-        }
+        let all = PLACES.into_iter().flatten();
+        in_rows(ui, all, columns as usize, |ui, place| tool(ui, state, place, size, execute));
     });
 }
 
-fn tool(ui: &mut Ui, state: &PanelState, place: &Place, size: Vec2, execute: Execute) {
-    let chosen = state.controls.tool();
-    let is_chosen = place.tools.contains(&chosen);
-    let response = button(ui, place.icon, place.name, size, is_chosen);
-    if response.tell(hints::of_tool(place.tools[0])).clicked() {
-        // A second click leaves a tool.
-        execute(Command::Tool(if is_chosen { Tool::default() } else { place.tools[0] }));
-    }
+fn tool(ui: &mut Ui, state: &PanelState, &(name, icon, tools): &Place, size: Vec2, execute: Execute) {
+    let is_chosen = tools.contains(&state.controls.tool());
+    let response = button(ui, icon, name, size, is_chosen);
+    // A second click leaves a tool.
+    let command = Command::Tool(if is_chosen { Tool::default() } else { tools[0] });
+    response.tell(hints::of_tool(tools[0])).gives(command, execute);
 }
 
 /// An icon, with its name below it where there is room.
@@ -193,12 +172,8 @@ pub(super) fn icon_button(
     let words = painter.layout_no_wrap(text.to_string(), font, colour);
     let gap = if text.is_empty() || icon.is_empty() { 0.0 } else { 8.0 };
     let left = area.center().x - (edge + gap + words.size().x) / 2.0;
-    paint(
-        painter,
-        icon,
-        Rect::from_center_size(egui::pos2(left + edge / 2.0, area.center().y), vec2(edge, edge)),
-        colour,
-    );
+    let square = Rect::from_center_size(egui::pos2(left + edge / 2.0, area.center().y), vec2(edge, edge));
+    paint(painter, icon, square, colour);
     painter.galley(egui::pos2(left + edge + gap, area.center().y - words.size().y / 2.0), words, colour);
     response
 }

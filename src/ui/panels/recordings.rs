@@ -2,8 +2,8 @@
 
 use super::colours::{ACCENT, BAR, EDGE, TEXT, WHOLE_BAR};
 use super::names::{self, Tell};
-use super::widgets::{BETWEEN_MESSAGES, MESSAGE_EDGES, message_frame};
-use super::{Execute, PanelState, ROW_HEIGHT, SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE, heading, icons, picture_rect, rail};
+use super::widgets::{BETWEEN_MESSAGES, MESSAGE_EDGES, command_button, message_frame};
+use super::{Execute, PanelState, ROW_HEIGHT, SMALL_TEXT, TEXT_SIZE, TOUCH_SIZE, icons, picture_rect, rail, section};
 use crate::command::Command;
 use crate::texts;
 use egui::accesskit::Role;
@@ -31,20 +31,16 @@ pub(super) fn show_list(ui: &mut Ui, state: &PanelState, width: f32, execute: Ex
     }
     let height = ROW_HEIGHT;
     let name = vec2(width - CLOSE - ui.spacing().item_spacing.x, height);
-    names::group(ui, texts::RECORDINGS, |ui| {
-        heading(ui, texts::RECORDINGS);
+    section(ui, texts::RECORDINGS, |ui| {
         for (n, recording) in state.recordings.iter().enumerate() {
             ui.horizontal(|ui| {
                 let button = Button::selectable(recording.is_shown, &recording.name).frame_when_inactive(true);
                 let button = ui.add_sized(name, button.truncate());
-                if button.tell(&texts::recording_hint(&recording.path)).named(&recording.name).clicked() {
-                    execute(Command::ShowRecording(n));
-                }
+                let button = button.tell(&texts::recording_hint(&recording.path)).named(&recording.name);
+                button.gives(Command::ShowRecording(n), execute);
                 let close = rail::icon_button(ui, icons::CLOSE, ("", texts::CLOSE), vec2(CLOSE, height), (true, false));
                 let close = close.tell(texts::CLOSE_RECORDING_HINT);
-                if close.named(&texts::close_recording(&recording.name)).clicked() {
-                    execute(Command::CloseRecording(n));
-                }
+                close.named(&texts::close_recording(&recording.name)).gives(Command::CloseRecording(n), execute);
             });
         }
     });
@@ -95,18 +91,15 @@ pub(super) fn show_reading(ui: &mut Ui, state: &PanelState, scale: f32, execute:
         message_frame(ACCENT).show(ui, |ui| {
             ui.set_width(width);
             names::announce(ui, &texts::reading(&reading.name), false);
-            let short = [texts::reading(&reading.name), reading.text.clone()].join("  ");
-            let title = if has_bar { texts::reading(&reading.name) } else { short };
-            let size = if has_bar { TEXT_SIZE } else { SMALL_TEXT };
+            let title = texts::reading(&reading.name);
+            let (title, size) =
+                if has_bar { (title, TEXT_SIZE) } else { (format!("{title}  {}", reading.text), SMALL_TEXT) };
             ui.add(Label::new(RichText::new(title).size(size).color(TEXT)).truncate());
             if has_bar {
                 ui.horizontal(|ui| {
                     bar(ui, reading, width - CANCEL - ui.spacing().item_spacing.x);
-                    let cancel = Button::new(texts::CANCEL_READING);
-                    let cancel = ui.add_sized(vec2(CANCEL, TOUCH_SIZE * 0.75), cancel);
-                    if cancel.tell(texts::CANCEL_READING_HINT).clicked() {
-                        execute(Command::CancelReading);
-                    }
+                    let size = vec2(CANCEL, TOUCH_SIZE * 0.75);
+                    command_button(ui, size, texts::CANCEL_READING, Command::CancelReading, execute);
                 });
             }
         });

@@ -29,10 +29,8 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
             sides.iter().filter_map(|side| side.handle).for_each(|place| handle(&painter, at(place)));
             if let Some(start) = region_box::start_line(scene, &tiling, n, state.controls.start_line()) {
                 let ends: Vec<Pos2> = start.line.into_iter().map(at).collect();
-                for (width, colour) in [(2.0 + 2.5, OUTLINE), (2.0, START)] {
-                    ends.windows(2).for_each(|two| {
-                        painter.line_segment([two[0], two[1]], Stroke::new(width, colour));
-                    });
+                for stroke in [Stroke::new(2.0 + 2.5, OUTLINE), Stroke::new(2.0, START)] {
+                    ends.windows(2).for_each(|two| _ = painter.line_segment([two[0], two[1]], stroke));
                 }
                 start.handles.into_iter().for_each(|place| start_handle(&painter, at(place)));
             }

@@ -1,56 +1,43 @@
 //! The search of all commands and controls: a line for typing, and the results.
 
-use super::colours::{ACCENT, BACKGROUND, CHOSEN, EDGE, PANEL, TEXT, WEAK_TEXT};
+use super::colours::{ACCENT, BACKGROUND, CHOSEN, EDGE, TEXT, WEAK_TEXT};
 use super::icons;
 use super::names::{self, Tell};
 use super::overlays::LOW_WINDOW;
 use super::visible::Search;
+use super::widgets::dialog;
 use super::{Execute, ROW_HEIGHT, SMALL_TEXT, TEXT_SIZE, rail};
 use crate::command::Command;
 use crate::palette::{self, Entry};
 use crate::texts;
 use egui::accesskit::Role;
-use egui::{
-    Align2, Area, FontId, Frame, Id, Margin, Order, Rect, ScrollArea, Sense, Stroke, StrokeKind, Ui, WidgetInfo,
-    WidgetType, pos2, vec2,
-};
+use egui::{Align2, FontId, Rect, ScrollArea, Sense, Stroke, StrokeKind, Ui, WidgetInfo, WidgetType, pos2, vec2};
 
 /// Most entries that are shown: more is found by another word.
 const MAX_SHOWN: usize = 60;
 
 pub(super) fn show(ui: &Ui, search: &Search, execute: Execute) {
     let screen = ui.ctx().content_rect();
-    let is_low = screen.height() < LOW_WINDOW;
-    let margin = if is_low { 6.0 } else { 12.0 };
-    let top = if is_low { 4.0 } else { 56.0 };
-    let area = Area::new(Id::new(texts::FIND)).order(Order::Foreground).anchor(Align2::CENTER_TOP, vec2(0.0, top));
-    area.show(ui.ctx(), |ui| {
-        names::name(ui, Role::Dialog, texts::FIND);
-        let frame = Frame::new().fill(PANEL).inner_margin(Margin::same(margin as i8)).corner_radius(10);
-        frame.stroke(Stroke::new(2.0, ACCENT)).show(ui, |ui| {
-            let width = (screen.width() - 2.0 * margin - 12.0).clamp(100.0, 620.0);
-            ui.set_width(width);
-            ui.spacing_mut().item_spacing.y = 2.0;
-            typed(ui, search, width, execute);
-            ui.add_space(4.0);
-            let found = palette::found(&search.text);
-            let height = (screen.height() - top - ROW_HEIGHT - 2.0 * margin - 24.0).clamp(30.0, 460.0);
-            ScrollArea::vertical().max_height(height).min_scrolled_height(height).auto_shrink([false, true]).show(
-                ui,
-                |ui| {
-                    names::list(ui, texts::FOUND, |ui| {
-                        if found.is_empty() {
-                            ui.label(texts::NOTHING_FOUND);
-                        }
-                        for (n, entry) in found.iter().take(MAX_SHOWN).enumerate() {
-                            if row(ui, entry, n == search.chosen, width - 16.0) {
-                                execute(Command::Find);
-                                execute(entry.command);
-                            }
-                        }
-                    });
-                },
-            );
+    let (margin, top) = if screen.height() < LOW_WINDOW { (6, 4.0) } else { (12, 56.0) };
+    dialog(ui, texts::FIND, (Align2::CENTER_TOP, top), margin, [100.0, 620.0], |ui, width| {
+        ui.spacing_mut().item_spacing.y = 2.0;
+        typed(ui, search, width, execute);
+        ui.add_space(4.0);
+        let found = palette::found(&search.text);
+        let height = (screen.height() - top - ROW_HEIGHT - 2.0 * f32::from(margin) - 24.0).clamp(30.0, 460.0);
+        let area = ScrollArea::vertical().max_height(height).min_scrolled_height(height).auto_shrink([false, true]);
+        area.show(ui, |ui| {
+            names::list(ui, texts::FOUND, |ui| {
+                if found.is_empty() {
+                    ui.label(texts::NOTHING_FOUND);
+                }
+                for (n, entry) in found.iter().take(MAX_SHOWN).enumerate() {
+                    if row(ui, entry, n == search.chosen, width - 16.0) {
+                        execute(Command::Find);
+                        execute(entry.command);
+                    }
+                }
+            });
         });
     });
 }
@@ -58,8 +45,7 @@ pub(super) fn show(ui: &Ui, search: &Search, execute: Execute) {
 /// What is typed, and what closes the search.
 fn typed(ui: &mut Ui, search: &Search, width: f32, execute: Execute) {
     ui.horizontal(|ui| {
-        let size = vec2(width - ROW_HEIGHT - 8.0, ROW_HEIGHT);
-        let (area, response) = ui.allocate_exact_size(size, Sense::hover());
+        let (area, response) = ui.allocate_exact_size(vec2(width - ROW_HEIGHT - 8.0, ROW_HEIGHT), Sense::hover());
         response.widget_info(|| WidgetInfo::labeled(WidgetType::Label, true, texts::FIND));
         let painter = ui.painter();
         painter.rect(area, 6.0, BACKGROUND, Stroke::new(1.0, EDGE), StrokeKind::Inside);
@@ -73,11 +59,9 @@ fn typed(ui: &mut Ui, search: &Search, width: f32, execute: Execute) {
         let clip = painter.with_clip_rect(area.shrink(4.0));
         clip.text(at, Align2::LEFT_CENTER, text, FontId::proportional(TEXT_SIZE), colour);
         response.with_value(&search.text);
-        let close =
-            rail::icon_button(ui, icons::CLOSE, ("", texts::CLOSE), vec2(ROW_HEIGHT, ROW_HEIGHT), (true, false));
-        if close.tell(texts::CLOSE_SEARCH_HINT).named(texts::CLOSE).clicked() {
-            execute(Command::Find);
-        }
+        let size = vec2(ROW_HEIGHT, ROW_HEIGHT);
+        let close = rail::icon_button(ui, icons::CLOSE, ("", texts::CLOSE), size, (true, false));
+        close.tell(texts::CLOSE_SEARCH_HINT).named(texts::CLOSE).gives(Command::Find, execute);
     });
 }
 
@@ -96,13 +80,8 @@ fn row(ui: &mut Ui, entry: &Entry, is_chosen: bool, width: f32) -> bool {
         response.scroll_to_me(None);
     }
     let painter = ui.painter().with_clip_rect(area.shrink2(vec2(8.0, 0.0)));
-    let key = painter.text(
-        area.right_center() - vec2(8.0, 0.0),
-        Align2::RIGHT_CENTER,
-        &entry.key,
-        FontId::proportional(SMALL_TEXT),
-        ACCENT,
-    );
+    let (end, small) = (area.right_center() - vec2(8.0, 0.0), FontId::proportional(SMALL_TEXT));
+    let key = painter.text(end, Align2::RIGHT_CENTER, &entry.key, small, ACCENT);
     let painter = painter.with_clip_rect(area.shrink2(vec2(8.0, 0.0)).with_max_x(key.left() - 8.0));
     let name = FontId::proportional(TEXT_SIZE);
     let up = if entry.about.is_empty() { 0.0 } else { 8.0 };

@@ -1,16 +1,16 @@
 //! The options of tools, at the top of the inspector: clip faces, cuts and brush, the curved plane, the start line.
 
 use super::colours::ACCENT;
-use super::names::{self, Tell};
-use super::widgets::{add_and_remove, front, plain_slider, say_step, slider, switch};
-use super::{Execute, PanelState, ROW_HEIGHT, heading};
+use super::names::Tell;
+use super::widgets::{add_and_remove, command_button, front, say_step, scale_slider, slider, switch};
+use super::{Execute, PanelState, ROW_HEIGHT, section};
 use crate::command::{Command, Tool};
 use crate::controls::BRUSH_RADII;
 use crate::scene::{KeptSide, MAX_START_POINTS, MIN_START_POINTS, Settings};
 use crate::sliders::SLIDERS;
 use crate::texts;
 use crate::view;
-use egui::{Button, RichText, Ui, vec2};
+use egui::{RichText, Ui, vec2};
 
 /// The indices of the two sliders for faces of clip planes; None for one that does not exist with these settings.
 pub(super) fn of_clip(settings: &Settings) -> [Option<usize>; 2] {
@@ -23,8 +23,7 @@ pub(super) fn clip(ui: &mut Ui, state: &PanelState, width: f32, execute: Execute
     if there == [None; 2] {
         return;
     }
-    names::group(ui, texts::CLIP, |ui| {
-        heading(ui, texts::CLIP);
+    section(ui, texts::CLIP, |ui| {
         ui.set_max_width(width);
         for number in there.into_iter().flatten() {
             slider(ui, state, number, SLIDERS[number].name, execute);
@@ -45,15 +44,12 @@ pub(super) fn cuts(ui: &mut Ui, state: &PanelState, width: f32, execute: Execute
     if !is_chosen && !is_brush && state.controls.settings().cuts.is_empty() {
         return;
     }
-    names::group(ui, texts::CUTS, |ui| {
-        heading(ui, texts::CUTS);
+    section(ui, texts::CUTS, |ui| {
         ui.set_max_width(width);
         if is_chosen {
-            let mut on = state.controls.kept_side() == KeptSide::Inside;
-            let hint = texts::KEEP_INSIDE_HINT;
-            if switch(ui, &mut on, texts::KEEP_INSIDE, hint) {
-                execute(Command::KeepSide(if on { KeptSide::Inside } else { KeptSide::Outside }));
-            }
+            let is_inside = state.controls.kept_side() == KeptSide::Inside;
+            let keep = |on| Command::KeepSide(if on { KeptSide::Inside } else { KeptSide::Outside });
+            switch(ui, is_inside, texts::KEEP_INSIDE, keep, execute);
         }
         if is_brush {
             brush_radius(ui, state, execute);
@@ -62,11 +58,7 @@ pub(super) fn cuts(ui: &mut Ui, state: &PanelState, width: f32, execute: Execute
             slider(ui, state, number, SLIDERS[number].name, execute);
         }
         if !state.controls.settings().cuts.is_empty() {
-            let size = vec2(width, ROW_HEIGHT);
-            let hint = texts::REMOVE_ALL_CUTS_HINT;
-            if ui.add_sized(size, Button::new(texts::REMOVE_ALL_CUTS)).tell(hint).clicked() {
-                execute(Command::ClearCuts);
-            }
+            command_button(ui, vec2(width, ROW_HEIGHT), texts::REMOVE_ALL_CUTS, Command::ClearCuts, execute);
         }
     });
 }
@@ -78,8 +70,7 @@ pub(super) fn curve(ui: &mut Ui, state: &PanelState, width: f32, execute: Execut
     if !is_chosen && !has_curve {
         return;
     }
-    names::group(ui, texts::CURVED_PLANE, |ui| {
-        heading(ui, texts::CURVED_PLANE);
+    section(ui, texts::CURVED_PLANE, |ui| {
         ui.set_max_width(width);
         if is_chosen {
             let step = match (line.map(|line| line.points.len()), has_curve) {
@@ -92,17 +83,12 @@ pub(super) fn curve(ui: &mut Ui, state: &PanelState, width: f32, execute: Execut
         }
         let size = vec2(width, ROW_HEIGHT);
         if line.is_some_and(|line| line.points.len() > 1) {
-            let hint = texts::END_CURVE_HINT;
-            let button = super::overlays::first(RichText::new(texts::END_CURVE));
-            if ui.add_sized(size, button).tell(hint).clicked() {
-                execute(Command::EndCurve);
-            }
+            let [name, hint] = texts::END_CURVE;
+            let button = super::overlays::first(RichText::new(name));
+            ui.add_sized(size, button).tell(hint).gives(Command::EndCurve, execute);
         }
         if has_curve {
-            let hint = texts::REMOVE_CURVE_HINT;
-            if ui.add_sized(size, Button::new(texts::REMOVE_CURVE)).tell(hint).clicked() {
-                execute(Command::ClearCurve);
-            }
+            command_button(ui, size, texts::REMOVE_CURVE, Command::ClearCurve, execute);
         }
     });
 }
@@ -116,34 +102,28 @@ pub(super) fn start_line(ui: &mut Ui, state: &PanelState, width: f32, execute: E
     if !is_chosen && points.is_none() {
         return;
     }
-    names::group(ui, texts::START_LINE, |ui| {
-        heading(ui, texts::START_LINE);
+    section(ui, texts::START_LINE, |ui| {
         ui.set_max_width(width);
-        let mut on = points.is_some();
-        let hint = texts::CURVED_LINE_HINT;
-        if switch(ui, &mut on, texts::CURVED_LINE, hint) {
-            execute(Command::ToggleStartCurve);
-        }
+        let about = [texts::CURVED_LINE, texts::CURVED_LINE_HINT];
+        switch(ui, points.is_some(), about, |_| Command::ToggleStartCurve, execute);
         let Some(points) = points.filter(|_| is_chosen) else { return };
         let [low, high] = [scene.low, scene.high].map(|corner| view::below_face(scene, corner).y);
-        for (n, [lateral, depth]) in points.iter().enumerate() {
-            let hint = texts::START_HANDLE_HINT;
-            if let Some(depth) = plain_slider(ui, &texts::start_handle(n + 1), *depth, [low, high], hint) {
-                execute(Command::MoveStartHandle(n, [*lateral, depth]));
-            }
+        for (n, [lateral, depth]) in points.iter().copied().enumerate() {
+            let name = texts::start_handle(n + 1);
+            let shown = (depth, texts::millimetres(depth));
+            let to = |depth| Command::MoveStartHandle(n, [lateral, depth]);
+            scale_slider(ui, [&name, texts::START_HANDLE_HINT], shown, ([low, high], 0.5), to, execute);
         }
-        let (count, add, remove) = (points.len(), texts::ADD_HANDLE_HINT, texts::REMOVE_HANDLE_HINT);
         let both = [
-            (Command::AddStartHandle(None), texts::ADD_HANDLE, count < MAX_START_POINTS, add),
-            (Command::RemoveStartHandle(None), texts::REMOVE_HANDLE, count > MIN_START_POINTS, remove),
+            (Command::AddStartHandle(None), texts::ADD_HANDLE, points.len() < MAX_START_POINTS),
+            (Command::RemoveStartHandle(None), texts::REMOVE_HANDLE, points.len() > MIN_START_POINTS),
         ];
         add_and_remove(ui, width, both, execute);
     });
 }
 
 pub(super) fn brush_radius(ui: &mut Ui, state: &PanelState, execute: Execute) {
-    let hint = texts::RADIUS_OF_BRUSH_HINT;
-    if let Some(radius) = plain_slider(ui, texts::RADIUS_OF_BRUSH, state.controls.brush_radius(), BRUSH_RADII, hint) {
-        execute(Command::BrushRadius(radius));
-    }
+    let radius = state.controls.brush_radius();
+    let shown = (radius, texts::millimetres(radius));
+    scale_slider(ui, texts::RADIUS_OF_BRUSH, shown, (BRUSH_RADII, 0.5), Command::BrushRadius, execute);
 }

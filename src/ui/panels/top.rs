@@ -4,7 +4,7 @@ use super::colours::{ACCENT, BUTTON, CHOSEN, EDGE, PANEL, TEXT, WARNING, WEAK_TE
 use super::icons::{self, Icon};
 use super::names::{self, Tell};
 use super::rail::{icon_button, paint};
-use super::widgets::row_of;
+use super::widgets::{row_of, truncated};
 use super::{Execute, PanelState, ROW_HEIGHT, TEXT_SIZE};
 use crate::command::Command;
 use crate::scene::{Layout, Mode, Settings};
@@ -16,15 +16,15 @@ use egui::{
     WidgetType, pos2, vec2,
 };
 
-/// The views: their names, what chooses them, and what they show.
-const VIEWS: [(&str, Command, &str); 7] = [
-    (texts::VIEW_3D, Command::Rendering, texts::VIEW_3D_HINT),
-    (texts::LAYOUT_BESIDE, Command::Layout(Layout::Beside), hints::of_layout(Layout::Beside)),
-    (texts::LAYOUT_FOUR, Command::Layout(Layout::Four), hints::of_layout(Layout::Four)),
-    (texts::LAYOUT_PAIR, Command::Layout(Layout::Pair), hints::of_layout(Layout::Pair)),
-    (Mode::Orthogonal.title(), Command::Mode(Mode::Orthogonal), hints::of_mode(Mode::Orthogonal)),
-    (Mode::Plane.title(), Command::Mode(Mode::Plane), hints::of_mode(Mode::Plane)),
-    (Mode::Tomography.title(), Command::Mode(Mode::Tomography), hints::of_mode(Mode::Tomography)),
+/// The views: what chooses them, their names, and what they show.
+const VIEWS: [(Command, [&str; 2]); 7] = [
+    (Command::Rendering, texts::VIEW_3D),
+    (Command::Layout(Layout::Beside), [texts::LAYOUT_BESIDE, hints::of_layout(Layout::Beside)]),
+    (Command::Layout(Layout::Four), [texts::LAYOUT_FOUR, hints::of_layout(Layout::Four)]),
+    (Command::Layout(Layout::Pair), [texts::LAYOUT_PAIR, hints::of_layout(Layout::Pair)]),
+    (Command::Mode(Mode::Orthogonal), [Mode::Orthogonal.title(), hints::of_mode(Mode::Orthogonal)]),
+    (Command::Mode(Mode::Plane), [Mode::Plane.title(), hints::of_mode(Mode::Plane)]),
+    (Command::Mode(Mode::Tomography), [Mode::Tomography.title(), hints::of_mode(Mode::Tomography)]),
 ];
 
 fn is_view(settings: &Settings, view: Command) -> bool {
@@ -35,17 +35,17 @@ fn is_view(settings: &Settings, view: Command) -> bool {
     }
 }
 
-/// What each button does: its icon, name, command and explanation.
-pub(super) type Item = (Icon, &'static str, Command, &'static str);
-const OPEN: Item = (icons::OPEN, texts::OPEN, Command::OpenFiles, texts::OPEN_HINT);
-const SAVE: Item = (icons::SAVE, texts::SAVE_WORKSPACE, Command::SaveWorkspace, texts::SAVE_WORKSPACE_HINT);
-const UNDO: Item = (icons::UNDO, texts::UNDO, Command::Undo, texts::UNDO_HINT);
-const REDO: Item = (icons::REDO, texts::REDO, Command::Redo, texts::REDO_HINT);
-const FIND: Item = (icons::SEARCH, texts::FIND, Command::Find, texts::FIND_HINT);
-const TIMES: Item = (icons::TIMES, texts::TIMES, Command::ToggleTimes, texts::TIMES_HINT);
-const FULL_SCREEN: Item = (icons::FULL_SCREEN, texts::FULL_SCREEN, Command::ToggleFullScreen, texts::FULL_SCREEN_HINT);
-const HELP: Item = (icons::HELP, texts::HELP, Command::ToggleHelp, texts::HELP_HINT);
-pub(super) const INSPECTOR: Item = (icons::INSPECTOR, texts::INSPECTOR, Command::ToggleDrawer, texts::DRAWER_HINT);
+/// What each button does: its icon, name and explanation, and command.
+pub(super) type Item = (Icon, [&'static str; 2], Command);
+const OPEN: Item = (icons::OPEN, texts::OPEN, Command::OpenFiles);
+const SAVE: Item = (icons::SAVE, texts::SAVE_WORKSPACE, Command::SaveWorkspace);
+const UNDO: Item = (icons::UNDO, texts::UNDO, Command::Undo);
+const REDO: Item = (icons::REDO, texts::REDO, Command::Redo);
+const FIND: Item = (icons::SEARCH, [texts::FIND, texts::FIND_HINT], Command::Find);
+const TIMES: Item = (icons::TIMES, texts::TIMES, Command::ToggleTimes);
+const FULL_SCREEN: Item = (icons::FULL_SCREEN, texts::FULL_SCREEN, Command::ToggleFullScreen);
+const HELP: Item = (icons::HELP, texts::HELP, Command::ToggleHelp);
+pub(super) const INSPECTOR: Item = (icons::INSPECTOR, [texts::INSPECTOR, texts::DRAWER_HINT], Command::ToggleDrawer);
 
 /// Width of a button with its icon alone, with a text, and of the search with its text, points.
 const ICON: f32 = 38.0;
@@ -67,10 +67,7 @@ pub(super) fn show(ui: &mut Ui, state: &PanelState, height: f32, execute: Execut
         let bar = ui.max_rect();
         let is_wide = bar.width() >= WIDE;
         let row = bar.shrink2(vec2(GAP + 2.0, (height - ROW_HEIGHT) / 2.0));
-        let mut left = row.left();
-        if bar.width() >= WIDEST {
-            left = name_program(ui, row) + 2.0 * GAP;
-        }
+        let mut left = if bar.width() >= WIDEST { name_program(ui, row) + 2.0 * GAP } else { row.left() };
         for item in [OPEN, SAVE] {
             let has_text = is_wide && item.2 == Command::OpenFiles;
             let width = if has_text { WITH_TEXT } else { ICON };
@@ -86,7 +83,7 @@ pub(super) fn show(ui: &mut Ui, state: &PanelState, height: f32, execute: Execut
         let font = FontId::proportional(TEXT_SIZE);
         let words = |ui: &Ui, text: &str| ui.painter().layout_no_wrap(text.into(), font.clone(), TEXT).size().x;
         let spare = if is_wide { 20.0 } else { 10.0 };
-        let names = VIEWS.map(|(name, ..)| if is_wide { name } else { short(name) });
+        let names = VIEWS.map(|(_, [name, _])| if is_wide { name } else { short(name) });
         let segments = names.map(|name| (name, words(ui, name) + spare));
         let all: f32 = segments.iter().map(|(_, width)| width).sum();
         // In the middle of the window where that leaves room for the tabs, else as far to the right as it goes.
@@ -125,7 +122,7 @@ fn name_program(ui: &Ui, row: Rect) -> f32 {
 pub(super) fn show_item(
     ui: &mut Ui,
     state: &PanelState,
-    (icon, name, command, hint): Item,
+    (icon, [name, hint], command): Item,
     has_text: bool,
     area: Rect,
     execute: Execute,
@@ -146,9 +143,7 @@ pub(super) fn show_item(
         let button = icon_button(ui, icon, (text, name), area.size(), (is_enabled, is_on));
         let button = button.tell(hint).named(name);
         let button = if command == Command::ToggleDrawer { button.expanded(is_on) } else { button };
-        if button.on_disabled_hover_text(hint).clicked() {
-            execute(command);
-        }
+        button.on_disabled_hover_text(hint).gives(command, execute);
     });
 }
 
@@ -169,7 +164,7 @@ fn show_views(ui: &mut Ui, state: &PanelState, area: Rect, segments: &[(&str, f3
         ui.painter().rect_stroke(area, 6.0, Stroke::new(1.0, EDGE), StrokeKind::Inside);
         let share = area.width() / segments.iter().map(|(_, width)| width).sum::<f32>();
         let mut left = area.left();
-        for ((name, command, hint), (text, width)) in VIEWS.into_iter().zip(segments) {
+        for ((command, [name, hint]), (text, width)) in VIEWS.into_iter().zip(segments) {
             let part = place(area, left, width * share);
             left += width * share;
             let is_chosen = is_view(settings, command);
@@ -184,9 +179,7 @@ fn show_views(ui: &mut Ui, state: &PanelState, area: Rect, segments: &[(&str, f3
             }
             let colour = if is_chosen || is_over { TEXT } else { WEAK_TEXT };
             painter.text(part.center(), Align2::CENTER_CENTER, text, FontId::proportional(TEXT_SIZE), colour);
-            if response.tell(hint).clicked() {
-                execute(command);
-            }
+            response.tell(hint).gives(command, execute);
         }
     });
 }
@@ -224,34 +217,25 @@ fn show_tabs(ui: &mut Ui, state: &PanelState, area: Rect, execute: Execute) {
             }
             clipped(ui, &recording.name, name.shrink2(vec2(8.0, 0.0)));
             let response = response.tell(&texts::recording_hint(&recording.path)).named(&recording.name);
-            if response.clicked() {
-                execute(Command::ShowRecording(n));
-            }
+            response.gives(Command::ShowRecording(n), execute);
             let response = ui.allocate_rect(close, Sense::click());
             let closes = texts::close_recording(&recording.name);
             response.widget_info(|| WidgetInfo::labeled(WidgetType::Button, true, &closes));
             let colour = if response.hovered() || response.has_focus() { TEXT } else { WEAK_TEXT };
             paint(ui.painter(), icons::CLOSE, Rect::from_center_size(close.center(), vec2(14.0, 14.0)), colour);
-            if response.tell(texts::CLOSE_RECORDING_HINT).named(&closes).clicked() {
-                execute(Command::CloseRecording(n));
-            }
+            response.tell(texts::CLOSE_RECORDING_HINT).named(&closes).gives(Command::CloseRecording(n), execute);
         }
         if !has_all {
             let more = place(area, area.right() - 30.0, 30.0);
             let response = ui.put(more, Button::new(texts::MORE)).tell(texts::NEXT_RECORDING_HINT);
-            if response.named(texts::NEXT_RECORDING).clicked() {
-                execute(Command::StepRecording(1));
-            }
+            response.named(texts::NEXT_RECORDING).gives(Command::StepRecording(1), execute);
         }
     });
 }
 
 /// A text that ends in dots where it has no room.
 fn clipped(ui: &Ui, text: &str, area: Rect) {
-    let mut job =
-        egui::text::LayoutJob::simple_singleline(text.to_string(), FontId::proportional(TEXT_SIZE - 1.0), TEXT);
-    job.wrap = egui::text::TextWrapping::truncate_at_width(area.width());
-    let galley = ui.painter().layout_job(job);
+    let galley = truncated(ui, text, TEXT_SIZE - 1.0, area.width());
     ui.painter().galley(pos2(area.left(), area.center().y - galley.size().y / 2.0), galley, TEXT);
 }
 
@@ -261,10 +245,8 @@ pub(super) fn show_buttons(ui: &mut Ui, state: &PanelState, width: f32, execute:
         return;
     }
     let settings = state.controls.settings();
-    let views = VIEWS.map(|(name, command, _)| (command, name));
     let columns = ((width / WITH_TEXT) as usize).clamp(1, 3);
-    let hint = |command| VIEWS.iter().find(|(_, other, _)| *other == command).map_or("", |(.., hint)| hint);
-    row_of(ui, texts::VIEW, &views, (columns, width), |view| is_view(settings, view), hint, &mut *execute);
+    row_of(ui, texts::VIEW, &VIEWS, (columns, width), |view| is_view(settings, view), execute);
     names::group(ui, texts::PROGRAM, |ui| {
         let all = [OPEN, SAVE, UNDO, REDO, FIND, HELP, TIMES, FULL_SCREEN];
         let columns = (width / 52.0).floor().clamp(1.0, 8.0);

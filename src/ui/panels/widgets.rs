@@ -1,17 +1,21 @@
-//! Building blocks of panels: sliders of settings and of other values, switches, and the frame of messages.
+//! Building blocks of panels: dialogs, rows, buttons, sliders of settings and of other values, switches, shortened texts, and the frame of messages.
 
-use super::colours::{ABSENT, ACCENT, BACKGROUND, BUTTON, EDGE, MESSAGE, ON_SELECTED, SELECTED, TEXT, WEAK_TEXT};
+use super::colours::{
+    ABSENT, ACCENT, BACKGROUND, BUTTON, EDGE, MESSAGE, ON_SELECTED, PANEL, SELECTED, TEXT, WEAK_TEXT,
+};
 use super::names::{self, Tell};
-use super::{Execute, PanelState, ROW_HEIGHT, SMALL_TEXT, TEXT_SIZE, heading};
+use super::{Execute, PanelState, ROW_HEIGHT, SMALL_TEXT, TEXT_SIZE, section};
 use crate::command::Command;
 use crate::scene::Settings;
 use crate::sliders::{self, SLIDERS};
 use crate::texts;
 use egui::accesskit::Role;
+use egui::text::{LayoutJob, TextWrapping};
 use egui::{
-    Align, Button, Color32, FontId, Frame, Label, Margin, PointerButton, Rect, RichText, Sense, Slider, Stroke,
-    StrokeKind, Ui, WidgetInfo, WidgetType, pos2, vec2,
+    Align, Align2, Area, Button, Color32, FontId, Frame, Galley, Id, Label, Layout, Margin, Order, PointerButton, Rect,
+    Response, RichText, Sense, Slider, Stroke, StrokeKind, Ui, Vec2, WidgetInfo, WidgetType, pos2, vec2,
 };
+use std::sync::Arc;
 
 /// Distance between two messages, points.
 pub(super) const BETWEEN_MESSAGES: f32 = 8.0;
@@ -28,6 +32,50 @@ pub(super) fn message_frame(edge: Color32) -> Frame {
     Frame::new().fill(MESSAGE).inner_margin(Margin::symmetric(16, 10)).corner_radius(8).stroke(Stroke::new(2.0, edge))
 }
 
+/// Shows a dialog over everything else. `place`, `below`: its anchor in the window and the distance below it; `margin`: around its content; `widths`: the
+/// smallest and the largest width of the content; all in points. `add` adds the content and gets its width.
+pub(super) fn dialog(
+    ui: &Ui,
+    title: &str,
+    (place, below): (Align2, f32),
+    margin: i8,
+    widths: [f32; 2],
+    add: impl FnOnce(&mut Ui, f32),
+) {
+    let area = Area::new(Id::new(title)).order(Order::Foreground).anchor(place, vec2(0.0, below));
+    area.show(ui.ctx(), |ui| {
+        names::name(ui, Role::Dialog, title);
+        let frame = Frame::new().fill(PANEL).inner_margin(Margin::same(margin)).corner_radius(10);
+        frame.stroke(Stroke::new(2.0, ACCENT)).show(ui, |ui| {
+            let width = ui.ctx().content_rect().width() - 2.0 * f32::from(margin) - 12.0;
+            let width = width.clamp(widths[0], widths[1]);
+            ui.set_width(width);
+            add(ui, width);
+        });
+    });
+}
+
+/// Shows entries in rows of `columns`, at least 1.
+pub(super) fn in_rows<T>(
+    ui: &mut Ui,
+    entries: impl IntoIterator<Item = T>,
+    columns: usize,
+    mut add: impl FnMut(&mut Ui, T),
+) {
+    let mut entries = entries.into_iter().peekable();
+    while entries.peek().is_some() {
+        ui.horizontal(|ui| entries.by_ref().take(columns.max(1)).for_each(|entry| add(ui, entry)));
+    }
+}
+
+/// A part of a row that is so wide whatever is in it.
+pub(super) fn cell(ui: &mut Ui, size: Vec2, add: impl FnOnce(&mut Ui)) {
+    ui.allocate_ui_with_layout(size, Layout::left_to_right(Align::Center), |ui| {
+        ui.set_min_width(size.x);
+        add(ui);
+    });
+}
+
 /// The index of the slider for the first of these keys that exists with these settings; None if none does.
 pub(super) fn front(keys: &[&str], settings: &Settings) -> Option<usize> {
     keys.iter().find_map(|key| SLIDERS.iter().position(|s| s.key == *key && s.applies(settings)))
@@ -41,11 +89,8 @@ pub(super) fn slider(ui: &mut Ui, state: &PanelState, number: usize, name: &str,
     let before = slider.get(settings);
     let is_sought = state.visible.inspector.sought == Some(number);
     if slider.is_switch() {
-        let mut on = before >= 0.5;
-        let response = switch_row(ui, &mut on, name, slider.hint);
-        if response.clicked() {
-            execute(Command::SetSlider(number, f64::from(u8::from(on))));
-        }
+        let set = |on| Command::SetSlider(number, f64::from(u8::from(on)));
+        let response = switch(ui, before >= 0.5, [name, slider.hint], set, execute);
         if is_sought {
             find(&response);
         }
@@ -59,9 +104,7 @@ pub(super) fn slider(ui: &mut Ui, state: &PanelState, number: usize, name: &str,
         let slider = Slider::new(&mut value, low..=high.max(low)).show_value(false).step_by(slider.step);
         ui.add(slider).tell(&hint).named(name).with_value(&shown)
     });
-    if about.tell(texts::TYPE_VALUE_HINT).named(&texts::value_of(name)).clicked() {
-        execute(Command::TypeValue(number));
-    }
+    about.tell(texts::TYPE_VALUE_HINT).named(&texts::value_of(name)).gives(Command::TypeValue(number), execute);
     if is_sought {
         find(&response);
     }
@@ -71,17 +114,14 @@ pub(super) fn slider(ui: &mut Ui, state: &PanelState, number: usize, name: &str,
         execute(Command::ResetSlider(number));
         return;
     }
-    // egui also reports a change when it rounds a value to the step, without any input.
-    let is_held = response.dragged() || response.clicked() || response.is_pointer_button_down_on();
-    let is_asked = names::asks_for_value(ui, &response);
-    if (is_held || is_asked) && value != before {
+    if names::asks_for_value(ui, &response) && value != before {
         execute(Command::SetSlider(number, value));
     }
 }
 
 /// Gives the keyboard to a control that was searched for, once, and scrolls to it.
-fn find(control: &egui::Response) {
-    let id = egui::Id::new("sought");
+fn find(control: &Response) {
+    let id = Id::new("sought");
     let is_new = control.ctx.data_mut(|data| data.get_temp(id) != Some(control.id));
     if is_new {
         control.ctx.data_mut(|data| data.insert_temp(id, control.id));
@@ -121,11 +161,10 @@ fn row(
     name: &str,
     value: &str,
     is_typed: bool,
-    add: impl FnOnce(&mut Ui) -> egui::Response,
-) -> (egui::Response, egui::Response) {
+    add: impl FnOnce(&mut Ui) -> Response,
+) -> (Response, Response) {
     let width = ui.available_width();
-    let font = FontId::proportional(TEXT_SIZE);
-    let words = ui.painter().layout_no_wrap(name.to_string(), font.clone(), TEXT);
+    let words = ui.painter().layout_no_wrap(name.to_string(), FontId::proportional(TEXT_SIZE), TEXT);
     let is_long = words.size().x > NAME || width < 2.5 * NAME;
     if is_long {
         let (area, _) = ui.allocate_exact_size(vec2(width, TEXT_SIZE + 4.0), Sense::hover());
@@ -150,9 +189,7 @@ fn row(
         let is_over = is_typed || shown.hovered() || shown.has_focus();
         let stroke = Stroke::new(1.0, if is_over { ACCENT } else { EDGE });
         painter.rect(area, 4.0, BACKGROUND, stroke, StrokeKind::Inside);
-        let mut job = egui::text::LayoutJob::simple_singleline(value.to_string(), font.clone(), TEXT);
-        job.wrap = egui::text::TextWrapping::truncate_at_width(VALUE - 8.0);
-        let text = painter.layout_job(job);
+        let text = truncated(ui, value, TEXT_SIZE, VALUE - 8.0);
         let at = pos2(area.right() - 6.0 - text.size().x, area.center().y - text.size().y / 2.0);
         painter.galley(at.max(area.left_top()), text, TEXT);
         (set, shown)
@@ -160,54 +197,57 @@ fn row(
     .inner
 }
 
+/// A text of one line that ends in dots where it has no room.
+pub(super) fn truncated(ui: &Ui, text: &str, size: f32, width: f32) -> Arc<Galley> {
+    let mut job = LayoutJob::simple_singleline(text.to_string(), FontId::proportional(size), TEXT);
+    job.wrap = TextWrapping::truncate_at_width(width);
+    ui.painter().layout_job(job)
+}
+
 /// Shows a name in place of a control that the present mode does not have.
 pub(super) fn absent(ui: &mut Ui, name: &str) {
     let (area, response) = ui.allocate_exact_size(vec2(ui.available_width(), SLIDER_ROW), Sense::hover());
     let font = FontId::proportional(TEXT_SIZE);
     let at = area.left_center();
-    ui.painter().text(at, egui::Align2::LEFT_CENTER, name, font.clone(), ABSENT);
-    ui.painter().text(area.right_center() - vec2(6.0, 0.0), egui::Align2::RIGHT_CENTER, "-", font, ABSENT);
+    ui.painter().text(at, Align2::LEFT_CENTER, name, font.clone(), ABSENT);
+    ui.painter().text(area.right_center() - vec2(6.0, 0.0), Align2::RIGHT_CENTER, "-", font, ABSENT);
     response.on_hover_text(texts::NO_SUCH_CONTROL);
 }
 
-/// Shows buttons of which one is selected, under a title, in rows of `columns` buttons that are `width` points wide.
-pub(super) fn row_of<T: Copy>(
+/// Shows buttons of which one is selected, under a title, in rows of `columns` buttons that are `width` points wide: of each its command, its name and
+/// its hint.
+pub(super) fn row_of(
     ui: &mut Ui,
     title: &str,
-    all: &[(T, &str)],
+    all: &[(Command, [&str; 2])],
     (columns, width): (usize, f32),
-    is_chosen: impl Fn(T) -> bool,
-    hint: impl Fn(T) -> &'static str,
-    mut select: impl FnMut(T),
+    is_chosen: impl Fn(Command) -> bool,
+    execute: Execute,
 ) {
-    names::group(ui, title, |ui| {
-        heading(ui, title);
+    section(ui, title, |ui| {
         ui.spacing_mut().item_spacing = vec2(4.0, 4.0);
         ui.spacing_mut().button_padding.x = 2.0;
         let each = (width - 4.0 * (columns - 1) as f32) / columns as f32;
-        for some in all.chunks(columns) {
-            ui.horizontal(|ui| {
-                for (value, name) in some {
-                    let button = Button::selectable(is_chosen(*value), *name).frame_when_inactive(true);
-                    if ui.add(button.min_size(vec2(each, ROW_HEIGHT))).tell(hint(*value)).clicked() {
-                        select(*value);
-                    }
-                }
-            });
-        }
+        in_rows(ui, all, columns, |ui, (command, [name, hint])| {
+            let button = Button::selectable(is_chosen(*command), *name).frame_when_inactive(true);
+            ui.add(button.min_size(vec2(each, ROW_HEIGHT))).tell(hint).gives(*command, execute);
+        });
     });
 }
 
-/// Shows two buttons side by side, one that adds and one that removes, together `width` points wide: of each its command, its name, whether it can be
-/// pressed, and its hint.
-pub(super) fn add_and_remove(ui: &mut Ui, width: f32, both: [(Command, &str, bool, &str); 2], execute: Execute) {
+/// Shows a button with a name and a hint that gives a command.
+pub(super) fn command_button(ui: &mut Ui, size: Vec2, [name, hint]: [&str; 2], command: Command, execute: Execute) {
+    ui.add_sized(size, Button::new(name)).tell(hint).gives(command, execute);
+}
+
+/// Shows two buttons side by side, one that adds and one that removes, together `width` points wide: of each its command, its name and hint, and whether
+/// it can be pressed.
+pub(super) fn add_and_remove(ui: &mut Ui, width: f32, both: [(Command, [&str; 2], bool); 2], execute: Execute) {
     let half = vec2((width - ui.spacing().item_spacing.x) / 2.0, ROW_HEIGHT);
     ui.horizontal(|ui| {
-        for (word, (command, name, is_enabled, hint)) in [texts::ADD, texts::REMOVE].into_iter().zip(both) {
+        for (word, (command, [name, hint], is_enabled)) in [texts::ADD, texts::REMOVE].into_iter().zip(both) {
             let button = ui.add_enabled(is_enabled, Button::new(word).min_size(half));
-            if button.tell(hint).on_disabled_hover_text(hint).named(name).clicked() {
-                execute(command);
-            }
+            button.tell(hint).on_disabled_hover_text(hint).named(name).gives(command, execute);
         }
     });
 }
@@ -220,26 +260,21 @@ pub(super) fn say_step(ui: &mut Ui, step: &str, colour: Color32) {
     });
 }
 
-/// Shows a slider in mm for a value that is no setting. `before`: the present value. Returns the new value if the user changes it.
-pub(super) fn plain_slider(ui: &mut Ui, name: &str, before: f64, range: [f64; 2], hint: &str) -> Option<f64> {
-    scale_slider(ui, name, before, (range, 0.5), texts::millimetres(before), hint)
-}
-
-/// Shows a slider for a value that is no setting. `before`: the present value; `shown`: the value as displayed. Returns the new value if the
-/// user changes it.
+/// Shows a slider for a value that is no setting, with its range and step. `before`: the present value; `shown`: the value as displayed. A new value
+/// of the user gives the command for it.
 pub(super) fn scale_slider(
     ui: &mut Ui,
-    name: &str,
-    before: f64,
+    [name, hint]: [&str; 2],
+    (before, shown): (f64, String),
     ([low, high], step): ([f64; 2], f64),
-    shown: String,
-    hint: &str,
-) -> Option<f64> {
+    command: impl FnOnce(f64) -> Command,
+    execute: Execute,
+) {
     let mut value = before.clamp(low, high.max(low));
     let width = ui.available_width();
     ui.horizontal(|ui| {
         ui.label(RichText::new(name));
-        ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             ui.label(RichText::new(&shown).color(ACCENT));
         });
     });
@@ -248,38 +283,42 @@ pub(super) fn scale_slider(
     ui.spacing_mut().interact_size.y = KNOB;
     let slider = ui.add(Slider::new(&mut value, low..=high.max(low)).show_value(false).step_by(step));
     let slider = slider.tell(hint).named(name).with_value(&shown);
-    let is_held = slider.dragged() || slider.clicked() || slider.is_pointer_button_down_on();
-    ((is_held || names::asks_for_value(ui, &slider)) && value != before).then_some(value)
+    if names::asks_for_value(ui, &slider) && value != before {
+        execute(command(value));
+    }
 }
 
-/// Shows a switch with its name; the whole row reacts. Returns true if the user changed it.
-pub(super) fn switch(ui: &mut Ui, on: &mut bool, name: &str, hint: &str) -> bool {
-    switch_row(ui, on, name, hint).clicked()
-}
-
-fn switch_row(ui: &mut Ui, on: &mut bool, name: &str, hint: &str) -> egui::Response {
+/// Shows a switch with its name; the whole row reacts. A click gives the command for the other position.
+pub(super) fn switch(
+    ui: &mut Ui,
+    is_on: bool,
+    [name, hint]: [&str; 2],
+    command: impl FnOnce(bool) -> Command,
+    execute: Execute,
+) -> Response {
     let (width, height) = (40.0, 22.0);
     // A long name has two lines, and ends before the switch.
     let room = (ui.available_width() - width - 6.0).max(0.0);
     let label = ui.painter().layout(name.to_string(), FontId::proportional(TEXT_SIZE), TEXT, room);
     let size = vec2(ui.available_width(), SLIDER_ROW.max(label.size().y + 4.0));
     let (area, response) = ui.allocate_exact_size(size, Sense::click());
-    if response.clicked() {
-        *on = !*on;
-    }
-    response.widget_info(|| WidgetInfo::selected(WidgetType::Checkbox, true, *on, name));
+    let on = is_on ^ response.clicked();
+    response.widget_info(|| WidgetInfo::selected(WidgetType::Checkbox, true, on, name));
     let response = response.tell(hint).with_role(Role::Switch);
     let right = pos2(area.right() - width, area.center().y - height / 2.0);
     let track = Rect::from_min_size(right, vec2(width, height));
     let painter = ui.painter();
-    let fill = if *on { SELECTED } else { BUTTON };
+    let fill = if on { SELECTED } else { BUTTON };
     painter.rect_filled(track, height / 2.0, fill);
     let edge = if response.hovered() || response.has_focus() { TEXT } else { WEAK_TEXT };
     painter.rect_stroke(track, height / 2.0, Stroke::new(1.0, edge), StrokeKind::Inside);
-    let x = if *on { track.right() - height / 2.0 } else { track.left() + height / 2.0 };
+    let x = if on { track.right() - height / 2.0 } else { track.left() + height / 2.0 };
     painter.circle_filled(pos2(x, track.center().y), height / 2.0 - 4.0, ON_SELECTED);
     let at = pos2(area.left(), area.center().y - label.size().y / 2.0);
     let clip = Rect::from_min_max(area.min, pos2(track.left() - 6.0, area.bottom()));
     painter.with_clip_rect(clip).galley(at, label, TEXT);
+    if response.clicked() {
+        execute(command(on));
+    }
     response
 }

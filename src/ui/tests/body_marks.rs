@@ -48,7 +48,7 @@ fn the_probe_and_the_mark_follow_the_pointer_and_nothing_else_moves() {
         // The slop is 3 pixels of the picture.
         assert!((x - to[0]).hypot(y - to[1]) <= 3.1, "{toml}: {x} {y} {to:?}");
         let probed = mark(&window);
-        assert_eq!(BodyMark { probe: probed.probe, ..before.body_marks[0] }, probed, "{toml}");
+        assert_eq!(BodyMark { probe: probed.probe, ..before.drawn.body_marks[0] }, probed, "{toml}");
         // The body, off the probe.
         let centre = centre_of(&probed, picture);
         let from = [centre[0] + 60.0, centre[1] - 60.0];
@@ -94,13 +94,13 @@ fn other_tools_pass_through_marks_and_beside_marks_their_tool_turns_the_view() {
     let (before, picture) = (window.controls.settings().clone(), size(&window));
     window.drag(Button::Left, [picture[0] * 0.3, picture[1] * 0.7], [picture[0] * 0.4, picture[1] * 0.6]);
     assert_ne!(window.controls.settings().camera, before.camera);
-    assert_eq!(window.controls.body_marks(), before.body_marks);
+    assert_eq!(window.controls.body_marks(), before.drawn.body_marks);
     let turned = window.controls.settings().camera.clone();
     window.tool(Tool::Rotate);
     let probe = probe_of(&mark(&window), picture);
     window.drag(Button::Left, probe, [probe[0] - 40.0, probe[1]]);
     assert_ne!(window.controls.settings().camera, turned);
-    assert_eq!(window.controls.body_marks(), before.body_marks);
+    assert_eq!(window.controls.body_marks(), before.drawn.body_marks);
 }
 
 #[test]
@@ -162,14 +162,14 @@ fn buttons_choose_the_body_and_sliders_place_it_without_a_pointer() {
     };
     press(&mut shown, Body::FetusBreech.title());
     press(&mut shown, Body::Neck.title());
-    press(&mut shown, texts::MIRRORED);
+    press(&mut shown, texts::MIRRORED[0]);
     let expected = BodyMark { body: Body::Neck, mirrored: true, ..BodyMark::default() };
     assert_eq!(shown.controls.body_marks(), [expected]);
     let names = [
         texts::TURN_OF_PROBE,
         texts::PROBE_ACROSS,
         texts::PROBE_DOWN,
-        texts::SIZE_OF_MARK,
+        texts::SIZE_OF_MARK[0],
         texts::MARK_ACROSS,
         texts::MARK_DOWN,
     ];
@@ -179,10 +179,10 @@ fn buttons_choose_the_body_and_sliders_place_it_without_a_pointer() {
         shown.ask(node, Action::Increment, None);
         assert_ne!(shown.controls.body_marks()[0], before, "{name}");
     }
-    press(&mut shown, texts::ADD_BODY_MARK);
+    press(&mut shown, texts::ADD_BODY_MARK[0]);
     assert_eq!(shown.controls.body_marks().len(), 2);
     press(&mut shown, &texts::body_mark(1));
-    press(&mut shown, texts::REMOVE_BODY_MARK);
+    press(&mut shown, texts::REMOVE_BODY_MARK[0]);
     assert_eq!(shown.controls.body_marks(), [BodyMark { at: [0.12, 0.8], body: Body::Neck, ..BodyMark::default() }]);
 }
 

@@ -33,17 +33,17 @@ fn how_the_loop_is_played_is_undone_step_by_step() {
     assert_eq!(shown.apply(Command::WholeCine), Change::Marks);
     then(&|cine| (cine.first, cine.last) = (None, None));
     for cine in expected.iter().rev() {
-        assert_eq!(shown.controls.settings().cine, *cine);
+        assert_eq!(shown.controls.settings().drawn.cine, *cine);
         shown.apply(Command::Undo);
     }
     for cine in &expected[1..] {
         assert_eq!(shown.apply(Command::Redo), Change::Marks);
-        assert_eq!(shown.controls.settings().cine, *cine);
+        assert_eq!(shown.controls.settings().drawn.cine, *cine);
     }
     assert_eq!(shown.scene.settings, rendered, "the picture is not drawn again");
     // A reset of the view keeps it, as it keeps the measurements.
     shown.apply(Command::Reset);
-    assert_eq!(shown.controls.settings().cine, expected[expected.len() - 1]);
+    assert_eq!(shown.controls.settings().drawn.cine, expected[expected.len() - 1]);
 }
 
 /// Prevents a workspace that is rendered without the bar which the window saves, and a loop that begins anew with each opening.
@@ -62,9 +62,12 @@ fn a_workspace_keeps_the_bar_and_the_loop() {
         layers.finish().expect("settings")
     };
     let settings = read(&shown);
-    assert_eq!((settings.marks.bar, settings.cine), (false, Cine { first: Some(2), speed: 4.0, ..Cine::default() }));
+    assert_eq!(
+        (settings.drawn.marks.bar, settings.drawn.cine),
+        (false, Cine { first: Some(2), speed: 4.0, ..Cine::default() })
+    );
     assert_eq!(shown.apply(Command::Undo), Change::Marks);
-    assert!(read(&shown).marks.bar);
+    assert!(read(&shown).drawn.marks.bar);
 }
 
 /// Requirement: on the line of time a press shows a volume, the ends of the loop are dragged, a double click plays all, and keys and a screen reader

@@ -237,8 +237,8 @@ fn everything_that_is_drawn_has_the_contrast_that_wcag_demands() {
     shown.apply(Command::CurvePoint(PlaneName::A, [5.0, 70.0]));
     check(&shown, "a line in work");
     let mut shown = Shown::new("mode='surface'");
-    shown.is_frozen = true;
-    shown.pointers.0 = Some([600.0, 400.0]);
+    shown.timeliness.is_frozen = true;
+    shown.pointers.of_mouse = Some([600.0, 400.0]);
     shown.budget = Some(Duration::from_millis(16));
     shown.times.passes = vec![("surface", 1.0, 3), ("shade", 0.5, 3)];
     for (n, what) in ["help", "times", "exports", "the question"].into_iter().enumerate() {

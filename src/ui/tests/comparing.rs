@@ -35,16 +35,16 @@ fn every_button_of_a_comparison_gives_its_command() {
         let mut shown = compared(CompareView::Tiles, size);
         shown.check("comparison");
         for (name, command) in [
-            (texts::COMPARED_TILES, Command::CompareView(CompareView::Tiles)),
-            (texts::COMPARED_DIFFERENCE, Command::CompareView(CompareView::Difference)),
-            (texts::COMPARED_WIPE, Command::CompareView(CompareView::Wipe)),
-            (texts::LINK_VIEW, Command::ToggleLink(Link::View)),
-            (texts::LINK_PLANES, Command::ToggleLink(Link::Planes)),
-            (texts::LINK_LOOK, Command::ToggleLink(Link::Look)),
-            (texts::LINK_VOLUME, Command::ToggleLink(Link::Volume)),
+            (texts::COMPARED_TILES[0], Command::CompareView(CompareView::Tiles)),
+            (texts::COMPARED_DIFFERENCE[0], Command::CompareView(CompareView::Difference)),
+            (texts::COMPARED_WIPE[0], Command::CompareView(CompareView::Wipe)),
+            (texts::LINK_VIEW[0], Command::ToggleLink(Link::View)),
+            (texts::LINK_PLANES[0], Command::ToggleLink(Link::Planes)),
+            (texts::LINK_LOOK[0], Command::ToggleLink(Link::Look)),
+            (texts::LINK_VOLUME[0], Command::ToggleLink(Link::Volume)),
             (texts::ALIGN, Command::Align),
-            (texts::ADD_COMPARED, Command::CompareFurther),
-            (texts::END_COMPARISON, Command::Compare),
+            (texts::ADD_COMPARED[0], Command::CompareFurther),
+            (texts::END_COMPARISON[0], Command::Compare),
         ] {
             let node = shown.find(texts::COMPARISON, Role::Button, name);
             assert_eq!(shown.ask(node, Action::Click, None), [command], "{name}");
@@ -104,7 +104,7 @@ fn four_tiles_are_a_square() {
         let (end, of_room) = (room.tile(3).0[axis] + room.tile(3).1[axis], whole.0[axis] + whole.1[axis]);
         assert!(end <= of_room && of_room - end < 2, "{axis}");
     }
-    assert!(shown.all(texts::COMPARISON, Role::Button, texts::ADD_COMPARED).is_empty());
+    assert!(shown.all(texts::COMPARISON, Role::Button, texts::ADD_COMPARED[0]).is_empty());
 }
 
 /// A drag over B moves it, with Shift it turns, in pixels of its picture.

@@ -59,7 +59,7 @@ fn a_live_picture_that_is_more_than_a_second_behind_says_so() {
         [("mode='surface'", SIZE), ("mode='surface'\nlayout='four'", SIZE), ("mode='plane'", [300, 250])]
     {
         let mut shown = Shown::sized(toml, size, 1.0);
-        (shown.is_live, shown.times.latency) = (true, Some(999.0));
+        (shown.timeliness.is_live, shown.times.latency) = (true, Some(999.0));
         shown.settle();
         assert!(delays(&shown).is_empty() && !is_named(&shown), "{toml}: under a second");
         shown.times.latency = Some(2410.0);
@@ -81,9 +81,9 @@ fn a_live_picture_that_is_more_than_a_second_behind_says_so() {
             assert!(delays(&shown).is_empty() && !is_named(&shown), "{toml}: {what}");
             change(&mut shown, false);
         };
-        is_silent(&|shown, is_on| shown.is_frozen = is_on, "frozen");
-        is_silent(&|shown, is_on| shown.is_live = !is_on, "a recording");
-        is_silent(&|shown, is_on| shown.ended = is_on.then_some(Duration::from_secs(3)), "ended");
+        is_silent(&|shown, is_on| shown.timeliness.is_frozen = is_on, "frozen");
+        is_silent(&|shown, is_on| shown.timeliness.is_live = !is_on, "a recording");
+        is_silent(&|shown, is_on| shown.timeliness.ended = is_on.then_some(Duration::from_secs(3)), "ended");
     }
 }
 

@@ -276,9 +276,9 @@ fn a_drag_goes_on_outside_of_the_window_and_keys_stay_held() {
     let mut keys = HeldKeys::default();
     let shift = Modifiers { shift: true, ..Modifiers::default() };
     assert!(keys.input(&Input::Modifiers(shift)).is_none() && keys.input(&Input::PointerLeft).is_none());
-    assert_eq!(keys.modifiers(), shift);
+    assert_eq!(keys.modifiers, shift);
     keys.input(&Input::FocusLost);
-    assert_eq!(keys.modifiers(), Modifiers::default());
+    assert_eq!(keys.modifiers, Modifiers::default());
 }
 
 /// A touch at a position on the picture.

@@ -350,9 +350,9 @@ fn the_controls_of_the_bar_stand_still() {
         let before = ids(&shown);
         assert!(before.len() >= 2, "{size:?} at {scale}: {before:?}");
         for n in (0..40_u32).step_by(3) {
-            shown.is_live = n < 20;
-            shown.is_frozen = (20..30).contains(&n);
-            shown.ended = (n >= 30).then(|| Duration::from_secs(u64::from(10_u32.pow(n % 5))));
+            shown.timeliness.is_live = n < 20;
+            shown.timeliness.is_frozen = (20..30).contains(&n);
+            shown.timeliness.ended = (n >= 30).then(|| Duration::from_secs(u64::from(10_u32.pow(n % 5))));
             shown.cine.count = (n as usize + 1).min(20);
             shown.cine.shown = Some(shown.cine.count - 1);
             shown.cine.range = n as usize / 4..=shown.cine.count - 1;

@@ -223,13 +223,13 @@ fn the_picture_is_described() {
     };
     assert_eq!(picture(&shown)[0], "Surface from the front, live, Demo data (phantom)");
     for (seconds, said) in [(7, "Ended 7 s"), (119, "Ended 1 min"), (7200, "Ended 2 h")] {
-        shown.ended = Some(Duration::from_secs(seconds));
+        shown.timeliness.ended = Some(Duration::from_secs(seconds));
         shown.settle();
         assert_eq!(picture(&shown)[0], "Surface from the front, the source has ended, Demo data (phantom)");
         shown.find("Cine loop", Role::Button, said);
     }
     shown.apply(Command::Rotate([30.0, 20.0]));
-    shown.is_frozen = true;
+    shown.timeliness.is_frozen = true;
     shown.apply(Command::Layout(Layout::Four));
     let [name, about] = picture(&shown);
     assert!(name.starts_with("Surface with three planes, turned to azimuth") && name.contains(", frozen,"), "{name}");

@@ -170,7 +170,7 @@ proptest! {
                     let is_covered = !follows;
                     let on =
                         Viewport { corner, size, scene, volume: None, measures: &measures, body_marks: &body_marks, start_line, has_work, is_covered, now };
-                    let mut commands = gestures.input(input, &on, *tool, keys.modifiers());
+                    let mut commands = gestures.input(input, &on, *tool, keys.modifiers);
                     commands.extend(keys.input(input));
                     for command in commands {
                         prop_assert!(is_finite(&command), "{input:?}: {command:?}");

@@ -4,12 +4,12 @@ use super::*;
 use crate::cine_player::{CinePlayer, CineState, Loop};
 use crate::command::InspectorTab;
 use crate::controls::EXAMS;
-use crate::keyboard_pointer::PointerMark;
 use crate::live::cine::CineVolume;
 use crate::panels::accesskit::{Action, ActionData, ActionRequest, Node, NodeId, TreeId, TreeUpdate};
 use crate::panels::drawn::Drawn;
 use crate::panels::{
-    self, Banner, FilesShown, Note, PanelOutput, PanelState, Panels, PresetTile, PresetsShown, Reading, Room, Visible,
+    self, Banner, FilesShown, Note, PanelOutput, PanelState, Panels, Pointers, PresetTile, PresetsShown, Reading, Room,
+    SmallPictures, Timeliness, Visible,
 };
 use crate::passes::unveil::StartLine;
 use crate::picture::Picture;
@@ -42,10 +42,7 @@ pub(super) struct Shown {
     pub(super) has_drawn: bool,
     /// The scene of the picture that is shown while another one is drawn; none: the present one's.
     pub(super) kept: Option<Scene>,
-    pub(super) is_frozen: bool,
-    pub(super) is_live: bool,
-    pub(super) is_late: bool,
-    pub(super) ended: Option<Duration>,
+    pub(super) timeliness: Timeliness,
     pub(super) cine: CineState,
     pub(super) banner: Option<Banner>,
     pub(super) notes: Vec<Note>,
@@ -60,8 +57,7 @@ pub(super) struct Shown {
     pub(super) start_lines: Vec<StartLine>,
     /// The volume that is compared with the shown one.
     pub(super) compared: Option<crate::comparison::Shown>,
-    /// That of no windowing system, and that by keyboard.
-    pub(super) pointers: (Option<[f64; 2]>, Option<PointerMark>),
+    pub(super) pointers: Pointers,
     /// What the last layout said.
     pub(super) tree: BTreeMap<NodeId, Node>,
     pub(super) focus: Option<NodeId>,
@@ -97,10 +93,7 @@ impl Shown {
             leaving: None,
             has_drawn: true,
             kept: None,
-            is_frozen: false,
-            is_live: false,
-            is_late: false,
-            ended: None,
+            timeliness: Timeliness::default(),
             cine: CinePlayer::default().state(
                 Loop { cine: &Cine::default(), volumes: &(0..20).map(|_| CineVolume::default()).collect() },
                 Some(2),
@@ -113,7 +106,7 @@ impl Shown {
             reading: None,
             presets: None,
             start_lines: Vec::new(),
-            pointers: (None, None),
+            pointers: Pointers::default(),
             compared: None,
             tree: BTreeMap::new(),
             focus: None,
@@ -209,20 +202,14 @@ impl Shown {
             is_turning: false,
             exporting: Some(("Surface", Some(Progress { done: 12, of: 72 }))),
             presets: self.presets.as_ref().map(|(own, naming)| presets(own, naming.as_deref())),
-            has_small_pictures: true,
-            looks: presets(&[], None).tiles,
-            loop_pictures: &[],
-            is_frozen: self.is_frozen,
-            is_live: self.is_live,
-            is_late: self.is_late,
-            ended: self.ended,
+            small: SmallPictures { are_drawn: true, looks: presets(&[], None).tiles, of_loop: &[] },
+            timeliness: self.timeliness,
             cine: self.cine.clone(),
             quality: ("full", self.budget),
             banner: self.banner.clone(),
             notes: &self.notes,
             exit_key: "",
-            pointer: self.pointers.0,
-            keyboard_pointer: self.pointers.1,
+            pointers: self.pointers,
             compared: self.compared.as_ref(),
         };
         let output = self.panels.lay_out(&state, self.size, self.time);

@@ -51,9 +51,9 @@ fn the_user_states_the_sides_by_controls_and_takes_them_back() {
     let rendered = shown.scene.settings.clone();
     let asked = press(&mut shown, LATERAL, "right to left");
     assert_eq!(asked, [Command::Sides(VolumeAxis::Lateral, Sides::RightLeft)]);
-    assert_eq!(shown.controls.settings().marks.lateral, Sides::RightLeft);
+    assert_eq!(shown.controls.settings().drawn.marks.lateral, Sides::RightLeft);
     assert_eq!(shown.scene.settings, rendered, "the picture is not drawn again");
-    let tiles = shown.scene.marks_with(&shown.controls.settings().marks);
+    let tiles = shown.scene.marks_with(&shown.controls.settings().drawn.marks);
     let across = [(Edge::Left, "R"), (Edge::Right, "L")];
     assert!(tiles.iter().filter(|tile| tile.letters == across).count() == 3, "{tiles:?}");
     let (mut letters, dots) = marks(&shown);
@@ -70,7 +70,7 @@ fn the_user_states_the_sides_by_controls_and_takes_them_back() {
         (Command::Redo, Sides::RightLeft, 6),
     ] {
         shown.apply(command);
-        assert_eq!(shown.controls.settings().marks.lateral, sides, "{command:?}");
+        assert_eq!(shown.controls.settings().drawn.marks.lateral, sides, "{command:?}");
         assert_eq!((marks(&shown).0.len(), &shown.scene.settings), (count, &rendered), "{command:?}");
     }
 }
@@ -79,13 +79,13 @@ fn the_user_states_the_sides_by_controls_and_takes_them_back() {
 fn the_letters_are_exchanged_and_a_pair_lies_along_one_axis() {
     let mut shown = opened("mode='plane'\nmarks.lateral='left-right'");
     assert_eq!(press(&mut shown, "Sides", "Exchange L and R"), [Command::ExchangeLeftAndRight]);
-    assert_eq!(shown.controls.settings().marks.lateral, Sides::RightLeft);
+    assert_eq!(shown.controls.settings().drawn.marks.lateral, Sides::RightLeft);
     press(&mut shown, "Slices, first to last", "left to right");
-    let marks = &shown.controls.settings().marks;
+    let marks = &shown.controls.settings().drawn.marks;
     assert_eq!((marks.lateral, marks.elevation), (Sides::None, Sides::LeftRight), "L and R cannot lie along two axes");
     press(&mut shown, "From the probe down", "front to back");
     press(&mut shown, "Slices, first to last", "no letters");
-    let marks = &shown.controls.settings().marks;
+    let marks = &shown.controls.settings().drawn.marks;
     assert_eq!((marks.depth, marks.elevation), (Sides::FrontBack, Sides::None));
     let exchange = shown.find("Sides", Role::Button, "Exchange L and R");
     assert!(shown.tree[&exchange].is_disabled(), "there is neither L nor R");
@@ -94,7 +94,7 @@ fn the_letters_are_exchanged_and_a_pair_lies_along_one_axis() {
 #[test]
 fn the_user_states_where_the_marker_of_the_probe_is() {
     let mut shown = opened("mode='plane'");
-    let edge = |shown: &Shown| shown.scene.marks_with(&shown.controls.settings().marks)[0].probe;
+    let edge = |shown: &Shown| shown.scene.marks_with(&shown.controls.settings().drawn.marks)[0].probe;
     assert_eq!(edge(&shown), Some(Edge::Left));
     assert_eq!(press(&mut shown, "Probe marker (dot)", "Last"), [Command::ProbeMarker(ProbeMarker::Last)]);
     assert_eq!((edge(&shown), marks(&shown).1), (Some(Edge::Right), 1));

@@ -67,7 +67,7 @@ pub(crate) fn of_viewpoint(viewpoint: Viewpoint) -> &'static str {
 }
 
 /// How something is measured.
-pub(crate) fn of_measure(kind: MeasureKind) -> &'static str {
+fn of_measure(kind: MeasureKind) -> &'static str {
     match kind {
         MeasureKind::Distance => {
             "Distance in mm: click both ends, or drag. On a rendering: from surface to surface. (M)"

@@ -37,19 +37,23 @@ pub struct Binding {
 
 const NONE: Modifiers = Modifiers { shift: false, control: false, alt: false };
 const SHIFT: Modifiers = Modifiers { shift: true, ..NONE };
+const CONTROL: Modifiers = Modifiers { control: true, ..NONE };
+
+/// A binding of a key that is pressed with these modifiers.
+const fn with(modifiers: Modifiers, key: Key, description: &'static str, command: Command) -> Binding {
+    Binding { key, modifiers, description, command, repeats: false }
+}
 
 const fn on(key: Key, description: &'static str, command: Command) -> Binding {
-    Binding { key, modifiers: NONE, description, command, repeats: false }
+    with(NONE, key, description, command)
 }
 
-/// With control.
 const fn control(key: Key, description: &'static str, command: Command) -> Binding {
-    Binding { modifiers: Modifiers { control: true, ..NONE }, ..on(key, description, command) }
+    with(CONTROL, key, description, command)
 }
 
-/// With shift.
 const fn shift(key: Key, description: &'static str, command: Command) -> Binding {
-    Binding { modifiers: SHIFT, ..on(key, description, command) }
+    with(SHIFT, key, description, command)
 }
 
 impl Binding {
@@ -107,12 +111,9 @@ pub const KEY_BINDINGS: &[Binding] = &[
     on(Char('-'), "farther", Command::Zoom(1.0 / 1.1)).repeating(),
     on(Key::Backspace, "reset all settings", Command::Reset),
     control(Char('z'), "undo", Command::Undo),
-    Binding {
-        modifiers: Modifiers { control: true, alt: true, shift: false },
-        ..on(Char('z'), "undo all changes", Command::UndoAll)
-    },
+    with(Modifiers { alt: true, ..CONTROL }, Char('z'), "undo all changes", Command::UndoAll),
     control(Char('y'), REDO, Command::Redo),
-    Binding { modifiers: Modifiers { control: true, shift: true, alt: false }, ..on(Char('z'), REDO, Command::Redo) },
+    with(Modifiers { shift: true, ..CONTROL }, Char('z'), REDO, Command::Redo),
     // Planes.
     on(Char('a'), "plane A: the scan plane", Command::Plane(PlaneName::A)),
     on(Char('b'), "plane B: across the frames", Command::Plane(PlaneName::B)),
@@ -219,28 +220,28 @@ pub(crate) fn key_label(binding: &Binding) -> String {
     held + &key
 }
 
-/// What no key does: name, hint, command.
-pub(crate) const WITHOUT_KEY: [(&str, &str, Command); 20] = [
-    (texts::VIEW_3D, texts::VIEW_3D_HINT, Command::Rendering),
-    (texts::EXCHANGE_LEFT_AND_RIGHT, texts::EXCHANGE_LEFT_AND_RIGHT_HINT, Command::ExchangeLeftAndRight),
-    ("Save the results (CSV)", texts::SAVE_RESULTS_HINT, Command::SaveMeasures),
-    ("Clear all measurements", texts::CLEAR_HINT, Command::ClearMeasures),
-    (texts::CANCEL_EXPORT, texts::CANCEL_EXPORT_HINT, Command::CancelExport),
-    ("Bar on saved pictures: on", texts::BAR_ON_SAVED_PICTURES_HINT, Command::SavesBar(true)),
-    ("Bar on saved pictures: off", texts::BAR_ON_SAVED_PICTURES_HINT, Command::SavesBar(false)),
-    ("Reference picture of slices: on", texts::REFERENCE_PICTURE_HINT, Command::Reference(true)),
-    ("Reference picture of slices: off", texts::REFERENCE_PICTURE_HINT, Command::Reference(false)),
-    (texts::SIDES, texts::SIDES_HINT, Command::InspectorTab(InspectorTab::Marks)),
-    (texts::PROBE_MARKER, texts::SIDES_HINT, Command::InspectorTab(InspectorTab::Marks)),
-    (texts::MEASUREMENTS, texts::TAB_MEASURE_HINT, Command::InspectorTab(InspectorTab::Measure)),
-    (texts::COLOUR, texts::COLOUR_HINT, Command::InspectorTab(InspectorTab::Look)),
-    (texts::OPACITY_OF, texts::OPACITY_OF_HINT, Command::InspectorTab(InspectorTab::Look)),
-    ("Compare: all pictures beside each other", texts::COMPARED_TILES_HINT, Command::CompareView(CompareView::Tiles)),
-    ("Compare: show the difference", texts::COMPARED_DIFFERENCE_HINT, Command::CompareView(CompareView::Difference)),
-    ("Compare: wipe from one picture to the other", texts::COMPARED_WIPE_HINT, Command::CompareView(CompareView::Wipe)),
-    ("Compare: add the next open recording", texts::ADD_COMPARED_HINT, Command::CompareFurther),
-    ("Compare: align both volumes", texts::ALIGN_HINT, Command::Align),
-    ("Compare: link windows, filters and light", texts::LINK_LOOK_HINT, Command::ToggleLink(Link::Look)),
+/// What no key does: name and hint, command.
+pub(crate) const WITHOUT_KEY: [([&str; 2], Command); 20] = [
+    (texts::VIEW_3D, Command::Rendering),
+    (texts::EXCHANGE_LEFT_AND_RIGHT, Command::ExchangeLeftAndRight),
+    (["Save the results (CSV)", texts::SAVE_RESULTS_HINT], Command::SaveMeasures),
+    (["Clear all measurements", texts::CLEAR[1]], Command::ClearMeasures),
+    (texts::CANCEL_EXPORT, Command::CancelExport),
+    (["Bar on saved pictures: on", texts::BAR_ON_SAVED_PICTURES[1]], Command::SavesBar(true)),
+    (["Bar on saved pictures: off", texts::BAR_ON_SAVED_PICTURES[1]], Command::SavesBar(false)),
+    (["Reference picture of slices: on", texts::REFERENCE_PICTURE[1]], Command::Reference(true)),
+    (["Reference picture of slices: off", texts::REFERENCE_PICTURE[1]], Command::Reference(false)),
+    ([texts::SIDES, texts::SIDES_HINT], Command::InspectorTab(InspectorTab::Marks)),
+    ([texts::PROBE_MARKER, texts::SIDES_HINT], Command::InspectorTab(InspectorTab::Marks)),
+    ([texts::MEASUREMENTS, texts::TAB_MEASURE_HINT], Command::InspectorTab(InspectorTab::Measure)),
+    ([texts::COLOUR, texts::COLOUR_HINT], Command::InspectorTab(InspectorTab::Look)),
+    ([texts::OPACITY_OF, texts::OPACITY_OF_HINT], Command::InspectorTab(InspectorTab::Look)),
+    (["Compare: all pictures beside each other", texts::COMPARED_TILES[1]], Command::CompareView(CompareView::Tiles)),
+    (["Compare: show the difference", texts::COMPARED_DIFFERENCE[1]], Command::CompareView(CompareView::Difference)),
+    (["Compare: wipe from one picture to the other", texts::COMPARED_WIPE[1]], Command::CompareView(CompareView::Wipe)),
+    (["Compare: add the next open recording", texts::ADD_COMPARED[1]], Command::CompareFurther),
+    (["Compare: align both volumes", texts::ALIGN_HINT], Command::Align),
+    (["Compare: link windows, filters and light", texts::LINK_LOOK[1]], Command::ToggleLink(Link::Look)),
 ];
 
 // The pointer by keyboard: its keys, and what they do while it is on.

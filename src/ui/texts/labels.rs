@@ -5,23 +5,20 @@ use crate::segment::volume::Measured;
 
 pub(crate) const LABELS: &str = "Labels";
 text!(label(number) = "Label {number}");
-pub(crate) const PAINT: &str = "Paint";
-pub(crate) const PAINT_HINT: &str = "Drag over a plane or over the surface: the label is painted. Ctrl erases.";
-pub(crate) const ERASE: &str = "Erase";
-pub(crate) const ERASE_HINT: &str = "Drag over a plane or over the surface: the chosen label is erased, others stay.";
-pub(crate) const GROW_DARK: &str = "Grow dark";
-pub(crate) const GROW_DARK_HINT: &str =
-    "Click in a body that is darker than what is around it, such as a cyst: all of it gets the label.";
-pub(crate) const GROW_BRIGHT: &str = "Grow bright";
-pub(crate) const GROW_BRIGHT_HINT: &str =
-    "Click in a body that is brighter than what is around it: all of it gets the label.";
+pub(crate) const PAINT: [&str; 2] =
+    ["Paint", "Drag over a plane or over the surface: the label is painted. Ctrl erases."];
+pub(crate) const ERASE: [&str; 2] =
+    ["Erase", "Drag over a plane or over the surface: the chosen label is erased, others stay."];
+pub(crate) const GROW_DARK: [&str; 2] =
+    ["Grow dark", "Click in a body that is darker than what is around it, such as a cyst: all of it gets the label."];
+pub(crate) const GROW_BRIGHT: [&str; 2] =
+    ["Grow bright", "Click in a body that is brighter than what is around it: all of it gets the label."];
 pub(crate) const SPHERE_BRUSH: &str = "Sphere brush";
 pub(crate) const SPHERE_BRUSH_HINT: &str =
     "On: a ball also on planes. Off: a disc that is one voxel thick, in the plane alone. On the surface it is a ball.";
 pub(crate) const CHOOSE_LABEL_HINT: &str =
     "Click: this label is painted. Its volume is that of its voxels; growing also says what the echoes measure.";
-pub(crate) const ADD_LABEL: &str = "Add a label";
-pub(crate) const ADD_LABEL_HINT: &str = "The new label is then painted.";
+pub(crate) const ADD_LABEL: [&str; 2] = ["Add a label", "The new label is then painted."];
 text!(label_measured(number) = "Label volume {number}");
 pub(crate) const LABEL_MEASURED_HINT: &str =
     "The body between the contours of this measurement gets the label. Beyond the outermost contours it is closed.";

@@ -17,11 +17,9 @@ pub(crate) const END_TRACING_HINT: &str = "Ends what is being traced (Enter).";
 pub(crate) const TYPE_TEXT_HINT: &str = "Click to type a text for it.";
 pub(crate) const DELETE_MEASUREMENT_HINT: &str = "Deletes it (undo brings it back).";
 text!(delete_measurement(number) = "Delete measurement {number}");
-pub const COPY: &str = "Copy";
-pub(crate) const COPY_HINT: &str = "Copies all results as CSV (Ctrl+C).";
+pub const COPY: [&str; 2] = ["Copy", "Copies all results as CSV (Ctrl+C)."];
 pub(crate) const SAVE_RESULTS_HINT: &str = "Saves all results as a CSV file.";
-pub const CLEAR: &str = "Clear";
-pub(crate) const CLEAR_HINT: &str = "Deletes all (undo brings them back).";
+pub const CLEAR: [&str; 2] = ["Clear", "Deletes all (undo brings them back)."];
 pub(crate) const STEP_TYPE: &str = "Type, then Enter.";
 
 // Limits.
@@ -57,25 +55,22 @@ pub(crate) const TOO_MANY_BODY_MARKS: &str = "There are as many body marks as a 
 pub(crate) const BODY_MARK_FIRST_STEP: &str = "Choose a part of the body.";
 pub(crate) const BODY_MARK_STEP: &str =
     "Click or drag the probe on it; the wheel turns it. Drag the body to move the mark.";
-pub const MIRRORED: &str = "Mirrored";
-pub(crate) const MIRRORED_HINT: &str =
-    "Exchanges left and right: the left breast, the back of the fetus on the other side.";
+pub const MIRRORED: [&str; 2] =
+    ["Mirrored", "Exchanges left and right: the left breast, the back of the fetus on the other side."];
 pub(crate) const TURN_OF_PROBE: &str = "Probe's direction";
 pub(crate) const TURN_OF_PROBE_HINT: &str =
     "Where the marker of the probe points: 0° to the head, -90° to the right side of the patient.";
 pub(crate) const PROBE_ACROSS: &str = "Probe across";
 pub(crate) const PROBE_DOWN: &str = "Probe down";
 pub(crate) const PROBE_ON_BODY_HINT: &str = "Where on the body the probe is, from its middle.";
-pub(crate) const SIZE_OF_MARK: &str = "Size";
-pub(crate) const SIZE_OF_MARK_HINT: &str = "How large the mark is, of the picture's shorter edge.";
+pub(crate) const SIZE_OF_MARK: [&str; 2] = ["Size", "How large the mark is, of the picture's shorter edge."];
 pub(crate) const MARK_ACROSS: &str = "Mark across";
 pub(crate) const MARK_DOWN: &str = "Mark down";
 pub(crate) const PLACE_OF_MARK_HINT: &str = "Where on the picture the mark is.";
 pub(crate) const SELECT_BODY_MARK_HINT: &str = "The controls are about this one.";
-pub(crate) const ADD_BODY_MARK: &str = "Add body mark";
-pub(crate) const ADD_BODY_MARK_HINT: &str = "One more mark, in another corner of the picture. At most four.";
-pub(crate) const REMOVE_BODY_MARK: &str = "Remove body mark";
-pub(crate) const REMOVE_BODY_MARK_HINT: &str = "Removes this one (undo brings it back).";
+pub(crate) const ADD_BODY_MARK: [&str; 2] =
+    ["Add body mark", "One more mark, in another corner of the picture. At most four."];
+pub(crate) const REMOVE_BODY_MARK: [&str; 2] = ["Remove body mark", "Removes this one (undo brings it back)."];
 
 // On the curved plane.
 pub(crate) const CURVE_NEEDS_BOTH_ENDS: &str = "A distance on the curved plane needs both of its ends there.";

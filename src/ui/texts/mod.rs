@@ -1,5 +1,6 @@
 //! Every text of the window, in English; `keys` also has the commands of keys, each beside its text. Names of modes are in [`Mode`](crate::scene::Mode), names and
-//! hints of sliders are at their settings; faults that the panels show are worded by the modules that find them.
+//! hints of sliders are at their settings; faults that the panels show are worded by the modules that find them. A name and its hint are a
+//! pair, in this order, unless one of them is also used alone.
 
 /// A text with values in it: `text!(name(value) = "text with {value}");`
 macro_rules! text {

@@ -31,25 +31,21 @@ pub(crate) const LAYOUT_PAIR_SHORT: &str = "VR|SR";
 pub(crate) const PROGRAM: &str = "Echolume";
 pub(crate) const TOP_BAR: &str = "Files, views and search";
 pub(crate) const TOOLS: &str = "Tools";
-pub(crate) const TAB_TOOLS_HINT: &str = "All tools and views (Shift+F3).";
 pub(crate) const INSPECTOR: &str = "Inspector";
-pub(crate) const TAB_LOOK: &str = "Look";
-pub(crate) const TAB_LOOK_HINT: &str =
-    "Looks, modes, threshold, gain, light, colours, and all other controls of the rendering (Shift+F3).";
+pub(crate) const TAB_LOOK: [&str; 2] =
+    ["Look", "Looks, modes, threshold, gain, light, colours, and all other controls of the rendering (Shift+F3)."];
 pub(crate) const TAB_PLANES_HINT: &str =
     "The planes: which one moves, where they cross, slices, and their look (Shift+F3).";
 pub(crate) const TAB_MEASURE_HINT: &str = "Tools that measure, and their results (Shift+F3).";
-pub(crate) const TAB_MARKS: &str = "Marks";
-pub(crate) const TAB_MARKS_HINT: &str =
-    "Texts, arrows, body marks, the patient's sides and the probe's marker (Shift+F3).";
+pub(crate) const TAB_MARKS: [&str; 2] =
+    ["Marks", "Texts, arrows, body marks, the patient's sides and the probe's marker (Shift+F3)."];
 pub(crate) const DRAWER_HINT: &str = "Opens all controls over the picture, or closes them (Shift+F3).";
 pub(crate) const DISTANCE: &str = "Distance";
 pub(crate) const AREA: &str = "Area";
 pub(crate) const MEASURED_VOLUME: &str = "Contours";
 pub(crate) const BODY: &str = "Body";
 pub(crate) const VIEW: &str = "View";
-pub(crate) const VIEW_3D: &str = "3D";
-pub(crate) const VIEW_3D_HINT: &str = "The rendering alone (Shift+Tab: one picture).";
+pub(crate) const VIEW_3D: [&str; 2] = ["3D", "The rendering alone (Shift+Tab: one picture)."];
 pub(crate) const RENDERING: &str = "Rendering";
 pub(crate) const RENDER_START: &str = "Where rendering starts";
 pub(crate) const NO_PLANES: &str = "3D + planes, 4-up, 3 planes, Plane and Slices show planes.";
@@ -59,7 +55,8 @@ pub(crate) const MANAGE_LOOKS: &str = "Manage";
 pub(crate) const MORE: &str = "...";
 pub(crate) const NEXT_RECORDING: &str = "Next recording";
 pub(crate) const NEXT_RECORDING_HINT: &str = "Shows the next of the recordings that are open (Ctrl+Page down).";
-pub(crate) const SAVE_WORKSPACE: &str = "Save workspace";
+pub(crate) const SAVE_WORKSPACE: [&str; 2] =
+    ["Save workspace", "Saves settings, recording and measurements together (Ctrl+S)."];
 pub(crate) const TYPE_VALUE_HINT: &str = "A click types the value; Enter sets it, Esc leaves it.";
 text!(value_of(name) = "Value of {name}");
 pub(crate) const LIVE: &str = "LIVE";
@@ -96,31 +93,26 @@ pub(crate) const RECENTRE_PLANES_HINT: &str =
     "Moves the point where the planes cross to the middle (J; double click with Crosshair).";
 pub(crate) const RECENTRE_PLANES: &str = "Recentre planes";
 pub(crate) const MEASURE: &str = "Measure";
-pub(crate) const OPEN: &str = "Open";
-pub(crate) const OPEN_HINT: &str = "Opens a recording or a workspace (Ctrl+O), or drop a file on the window.";
+pub(crate) const OPEN: [&str; 2] = ["Open", "Opens a recording or a workspace (Ctrl+O), or drop a file on the window."];
 pub(crate) const SAVE: &str = "Save";
-pub(crate) const SAVE_WORKSPACE_HINT: &str = "Saves settings, recording and measurements together (Ctrl+S).";
-pub(crate) const EXPORT_HINT: &str =
-    "Exports the volume that is shown: as a volume, a surface to print, or a turntable (Ctrl+E).";
 pub(crate) const RECORDINGS: &str = "Recordings";
 text!(recording_hint(path) = "{path}: shows it as it was left (Ctrl+Page up, Ctrl+Page down).");
 text!(close_recording(name) = "Close {name}");
 pub(crate) const CLOSE_RECORDING_HINT: &str = "Takes it from the list; its file stays, its settings and measurements are forgotten (Ctrl+W: the one that is shown).";
-pub(crate) const EXPORT: &str = "Export";
+pub(crate) const EXPORT: [&str; 2] =
+    ["Export", "Exports the volume that is shown: as a volume, a surface to print, or a turntable (Ctrl+E)."];
 pub const CUTS: &str = "Cuts";
-pub(crate) const KEEP_INSIDE_HINT: &str = "The next contour takes away what is outside of it, not what is within.";
-pub(crate) const KEEP_INSIDE: &str = "Keep inside";
-pub(crate) const REMOVE_ALL_CUTS: &str = "Remove all cuts";
-pub(crate) const REMOVE_ALL_CUTS_HINT: &str = "Renderings show everything again (Shift+F; undo brings the cuts back).";
+pub(crate) const KEEP_INSIDE: [&str; 2] =
+    ["Keep inside", "The next contour takes away what is outside of it, not what is within."];
+pub(crate) const REMOVE_ALL_CUTS: [&str; 2] =
+    ["Remove all cuts", "Renderings show everything again (Shift+F; undo brings the cuts back)."];
 text!(millimetres(length) = "{length:.1} mm");
 text!(bar_length(length) = "{length} mm");
 text!(whole_millimetres(length) = "{length:.0} mm");
-pub(crate) const RADIUS_OF_BRUSH: &str = "Radius of brush";
-pub(crate) const RADIUS_OF_BRUSH_HINT: &str = "How far from the surface under the pointer the brush removes.";
-pub(crate) const UNDO: &str = "Undo";
-pub(crate) const UNDO_HINT: &str = "Takes the last change back (Ctrl+Z).";
-pub(crate) const REDO: &str = "Redo";
-pub(crate) const REDO_HINT: &str = "Does it again (Ctrl+Y).";
+pub(crate) const RADIUS_OF_BRUSH: [&str; 2] =
+    ["Radius of brush", "How far from the surface under the pointer the brush removes."];
+pub(crate) const UNDO: [&str; 2] = ["Undo", "Takes the last change back (Ctrl+Z)."];
+pub(crate) const REDO: [&str; 2] = ["Redo", "Does it again (Ctrl+Y)."];
 pub const GREY: &str = "Grey";
 pub(crate) const SEPIA: &str = "Sepia";
 pub const SKIN: &str = "Skin";
@@ -130,20 +122,17 @@ pub(crate) const WARM: &str = "Warm";
 pub(crate) const AS_IS: &str = "As is";
 pub(crate) const ICE: &str = "Ice";
 pub(crate) const CONTROLS: &str = "Controls";
-pub(crate) const TAB_TOOLS: &str = "Tools";
+pub(crate) const TAB_TOOLS: [&str; 2] = ["Tools", "All tools and views (Shift+F3)."];
 pub(crate) const COLOUR_HINT: &str = "Colours of the tissue; they stand for no flow.";
 pub const COLOUR: &str = "Colour";
 pub(crate) const OPACITY_OF: &str = "Opacity of";
 pub(crate) const OPACITY_OF_HINT: &str = "Whose opacities the volume has, whatever its colours.";
 pub(crate) const SAME_AS_COLOUR: &str = "Own";
-pub(crate) const CAST_SHADOWS: &str = "Cast shadows";
-pub(crate) const CAST_SHADOWS_HINT: &str = "The lamp casts shadows on the surface.";
-pub(crate) const REFERENCE_PICTURE_HINT: &str =
-    "The first tile shows the plane across the slices, and where each of them is.";
-pub(crate) const REFERENCE_PICTURE: &str = "Reference picture";
-pub(crate) const BAR_ON_SAVED_PICTURES_HINT: &str =
-    "Saved pictures carry the patient's sides, and a bar with scale, depth, mode and time.";
-pub(crate) const BAR_ON_SAVED_PICTURES: &str = "Bar on saved pictures";
+pub(crate) const CAST_SHADOWS: [&str; 2] = ["Cast shadows", "The lamp casts shadows on the surface."];
+pub(crate) const REFERENCE_PICTURE: [&str; 2] =
+    ["Reference picture", "The first tile shows the plane across the slices, and where each of them is."];
+pub(crate) const BAR_ON_SAVED_PICTURES: [&str; 2] =
+    ["Bar on saved pictures", "Saved pictures carry the patient's sides, and a bar with scale, depth, mode and time."];
 pub(crate) const ADVANCED: &str = "Advanced";
 text!(advanced_group(name) = "Advanced: {name}");
 text!(advanced_hint(name) = "More controls: {name}. A click opens or closes the group.");
@@ -173,32 +162,24 @@ pub(crate) fn ended_for(ago: Duration) -> String {
         seconds => format!("{ENDED} {} h", seconds / 3600),
     }
 }
-pub(crate) const SAVE_PICTURE: &str = "Save picture";
-pub(crate) const SAVE_PICTURE_HINT: &str = "Saves the picture (Ctrl+I).";
-pub(crate) const HELP_HINT: &str = "All keys and gestures (H).";
-pub(crate) const SAVE_LOOP: &str = "Save loop";
-pub(crate) const SAVE_LOOP_HINT: &str = "Saves the last volumes as a recording (Ctrl+R).";
+pub(crate) const SAVE_PICTURE: [&str; 2] = ["Save picture", "Saves the picture (Ctrl+I)."];
+pub(crate) const SAVE_LOOP: [&str; 2] = ["Save loop", "Saves the last volumes as a recording (Ctrl+R)."];
 pub(crate) const RESET: &str = "Reset";
 pub(crate) const RESET_HINT: &str = "All settings as at the start (Backspace).";
-pub(crate) const FULL_SCREEN: &str = "Full screen";
-pub(crate) const FULL_SCREEN_HINT: &str = "Fills the screen, or leaves it (F11).";
-pub const TIMES: &str = "Times";
-pub(crate) const TIMES_HINT: &str = "Times of pictures and frames (F2).";
-pub const HELP: &str = "Help";
+pub(crate) const FULL_SCREEN: [&str; 2] = ["Full screen", "Fills the screen, or leaves it (F11)."];
+pub const TIMES: [&str; 2] = ["Times", "Times of pictures and frames (F2)."];
+pub const HELP: [&str; 2] = ["Help", "All keys and gestures (H)."];
 pub(crate) const NO_VOLUMES_YET: &str = "no volumes yet";
 pub const STOP: &str = "Stop";
 pub(crate) const PLAY: &str = "Play";
 pub(crate) const PLAY_HINT: &str = "Plays the last volumes as a loop (Enter).";
-pub(crate) const PREVIOUS_VOLUME: &str = "Previous volume";
-pub(crate) const PREVIOUS_VOLUME_HINT: &str = "Shows the previous volume (Left).";
-pub(crate) const NEXT_VOLUME: &str = "Next volume";
-pub(crate) const NEXT_VOLUME_HINT: &str = "Shows the next volume (Right).";
+pub(crate) const PREVIOUS_VOLUME: [&str; 2] = ["Previous volume", "Shows the previous volume (Left)."];
+pub(crate) const NEXT_VOLUME: [&str; 2] = ["Next volume", "Shows the next volume (Right)."];
 pub(crate) const SPEED_HINT: &str = "Speed of the loop; 1x is that of the acquisition (Ctrl+Left, Ctrl+Right).";
 text!(speed(speed) = "Speed {speed}");
-pub(crate) const BACK_AND_FORTH: &str = "Back and forth";
-pub(crate) const BACK_AND_FORTH_HINT: &str = "The loop plays back and forth. A click: forwards (Ctrl+Enter).";
-pub(crate) const FORWARDS: &str = "Forwards";
-pub(crate) const FORWARDS_HINT: &str = "The loop plays forwards. A click: back and forth (Shift+Enter).";
+pub(crate) const BACK_AND_FORTH: [&str; 2] =
+    ["Back and forth", "The loop plays back and forth. A click: forwards (Ctrl+Enter)."];
+pub(crate) const FORWARDS: [&str; 2] = ["Forwards", "The loop plays forwards. A click: back and forth (Shift+Enter)."];
 pub(crate) const VOLUME_OF_THE_LOOP_HINT: &str = "The volumes of the loop, oldest first. Drag its ends to play a part of it; a double click plays all (Shift+Home, Shift+End, Ctrl+Home).";
 pub(crate) const VOLUME_OF_THE_LOOP: &str = "Volume of the loop";
 text!(place_in_loop(place, count) = "{place} of {count}");
@@ -226,8 +207,8 @@ pub(crate) fn export_so_far(name: impl Display, done: u64, of: u64) -> String {
     format!("{name}: {} (cancel: Ctrl+E)", per_cent(done, of))
 }
 pub(crate) const CLOSE_EXPORT_HINT: &str = "Closes this list.";
-pub(crate) const CANCEL_EXPORT_HINT: &str = "Cancels the export that is running; no file of it is kept.";
-pub(crate) const CANCEL_EXPORT: &str = "Cancel the export";
+pub(crate) const CANCEL_EXPORT: [&str; 2] =
+    ["Cancel the export", "Cancels the export that is running; no file of it is kept."];
 pub(crate) const CLOSE_BUTTON: &str = "Close  (Esc)";
 pub(crate) const CLOSE: &str = "Close";
 
@@ -249,8 +230,7 @@ pub(crate) const SAVE_PRESENT_LOOK: &str = "Save present look";
 pub(crate) const UNDO_PRESETS_HINT: &str = "Brings your presets back as they were before the last change.";
 pub(crate) const UNDO_PRESETS_BUTTON: &str = "Undo  (Z)";
 pub(crate) const CLOSE_PRESETS_HINT: &str = "Closes this list.";
-pub(crate) const RENAME: &str = "Rename";
-pub(crate) const RENAME_HINT: &str = "Gives this preset another name.";
+pub(crate) const RENAME: [&str; 2] = ["Rename", "Gives this preset another name."];
 pub(crate) const DELETE: &str = "Delete";
 pub(crate) const DELETE_PRESET_HINT: &str = "Deletes this preset; Undo above brings it back.";
 
@@ -318,8 +298,7 @@ pub(crate) const NOTHING_FOUND: &str = "Nothing is found.";
 pub(crate) const NO_MEDICAL_DEVICE: &str = "Echolume is not a medical device.";
 pub(crate) const SAVE_AND_LEAVE: &str = "Save and leave  (Enter)";
 pub(crate) const LEAVE_WITHOUT_SAVING: &str = "Leave without saving  (L)";
-pub(crate) const STAY: &str = "Stay  (Esc)";
-pub(crate) const STAY_HINT: &str = "Goes on as before.";
+pub(crate) const STAY: [&str; 2] = ["Stay  (Esc)", "Goes on as before."];
 
 /// The question before leaving: what is not saved, and the answers.
 #[derive(Debug)]
@@ -350,17 +329,12 @@ pub(crate) static UNSAVED_LOOP_AND_WORK: Unsaved = Unsaved {
 pub(crate) const CLOSE_HELP_HINT: &str = "Closes the help (H).";
 
 // Presets of examinations.
-pub const FACE: &str = "Face";
-pub(crate) const FACE_HINT: &str = "Skin in fluid, under light that goes into it.";
-pub(crate) const SKELETON: &str = "Skeleton";
-pub(crate) const SKELETON_HINT: &str = "What reflects the most shines through thin soft tissue.";
-pub(crate) const GLASS: &str = "Glass";
-pub(crate) const GLASS_HINT: &str = "Only the edges of tissue shine: everything can be seen through.";
-pub(crate) const VESSELS: &str = "Vessels";
-pub(crate) const VESSELS_HINT: &str = "Inverted: fluid is opaque, tissue is clear.";
+pub const FACE: [&str; 2] = ["Face", "Skin in fluid, under light that goes into it."];
+pub(crate) const SKELETON: [&str; 2] = ["Skeleton", "What reflects the most shines through thin soft tissue."];
+pub(crate) const GLASS: [&str; 2] = ["Glass", "Only the edges of tissue shine: everything can be seen through."];
+pub(crate) const VESSELS: [&str; 2] = ["Vessels", "Inverted: fluid is opaque, tissue is clear."];
 pub(crate) const BONE_HINT: &str = "A bright surface under soft tissue.";
-pub(crate) const B_MODE: &str = "B-mode";
-pub(crate) const B_MODE_HINT: &str = "The scan plane in grey.";
+pub(crate) const B_MODE: [&str; 2] = ["B-mode", "The scan plane in grey."];
 
 pub(crate) const TURNTABLE: &str = "Turntable";
 pub(crate) const TURNTABLE_HINT: &str = "The view turns by itself, until you turn it. (Shift+T)";
@@ -376,10 +350,9 @@ pub(crate) const CURVE_STEP_SECOND: &str = "Click the next point of the line.";
 pub(crate) const CURVE_STEP_NEXT: &str = "Click the next point; Enter or a double click ends the line.";
 pub(crate) const CURVE_STEP_CHANGE: &str = "Drag a point of the line, or draw another line.";
 pub(crate) const CURVE_STEP_FIRST: &str = "Click the points of a line on A, B or C, or drag a straight line.";
-pub(crate) const END_CURVE_HINT: &str = "Shows the section along the line (Enter).";
-pub(crate) const END_CURVE: &str = "End the line";
-pub(crate) const REMOVE_CURVE_HINT: &str = "Shows the planes without it (Shift+Delete; undo brings it back).";
-pub(crate) const REMOVE_CURVE: &str = "Remove curved plane";
+pub(crate) const END_CURVE: [&str; 2] = ["End the line", "Shows the section along the line (Enter)."];
+pub(crate) const REMOVE_CURVE: [&str; 2] =
+    ["Remove curved plane", "Shows the planes without it (Shift+Delete; undo brings it back)."];
 
 // The start line.
 pub(crate) const START_LINE: &str = "Start line";
@@ -389,13 +362,11 @@ text!(start_handle(number) = "Handle {number}");
 pub(crate) const START_HANDLE_HINT: &str =
     "How deep rendering starts at this handle of the start line, counted from the left.";
 pub(crate) const ADD: &str = "Add";
-pub(crate) const ADD_HANDLE: &str = "Add handle";
-pub(crate) const ADD_HANDLE_HINT: &str =
-    "One more handle, in the widest gap; or double click the line where it is wanted. At most five.";
+pub(crate) const ADD_HANDLE: [&str; 2] =
+    ["Add handle", "One more handle, in the widest gap; or double click the line where it is wanted. At most five."];
 pub(crate) const REMOVE: &str = "Remove";
-pub(crate) const REMOVE_HANDLE: &str = "Remove handle";
-pub(crate) const REMOVE_HANDLE_HINT: &str =
-    "One handle less: the one that bends the line the least; or double click one. At least three.";
+pub(crate) const REMOVE_HANDLE: [&str; 2] =
+    ["Remove handle", "One handle less: the one that bends the line the least; or double click one. At least three."];
 pub(crate) const START_LINE_FULL: &str = "The start line has five handles, as many as it can have.";
 pub(crate) const START_LINE_LEAST: &str =
     "The start line has three handles, as few as it can have: Shift+G makes it straight.";

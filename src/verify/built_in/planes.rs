@@ -16,6 +16,7 @@ pub(super) fn plane_scenes() -> Vec<SceneSpec> {
     let mut add = |name: &str, geometry: &Geometry, toml: String| {
         scenes.push(SceneSpec::new(name, geometry, BYTES, toml));
     };
+    let [fan, moving, parallel] = [wobbler(), moved(wobbler(), 0.7), linear()].map(Geometry::Sweep);
     let base = "slices = { pixels = 33 }\nray = { sampling = 'exact' }";
     for (name, geometry) in geometries() {
         for (mode, rest) in [
@@ -47,29 +48,29 @@ pub(super) fn plane_scenes() -> Vec<SceneSpec> {
         "mode = 'cube'\npicture = { size = [33, 25] }\ncamera = { azimuth = 90 }\ncube = { shading = 0, edges = false, inset = { left = 12 } }".into(),
         "mode = 'cube'\npicture = { size = [23, 25] }\ncamera = { field_of_view = 70, zoom = 20 }\ncube = { inset = { near = 10 } }".into(),
     ] {
-        add(&toml.replace('\n', ", "), &Geometry::Sweep(wobbler()), format!("{toml}\n{base}"));
+        add(&toml.replace('\n', ", "), &fan, format!("{toml}\n{base}"));
     }
     let voxels = cartesian([17, 23, 9]);
     for (name, geometry, toml) in [
         ("Cartesian, 4-up, planes of all samples", &voxels, "mode = 'vr'\nlayout = 'four'\nplanes.smooth = {}"),
-        ("fan, parts that float", &Geometry::Sweep(wobbler()), "mode = 'vr'\nfloating = 30"),
-        ("fan, two cuts and a brush", &Geometry::Sweep(wobbler()), TWO_CUTS),
-        ("fan, start at the fluid", &Geometry::Sweep(wobbler()), "mode = 'vr'\nunveil.enabled = true"),
+        ("fan, parts that float", &fan, "mode = 'vr'\nfloating = 30"),
+        ("fan, two cuts and a brush", &fan, TWO_CUTS),
+        ("fan, start at the fluid", &fan, "mode = 'vr'\nunveil.enabled = true"),
         (
             "translated, a cut behind the start at the fluid",
-            &Geometry::Sweep(linear()),
+            &parallel,
             "mode = 'minip'\nunveil = { enabled = true, offset = 2 }\n\
              cuts = [{ contour = [[-5, -4], [6, -4], [0, 9]], view = { at = [0, 20, 0], direction = [0, 1, 1], up = [1, 0, 0] }, depth = 9 }]",
         ),
         (
             "fan, motor moving, a cut beside planes",
-            &Geometry::Sweep(moved(wobbler(), 0.7)),
+            &moving,
             "mode = 'sr'\nlayout = 'four'\n\
              cuts = [{ contour = [[-5, -4], [6, -4], [0, 9]], view = { at = [3, 25, -2], direction = [0.4, 1, -0.6], up = [0, 0, 1], eye = 60 } }]",
         ),
         (
             "translated, a cut of what floats",
-            &Geometry::Sweep(linear()),
+            &parallel,
             "mode = 'vr'\nfloating = 30\nregion.lateral = [-9, 12]\n\
              cuts = [{ contour = [[-5, -4], [6, -4], [0, 9]], view = { at = [0, 20, 0], direction = [0, 1, 1], up = [1, 0, 0] }, keep = 'inside', depth = 9 }]",
         ),
@@ -91,15 +92,11 @@ pub(super) fn plane_scenes() -> Vec<SceneSpec> {
     }
     let lit = "light = { volume = { cell = 3, ground = {} } }\nregion.fade = 6";
     for (name, geometry, toml) in [
-        ("fan, steps by their error", &Geometry::Sweep(wobbler()), "ray.tolerance = 0.5\nray.step = 2"),
-        (
-            "fan, moving, steps by their error, lit",
-            &Geometry::Sweep(moved(wobbler(), 0.7)),
-            &format!("ray.tolerance = 2\n{lit}"),
-        ),
+        ("fan, steps by their error", &fan, "ray.tolerance = 0.5\nray.step = 2"),
+        ("fan, moving, steps by their error, lit", &moving, &format!("ray.tolerance = 2\n{lit}")),
         (
             "translated, steps by their error, pre-integrated",
-            &Geometry::Sweep(linear()),
+            &parallel,
             "ray = { tolerance = 1, spread = 0, early_end = 0.05 }\nvolume = { compositing = 'pre-integrated', shading = 'depth-coded' }",
         ),
         (
@@ -108,19 +105,15 @@ pub(super) fn plane_scenes() -> Vec<SceneSpec> {
             "mode = 'sr'\nlayout = 'four'\nlabels = { behind = 0.2 }\nsurface.threshold = 0.3",
         ),
         ("labels, 3D + planes, half the rays", &voxels, "layout = 'beside'\nray.subsampling = 2\nlabels.fill = 0.4"),
-        (
-            "labels, pair, two rays",
-            &Geometry::Sweep(linear()),
-            "mode = 'sr'\nlayout = 'pair'\nlabels.shell = 0.7\nray.rays = 2",
-        ),
+        ("labels, pair, two rays", &parallel, "mode = 'sr'\nlayout = 'pair'\nlabels.shell = 0.7\nray.rays = 2"),
         (
             "labels, perspective, in floats",
-            &Geometry::Sweep(wobbler()),
+            &fan,
             "mode = 'mip'\nlabels.shell = 0.9\npost.floats = true\ncamera = { azimuth = 40, elevation = 15, field_of_view = 35, zoom = 1.8 }",
         ),
         (
             "labels, a curved plane",
-            &Geometry::Sweep(wobbler()),
+            &fan,
             "mode = 'orthogonal'\nlabels.fill = 0.3\nplanes = { tilt = 12, curve = { plane = 'c', points = [[-9, 3], [-2, -6], [5, 2], [11, 1]] } }",
         ),
         (
@@ -150,7 +143,7 @@ pub(super) fn plane_scenes() -> Vec<SceneSpec> {
             "mode = '{mode}'\nslices.pixels = 33\nray = {{ sampling = 'exact', elevation = 'bspline' }}\npicture.size = {size}\n\
              camera = {{ azimuth = -140, elevation = 25 }}"
         );
-        add(&format!("{mode}, B-spline across slices"), &Geometry::Sweep(wobbler()), toml);
+        add(&format!("{mode}, B-spline across slices"), &fan, toml);
     }
     scenes
 }

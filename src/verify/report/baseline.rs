@@ -132,10 +132,10 @@ pub fn compare(old: &Run, new: &Run, threshold: Threshold) -> BaselineComparison
             ));
         }
     }
-    let times = judge_times(&pairs, [old, new], threshold);
+    let (time_changes, time_notes) = judge_times(&pairs, [old, new], threshold);
     changes.extend(error_changes(&pairs));
-    changes.extend(times.changes);
-    notes.extend(times.notes);
+    changes.extend(time_changes);
+    notes.extend(time_notes);
     // The sort is stable: within a class the order stays.
     changes.sort_by_key(|c| c.class);
     let touched: HashSet<_> = changes.iter().map(|c| (&c.group, &c.name)).collect();
@@ -289,21 +289,14 @@ fn tolerance_change(pair: &Pair) -> Option<Change> {
 /// Probability of any false alarm among all times of a comparison.
 const ALPHA: f64 = 0.05;
 
-#[derive(Default)]
-struct TimeChanges {
-    changes: Vec<Change>,
-    notes: Vec<String>,
-}
-
-/// Changes of times by more than the noise of the device, by the method of `profile --compare`. `runs`: old, new.
-fn judge_times(pairs: &[Pair], runs: [&Run; 2], threshold: Threshold) -> TimeChanges {
+/// Changes of times by more than the noise of the device, by the method of `profile --compare`, and notes. `runs`: old, new.
+fn judge_times(pairs: &[Pair], runs: [&Run; 2], threshold: Threshold) -> (Vec<Change>, Vec<String>) {
     let times: Vec<&Pair> = pairs.iter().filter(|p| p.new.unit == Unit::Ns && !p.new.is_single_time()).collect();
     let because = incomparable(runs);
-    let mut found = TimeChanges::default();
     let singles = pairs.iter().filter(|p| p.new.is_single_time() && p.old.is_single_time());
-    found.changes.extend(singles.filter_map(|pair| single_change(pair, because.is_some())));
+    let mut changes: Vec<Change> = singles.filter_map(|pair| single_change(pair, because.is_some())).collect();
     if times.is_empty() {
-        return found;
+        return (changes, Vec::new());
     }
     let both = times.iter().filter(|p| !usable(p.old).is_empty() && !usable(p.new).is_empty()).count();
     let method = profile::Method::Apart { blocks: profile::blocks_needed(both, ALPHA) };
@@ -318,22 +311,18 @@ fn judge_times(pairs: &[Pair], runs: [&Run; 2], threshold: Threshold) -> TimeCha
     let criteria = profile::CompareOptions { threshold, alpha: ALPHA, force: true, ..Default::default() };
     let lines = match profile::judge(lines.collect(), method, tick, &criteria) {
         Ok(lines) => lines,
-        Err(fault) => {
-            found.notes.push(format!("times are not compared: {fault}"));
-            return found;
-        }
+        Err(fault) => return (changes, vec![format!("times are not compared: {fault}")]),
     };
     let mut left: BTreeMap<String, usize> = BTreeMap::new();
     for (pair, line) in times.iter().zip(&lines) {
         match &line.note {
             Some(why) if line.verdict == profile::Verdict::NotComparable => *left.entry(why.clone()).or_default() += 1,
-            _ => found.changes.extend(time_change(pair, line, threshold, because.is_some())),
+            _ => changes.extend(time_change(pair, line, threshold, because.is_some())),
         }
     }
-    found.notes.extend(because.map(|why| format!("{why}: times are reported, but fail nothing")));
-    found.notes.extend(left.into_iter().map(|(why, count)| format!("{count} times are not compared: {why}")));
-    found.notes.extend(profile::common_shift(&lines));
-    found
+    let because = because.map(|why| format!("{why}: times are reported, but fail nothing"));
+    let left = left.into_iter().map(|(why, count)| format!("{count} times are not compared: {why}"));
+    (changes, because.into_iter().chain(left).chain(profile::common_shift(&lines)).collect())
 }
 
 /// Ratio of times measured once, such as those to compile a pass, beyond which there is a change. Other programs run meanwhile.

@@ -2,7 +2,8 @@
 
 use super::baseline::{BaselineComparison, Class};
 use super::{
-    Figure, Outcome, PictureComparison, Run, Unit, Verdict, amount, fault_items, percent, seconds, value_of_limit,
+    Figure, Outcome, PictureComparison, Run, Unit, Verdict, amount, fault_items, grouped, percent, seconds,
+    value_of_limit,
 };
 use crate::baselines::Stored;
 use crate::html_page::page;
@@ -155,27 +156,20 @@ fn baseline(compared: &BaselineComparison) -> Markup {
 
 /// Reasons of left-out checks and other notes, each once with its checks.
 fn notes(run: &Run) -> Markup {
-    /// A reason and its checks.
-    type Reasons = Vec<(String, Vec<String>)>;
-    let mut parts: [(&str, Reasons); 3] =
-        [("Interrupted", Vec::new()), ("Left out", Vec::new()), ("Notes", Vec::new())];
-    let mut places = std::collections::HashMap::new();
-    for outcome in &run.outcomes {
-        let part = match outcome.verdict {
-            Verdict::Interrupted => 0,
-            Verdict::LeftOut => 1,
-            Verdict::Passed | Verdict::Failed => 2,
-        };
-        let unexplained = (part < 2 && outcome.notes.is_empty()).then(|| "no reason was given".to_string());
-        for note in outcome.notes.iter().map(|note| escaped(note)).chain(unexplained) {
-            let reasons = &mut parts[part].1;
-            let place = *places.entry((part, note.clone())).or_insert_with(|| {
-                reasons.push((note, Vec::new()));
-                reasons.len() - 1
-            });
-            reasons[place].1.push(outcome.title());
-        }
-    }
+    let part = |verdict| match verdict {
+        Verdict::Interrupted => 0,
+        Verdict::LeftOut => 1,
+        Verdict::Passed | Verdict::Failed => 2,
+    };
+    let reasons = |of: usize, is_needed: bool| {
+        let outcomes = run.outcomes.iter().filter(|outcome| part(outcome.verdict) == of);
+        grouped(outcomes.flat_map(|outcome| {
+            let unexplained = (is_needed && outcome.notes.is_empty()).then(|| "no reason was given".to_string());
+            let notes = outcome.notes.iter().map(|note| escaped(note)).chain(unexplained);
+            notes.map(move |note| (note, outcome.title()))
+        }))
+    };
+    let parts = [("Interrupted", reasons(0, true)), ("Left out", reasons(1, true)), ("Notes", reasons(2, false))];
     html! {
         @for (title, reasons) in parts.iter().filter(|(_, reasons)| !reasons.is_empty()) {
             section {

@@ -53,6 +53,10 @@ fn suite(run: &Run, group: &str, outcomes: &[&Outcome]) -> TestSuite {
 }
 
 fn case(outcome: &Outcome) -> TestCase {
+    let why = |usual: &str| {
+        let notes: Vec<String> = outcome.notes.iter().map(|note| escaped(note)).collect();
+        if notes.is_empty() { usual.into() } else { notes.join("; ") }
+    };
     let status = match outcome.verdict {
         Verdict::Passed => {
             let mut status = TestCaseStatus::success();
@@ -77,16 +81,13 @@ fn case(outcome: &Outcome) -> TestCase {
         }
         Verdict::LeftOut => {
             let mut status = TestCaseStatus::skipped();
-            let why: Vec<String> = outcome.notes.iter().map(|note| escaped(note)).collect();
-            status.set_message(if why.is_empty() { "left out".into() } else { why.join("; ") });
+            status.set_message(why("left out"));
             status
         }
         // An error, because a run that was ended early must not pass, and no failure, because the device is not at fault.
         Verdict::Interrupted => {
             let mut status = TestCaseStatus::non_success(NonSuccessKind::Error);
-            let why: Vec<String> = outcome.notes.iter().map(|note| escaped(note)).collect();
-            status.set_message(if why.is_empty() { "interrupted".into() } else { why.join("; ") });
-            status.set_type("interrupted");
+            status.set_message(why("interrupted")).set_type("interrupted");
             status
         }
     };

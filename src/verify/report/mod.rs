@@ -19,6 +19,7 @@ use crate::tree::{FromNode, Name, ToNode};
 use baseline::{BaselineComparison, Class};
 use std::collections::{HashMap, HashSet};
 use std::fmt::Write as _;
+use std::hash::Hash;
 use std::time::Duration;
 
 /// How thoroughly a device is checked.
@@ -75,17 +76,22 @@ impl Run {
 
     /// The outcomes by group; groups are in the order in which they first ran.
     pub fn groups(&self) -> Vec<(&str, Vec<&Outcome>)> {
-        let mut places = HashMap::new();
-        let mut groups: Vec<(&str, Vec<&Outcome>)> = Vec::new();
-        for outcome in &self.outcomes {
-            let place = *places.entry(outcome.group.as_str()).or_insert_with(|| {
-                groups.push((&outcome.group, Vec::new()));
-                groups.len() - 1
-            });
-            groups[place].1.push(outcome);
-        }
-        groups
+        grouped(self.outcomes.iter().map(|outcome| (outcome.group.as_str(), outcome)))
     }
+}
+
+/// Values by their keys, which are in the order in which they first occur.
+fn grouped<K: Clone + Eq + Hash, V>(pairs: impl IntoIterator<Item = (K, V)>) -> Vec<(K, Vec<V>)> {
+    let mut places = HashMap::new();
+    let mut groups: Vec<(K, Vec<V>)> = Vec::new();
+    for (key, value) in pairs {
+        let place = *places.entry(key.clone()).or_insert(groups.len());
+        match groups.get_mut(place) {
+            Some((_, values)) => values.push(value),
+            None => groups.push((key, vec![value])),
+        }
+    }
+    groups
 }
 
 /// The result of running one check.

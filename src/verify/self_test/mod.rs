@@ -88,11 +88,8 @@ pub fn faults() -> impl Iterator<Item = InjectedFault> {
 /// # Errors
 /// The device cannot be opened, or fails without a fault.
 pub fn run(options: &ContextOptions, mut tell: impl FnMut(&Detection)) -> Result<Vec<Detection>, GpuError> {
-    let mut all = Vec::new();
-    for detection in dropped_barriers(options)? {
-        tell(&detection);
-        all.push(detection);
-    }
+    let mut all = vec![by_oracle(options)?, by_layer(options)?];
+    all.iter().for_each(&mut tell);
     all.extend(run_faults(options, faults(), tell)?);
     Ok(all)
 }
@@ -114,14 +111,14 @@ pub fn run_faults(
     let answers = answers.into_iter().flat_map(|group| group(Level::Quick)).collect();
     let mut search = DetectionSearch { sound, answers, alarms: BTreeMap::new() };
     let mut all = Vec::new();
-    for fault in faults {
-        let detection = search.detection(&fault)?;
+    let mut keep = |detection| {
         tell(&detection);
         all.push(detection);
+    };
+    for fault in faults {
+        keep(search.detection(&fault)?);
     }
-    let detection = search.without_faults();
-    tell(&detection);
-    all.push(detection);
+    keep(search.without_faults());
     Ok(all)
 }
 
@@ -169,9 +166,9 @@ impl DetectionSearch {
             }
         }
         for check in &self.answers {
-            let Some(message) = alarm(check.findings(dut), &mut refused) else { continue };
+            let Some(message) = alarm((check.work)(dut), &mut refused) else { continue };
             let (by, sound) = (format!("{}, {}", check.group, check.name), &mut self.sound);
-            if self.alarms.entry(by.clone()).or_insert_with(|| sound_alarm(check.findings(sound))).is_none() {
+            if self.alarms.entry(by.clone()).or_insert_with(|| sound_alarm((check.work)(sound))).is_none() {
                 return Ok((by, message));
             }
         }
@@ -239,15 +236,6 @@ fn scenes() -> Vec<(&'static str, String, Vec<usize>)> {
     ]
 }
 
-/// Leaves out barriers and waits, one at a time. The barrier oracle must detect each; synchronization validation, if its layer is
-/// installed, must detect some. The recording renders two volume images, one while the other is filled.
-///
-/// # Errors
-/// The device fails.
-fn dropped_barriers(options: &ContextOptions) -> Result<Vec<Detection>, GpuError> {
-    Ok(vec![by_oracle(options)?, by_layer(options)?])
-}
-
 fn made(toml: &str) -> Result<(Scene, Vec<Texels>), GpuError> {
     let scene = scene(Geometry::Sweep(wobbler()), BYTES, toml).map_err(GpuError::Broken)?;
     let frames = frames(&scene, |[x, y, z]| ((7 * x + 3 * y + 11 * z) % 32) as f64 / 31.0);
@@ -275,6 +263,8 @@ fn logged(context: &Arc<Context>, toml: &str, queues: usize) -> Result<(Scene, S
     Ok((renderer.scene().clone(), log))
 }
 
+/// Leaves out barriers and waits, one at a time, of which the barrier oracle must detect each. The recording renders two volume images, one while the
+/// other is filled.
 fn by_oracle(options: &ContextOptions) -> Result<Detection, GpuError> {
     let begun = Instant::now();
     let context = Context::new(&ContextOptions { validation: false, ..options.clone() })?;
@@ -317,8 +307,8 @@ fn by_oracle(options: &ContextOptions) -> Result<Detection, GpuError> {
     })
 }
 
-/// Synchronization validation on one scene: no message with all barriers, some messages with one left out. It does not detect every one,
-/// since it ignores write-after-write hazards through storage images.
+/// Synchronization validation, if its layer is installed, on one scene: no message with all barriers, some messages with one left out. It does
+/// not detect every one, since it ignores write-after-write hazards through storage images.
 fn by_layer(options: &ContextOptions) -> Result<Detection, GpuError> {
     let begun = Instant::now();
     let toml = format!("mode = 'mip'\n{SMALL}");

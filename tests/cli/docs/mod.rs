@@ -205,6 +205,8 @@ struct Key {
     doc: String,
     of: Type,
     is_required: bool,
+    /// The keys of its type stand in its place.
+    is_flat: bool,
 }
 
 struct Choice {
@@ -297,7 +299,7 @@ fn described_types() -> BTreeMap<String, Described> {
                     let keys = fields.named.into_iter().filter(is_key).map(|field| {
                         let arguments = tree_arguments(&field.attrs);
                         for (name, _) in &arguments {
-                            let is_known = ["default", "skip_serializing_if"].contains(&name.as_str());
+                            let is_known = ["default", "skip_serializing_if", "flatten"].contains(&name.as_str());
                             assert!(is_known, "{file}: {name}: an argument that is not known here");
                         }
                         Key {
@@ -305,6 +307,7 @@ fn described_types() -> BTreeMap<String, Described> {
                             doc: doc(&field.attrs),
                             of: field.ty,
                             is_required: !all_default && argument(&arguments, "default").is_none(),
+                            is_flat: argument(&arguments, "flatten").is_some(),
                         }
                     });
                     (item.ident, item.attrs, Body::Struct(keys.collect()))
@@ -332,7 +335,23 @@ fn described_types() -> BTreeMap<String, Described> {
             types.insert(name.clone(), Described { name, doc: doc(&attributes), body });
         }
     }
+    while let Some((whole, at, part)) = flat_key(&types) {
+        let Some(Described { body: Body::Struct(keys), .. }) = types.remove(&part) else {
+            panic!("{part} is no struct")
+        };
+        let Some(Described { body: Body::Struct(all), .. }) = types.get_mut(&whole) else { continue };
+        all.splice(at..=at, keys.into_iter().map(|key| Key { is_required: false, ..key }));
+    }
     types
+}
+
+/// The first key that stands for those of its type: the type that has it, its index there, and its own type.
+fn flat_key(types: &BTreeMap<String, Described>) -> Option<(String, usize, String)> {
+    types.iter().find_map(|(name, described)| {
+        let Body::Struct(keys) = &described.body else { return None };
+        let at = keys.iter().position(|key| key.is_flat)?;
+        Some((name.clone(), at, parts(&keys[at].of).0))
+    })
 }
 
 /// The last name of a type's path and what it is of: `Option` and `f64` of `Option<f64>`.

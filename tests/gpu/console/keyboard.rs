@@ -151,7 +151,7 @@ fn the_pointer_by_keyboard_does_what_the_mouse_does() {
     keys.press(Key::Enter);
     // The light of one was taken back: their settings differ.
     let measured = |desk: &Desk| {
-        let all = desk.console.controls().settings().measure.iter();
+        let all = desk.console.controls().settings().drawn.measure.iter();
         all.map(|measured| Measurement { made: None, ..measured.clone() }).collect::<Vec<_>>()
     };
     assert_eq!((measured(&keys).len(), measured(&keys)), (1, measured(&mouse)));
@@ -253,7 +253,7 @@ fn with_the_tool_for_texts_letters_are_a_text_wherever_the_pointer_is() {
     let after = desk.console.controls().settings().clone();
     assert_eq!((desk.console.controls().tool(), after.clone().without_drawings()), (TEXT, before));
     let scene = desk.console.stream().scene().expect("begun");
-    let (tiling, at) = (scene.tiling(), |n: usize| scene.place_of(after.measure[n].points[0]));
+    let (tiling, at) = (scene.tiling(), |n: usize| scene.place_of(after.drawn.measure[n].points[0]));
     let [middle, pointed] = [0, 1].map(|n| tiling.project(&tiling.tiles[0], at(n)).0);
     for (found, [x, y]) in [(middle, SIZE.map(|n| f64::from(n) / 2.0)), (pointed, [50.0, 30.0])] {
         assert!((found[0] - x).hypot(found[1] - y) < 0.1, "{found:?}, not {x}, {y}");

@@ -206,7 +206,7 @@ fn a_recording_comes_back_as_it_was_left() {
     window.shows("/data/b.mha");
     assert_eq!(window.listed(), ["a.mha", "> b.mha", "c.mha"]);
     let settings = window.console.controls().settings();
-    assert_eq!((settings.mode, settings.measure.len()), (start.mode, 0), "another recording, with the start");
+    assert_eq!((settings.mode, settings.drawn.measure.len()), (start.mode, 0), "another recording, with the start");
     assert!(!window.console.stream().is_frozen());
     assert!(window.find(Role::Group, "Times").is_some(), "what the window shows stays");
     window.press(false, Key::Char('6'));
@@ -274,7 +274,7 @@ fn what_was_measured_is_not_lost_without_a_question() {
     saved.sort_by(|a, b| a.origin.recording.cmp(&b.origin.recording));
     for (workspace, (name, length)) in saved.iter().zip([("/data/a.mha", 10.0), ("/data/b.mha", 20.0)]) {
         assert_eq!(workspace.origin.recording.as_deref(), Some(Path::new(name)));
-        let measure = workspace.layers.clone().finish().expect("settings").measure;
+        let measure = workspace.layers.clone().finish().expect("settings").drawn.measure;
         assert_eq!(measure.len(), 1);
         let [from, to] = [0, 1].map(|n| glam::DVec3::from(measure[0].points[n]));
         assert!((from.distance(to) - length).abs() < 1e-9, "{name}: {from} to {to}");

@@ -527,10 +527,13 @@ pub fn declared() -> Vec<String> {
 }
 
 fn collect(name: &str, before: &str, types: &BTreeMap<String, Vec<syn::Field>>, keys: &mut Vec<String>) {
-    let is_skipped = |a: &syn::Attribute| a.meta.require_list().is_ok_and(|list| list.tokens.to_string() == "skip");
-    for field in types[name].iter().filter(|field| !field.attrs.iter().any(is_skipped)) {
+    let says = |field: &syn::Field, word: &str| {
+        field.attrs.iter().any(|a| a.meta.require_list().is_ok_and(|list| list.tokens.to_string() == word))
+    };
+    for field in types[name].iter().filter(|field| !says(field, "skip")) {
         let key = format!("{before}{}", field.ident.as_ref().expect("a name"));
         match innermost(&field.ty) {
+            Some(part) if says(field, "flatten") => collect(&part, before, types, keys),
             Some(inner) if types.contains_key(&inner) => collect(&inner, &format!("{key}."), types, keys),
             _ => keys.push(key),
         }

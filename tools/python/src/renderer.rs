@@ -192,7 +192,7 @@ impl Renderer {
     fn measurements(&self, py: Python<'_>) -> Vec<Measured> {
         py.detach(|| {
             let drawing = self.lock();
-            let found = drawing.renderer.scene().settings.measure.iter().map(|measured| match quantities(measured) {
+            let found = drawing.renderer.scene().settings.drawn.measure.iter().map(|measured| match quantities(measured) {
                 Ok(all) => (all.into_iter().map(|found| (found.name, found.value, found.unit)).collect(), None),
                 Err(why) => (Vec::new(), Some(why)),
             });

@@ -1,6 +1,6 @@
 //! Anisotropic diffusion in semi-implicit steps by additive operator splitting (Weickert, ter Haar Romeny and Viergever 1998):
 //! u' = 1/2 sum over both axes of (I - 2 tau A(u))^-1 u, with Perona and Malik's conductance between neighbours. Stable at any
-//! tau, and within the range of what was there. Each axis is solved by one of two methods (`Solver`).
+//! tau, and within the range of what was there. Each axis is solved by one of two methods (`Images::is_hybrid`).
 
 use super::estimator::storable_edge;
 use super::perona_malik::{conductance, constant, need};
@@ -12,47 +12,28 @@ pub(super) const TOLERANCE: Tolerance = Tolerance::absolute(3e-5).relative(3e-6)
      of at most 1 sums to tens; then what the target's format stores",
 );
 
-pub const SLICE: Pass = Pass {
-    name: "aos_slice",
-    link: Link::Filter(Filter { dispatches: |s| SLICES.solver(s).dispatches(), ..Filter::of_slices(|_| None) }),
-    shader: |s, t| SLICES.shader(s, t),
-    needed: |s| need(s.slice_filters.perona_malik, Scheme::Aos),
-    reads: |s, t| SLICES.reads(s, t.source(), t),
-    writes: |s, t| SLICES.writes(s, slices("target", t.target()), t),
-    extent: |s, t| SLICES.extent(s, t),
-    repeat: |s| SLICES.solver(s).dispatches() * s.slice_filters.perona_malik.unwrap_or_default().repeat,
-    params: |s, t| SLICES.params(s, s.slice_filters.perona_malik, t),
-    constants: |s, t| SLICES.constants(s, s.slice_filters.perona_malik, t, false),
-    tolerance: TOLERANCE,
-    reference: |s, t, reads, writes| SLICES.reference(s, s.slice_filters.perona_malik, t, reads, writes),
-    ..Pass::OF_SLICES
-};
+pub const SLICE: Pass = pass::<0>("aos_slice", Filter::of_slices(|_| None), Pass::OF_SLICES);
+pub const PICTURE: Pass = pass::<1>("aos_picture", Filter::of(Chain::Pictures), Pass::OF_PICTURES);
 
-pub const PICTURE: Pass = Pass {
-    name: "aos_picture",
-    link: Link::Filter(Filter { dispatches: |s| PICTURES.solver(s).dispatches(), ..Filter::of(Chain::Pictures) }),
-    shader: |s, t| PICTURES.shader(s, t),
-    needed: |s| need(s.settings.post.perona_malik, Scheme::Aos),
-    reads: |s, t| PICTURES.reads(s, t.source(), t),
-    writes: |s, t| PICTURES.writes(s, slices("target", t.target()), t),
-    extent: |s, t| PICTURES.extent(s, t),
-    repeat: |s| PICTURES.solver(s).dispatches() * s.settings.post.perona_malik.unwrap_or_default().repeat,
-    params: |s, t| PICTURES.params(s, s.settings.post.perona_malik, t),
-    constants: |s, t| PICTURES.constants(s, s.settings.post.perona_malik, t, false),
-    tolerance: TOLERANCE,
-    reference: |s, t, reads, writes| PICTURES.reference(s, s.settings.post.perona_malik, t, reads, writes),
-    ..Pass::OF_PICTURES
-};
+/// What the passes filter. A pass refers to its images by number, because its functions can capture nothing but constants.
+const IMAGES: [Images; 2] = [SLICES, PICTURES];
 
-/// How the rows and columns of an image are solved.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Solver {
-    /// One invocation solves a row or a column: one dispatch eliminates forwards, another substitutes back. That is the least work, and fastest on a
-    /// CPU.
-    Thomas,
-    /// One workgroup solves a row or a column in a single dispatch: parallel cyclic reduction splits it into as many systems as the workgroup has
-    /// invocations. Only so does a GPU have work for all its processors.
-    Hybrid,
+const fn pass<const OF: usize>(name: &'static str, filter: Filter, defaults: Pass) -> Pass {
+    Pass {
+        name,
+        link: Link::Filter(Filter { dispatches: |s| IMAGES[OF].dispatches(s), ..filter }),
+        shader: |s, t| IMAGES[OF].shader(s, t),
+        needed: |s| need((IMAGES[OF].settings)(s), Scheme::Aos),
+        reads: |s, t| IMAGES[OF].reads(s, t.source(), t),
+        writes: |s, t| IMAGES[OF].writes(s, slices("target", t.target()), t),
+        extent: |s, t| IMAGES[OF].extent(s, t),
+        repeat: |s| IMAGES[OF].dispatches(s) * (IMAGES[OF].settings)(s).unwrap_or_default().repeat,
+        params: |s, t| IMAGES[OF].params(s, (IMAGES[OF].settings)(s), t),
+        constants: |s, t| IMAGES[OF].constants(s, t, false),
+        tolerance: TOLERANCE,
+        reference: |s, t, reads, writes| IMAGES[OF].reference(s, (IMAGES[OF].settings)(s), t, reads, writes),
+        ..defaults
+    }
 }
 
 /// Invocations of a workgroup of the hybrid solver: THREADS of aos_solve.comp.
@@ -61,15 +42,11 @@ const THREADS: u32 = 128;
 /// Most unknowns that an invocation of the hybrid solver keeps in registers.
 const MAX_CHUNK: u32 = 16;
 
-impl Solver {
-    /// Number of dispatches of one time step; half of them work on rows, half on columns.
-    pub(super) fn dispatches(self) -> u32 {
-        if self == Solver::Thomas { 4 } else { 2 }
-    }
-}
-
-/// What differs between AOS on slices, distance maps and pictures: shaders, the slots for intermediate results, size and number of channels.
+/// What differs between AOS on slices, distance maps and pictures: settings, shaders, the slots for intermediate results, size and
+/// number of channels.
 pub(super) struct Images {
+    /// As the scene has them. Richardson's extrapolation passes other steps to `params` and `reference`.
+    settings: fn(&Scene) -> Option<PeronaMalik>,
     /// The shaders that eliminate, substitute back, and do both.
     shaders: [&'static str; 3],
     shares: Slot,
@@ -82,6 +59,7 @@ pub(super) struct Images {
 }
 
 pub(super) const SLICES: Images = Images {
+    settings: |s| s.slice_filters.perona_malik,
     shaders: ["filter/aos_forward.slice", "filter/aos_backward.slice", "filter/aos_solve.slice"],
     shares: Slot::SliceShares,
     forward: Slot::SliceForward,
@@ -91,6 +69,7 @@ pub(super) const SLICES: Images = Images {
     images: |t| t.slices,
 };
 const PICTURES: Images = Images {
+    settings: |s| s.settings.post.perona_malik,
     shaders: ["filter/aos_forward.picture", "filter/aos_backward.picture", "filter/aos_solve.picture"],
     shares: Slot::PictureShares,
     forward: Slot::PictureForward,
@@ -108,12 +87,20 @@ enum Sweep {
 }
 
 impl Images {
-    /// Chooses the hybrid solver wherever a workgroup's shared memory holds the longest row or column.
-    pub(super) fn solver(&self, scene: &Scene) -> Solver {
+    /// Number of dispatches of one time step; half of them work on rows, half on columns.
+    pub(super) fn dispatches(&self, scene: &Scene) -> u32 {
+        if self.is_hybrid(scene) { 2 } else { 4 }
+    }
+
+    /// True if one workgroup solves a row or a column in a single dispatch: parallel cyclic reduction splits it into as many systems as the workgroup
+    /// has invocations. Only so does a GPU have work for all its processors. It is done wherever a workgroup's shared memory holds the longest row or
+    /// column. Otherwise, by Thomas' algorithm, one invocation solves a row or a column: one dispatch eliminates forwards, another substitutes back.
+    /// That is the least work, and fastest on a CPU.
+    fn is_hybrid(&self, scene: &Scene) -> bool {
         let chunk = (0..2).map(|axis| self.chunk(scene, axis)).max().unwrap_or(0);
         // An equation has three coefficients and a right side.
         let bytes = 4 * (3 + self.channels) * THREADS * chunk;
-        if chunk <= MAX_CHUNK && bytes <= scene.device.shared_memory { Solver::Hybrid } else { Solver::Thomas }
+        chunk <= MAX_CHUNK && bytes <= scene.device.shared_memory
     }
 
     /// Unknowns of each invocation of the hybrid solver.
@@ -123,13 +110,11 @@ impl Images {
 
     /// The axis (0 along rows, 1 along columns) of a dispatch, and which sweeps it makes.
     fn turn_of(&self, scene: &Scene, args: &DispatchArgs) -> (usize, Sweep) {
-        match self.solver(scene) {
-            Solver::Hybrid => ((args.iteration % 2) as usize, Sweep::Both),
-            Solver::Thomas => {
-                let sweep = if args.iteration.is_multiple_of(2) { Sweep::Forward } else { Sweep::Backward };
-                ((args.iteration % 4 / 2) as usize, sweep)
-            }
+        if self.is_hybrid(scene) {
+            return ((args.iteration % 2) as usize, Sweep::Both);
         }
+        let sweep = if args.iteration.is_multiple_of(2) { Sweep::Forward } else { Sweep::Backward };
+        ((args.iteration % 4 / 2) as usize, sweep)
     }
 
     pub(super) fn shader(&self, scene: &Scene, args: &DispatchArgs) -> &'static str {
@@ -172,16 +157,10 @@ impl Images {
 
     /// Specialization constants. `extrapolates`: true for the dispatch that ends the two half steps of Richardson's extrapolation, and combines them
     /// with the full step.
-    pub(super) fn constants(
-        &self,
-        scene: &Scene,
-        settings: Option<PeronaMalik>,
-        args: &DispatchArgs,
-        extrapolates: bool,
-    ) -> Vec<(&'static str, i32)> {
+    pub(super) fn constants(&self, scene: &Scene, args: &DispatchArgs, extrapolates: bool) -> Vec<(&'static str, i32)> {
         let (axis, sweep) = self.turn_of(scene, args);
         let mut constants = vec![("AXIS", axis as i32)];
-        constants.extend((sweep != Sweep::Backward).then(|| constant(settings)));
+        constants.extend((sweep != Sweep::Backward).then(|| constant((self.settings)(scene))));
         constants.extend((sweep != Sweep::Forward).then_some(("RICHARDSON", extrapolates as i32)));
         constants.extend((sweep == Sweep::Both).then(|| ("CHUNK", self.chunk(scene, axis) as i32)));
         constants

@@ -33,7 +33,7 @@ pub const SLICE: Pass = Pass {
     extent: |s, t| SLICES.extent(s, t),
     repeat: |s| dispatches(s) * s.slice_filters.perona_malik.unwrap_or_default().repeat,
     params: |s, t| SLICES.params(s, step_of(s, t), t),
-    constants: |s, t| SLICES.constants(s, s.slice_filters.perona_malik, t, is_last(s, t)),
+    constants: |s, t| SLICES.constants(s, t, is_last(s, t)),
     tolerance: Tolerance { absolute: 6e-5, ..aos::TOLERANCE },
     reference: |s, t, reads, writes| {
         SLICES.reference(s, step_of(s, t), t, reads, writes);
@@ -50,7 +50,7 @@ pub const SLICE: Pass = Pass {
 };
 
 fn dispatches(scene: &Scene) -> u32 {
-    STEPS * SLICES.solver(scene).dispatches()
+    STEPS * SLICES.dispatches(scene)
 }
 
 /// The step of AOS that a dispatch belongs to.
@@ -62,8 +62,7 @@ enum Part {
 }
 
 fn part(scene: &Scene, args: &DispatchArgs) -> Part {
-    [Part::Complete, Part::FirstHalf, Part::SecondHalf]
-        [(args.iteration / SLICES.solver(scene).dispatches() % STEPS) as usize]
+    [Part::Complete, Part::FirstHalf, Part::SecondHalf][(args.iteration / SLICES.dispatches(scene) % STEPS) as usize]
 }
 
 /// The dispatch that ends both half steps.

@@ -23,14 +23,12 @@ pub(crate) const DISTANCE: Pass = Pass {
     reference: |scene, _, reads, writes| {
         let b = settings(scene);
         let source = reads.get("source");
-        let target = writes.get_mut("target");
         let [width, height, _] = source.size;
         let radius = radius(scene) as usize;
-        for (x, y) in pixels([width, height]) {
+        writes.get_mut("target").fill(|x, y| {
             let centre = source.one(x, y, 0);
             if !is_hit(centre) {
-                target.set([x, y, 0], &[centre]);
-                continue;
+                return [centre];
             }
             let (mut sum, mut weight) = (0.0, 0.0);
             for j in y.saturating_sub(radius)..=(y + radius).min(height - 1) {
@@ -45,8 +43,8 @@ pub(crate) const DISTANCE: Pass = Pass {
                     }
                 }
             }
-            target.set([x, y, 0], &[sum / weight]);
-        }
+            [sum / weight]
+        });
     },
     ..Pass::OF_DISTANCES
 };

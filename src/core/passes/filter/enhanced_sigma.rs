@@ -2,7 +2,7 @@
 //! fewer pixels than the starting window holds lie within two sigma of it, the window grows by one on every side.
 
 use super::estimator::{self, LEAST, least_distance};
-use super::sigma::{TIE, few, range};
+use super::sigma::{TIE, few, need, range};
 use crate::passes::pass::*;
 use crate::scene::{EnhancedSigma, Noise, Scene};
 
@@ -13,7 +13,7 @@ pub const SLICE: Pass = Pass {
     name: "enhanced_sigma_slice",
     link: Link::Filter(Filter::of_slices(|s| Some([reach(s, s.slice_filters.enhanced_sigma); 2]))),
     shader: |_, _| "filter/enhanced_sigma.slice",
-    needed: |s| need(s.slice_filters.enhanced_sigma),
+    needed: |s| need(s.slice_filters.enhanced_sigma.map(|enhanced| enhanced.sigma)),
     params: |s, t| params(s.slice_filters.enhanced_sigma, [LEAST, TIE], t),
     constants: |s, _| constants(s, s.slice_filters.enhanced_sigma, false),
     tolerance: Tolerance::absolute(6e-4).outliers(2e-3).because(WHY),
@@ -27,7 +27,7 @@ pub const SLICE: Pass = Pass {
 pub(crate) const DISTANCE: Pass = Pass {
     name: "enhanced_sigma_distance",
     shader: |_, _| "filter/enhanced_sigma.distance",
-    needed: |s| need(s.distance.enhanced_sigma),
+    needed: |s| need(s.distance.enhanced_sigma.map(|enhanced| enhanced.sigma)),
     params: |s, t| params(s.distance.enhanced_sigma, [least_distance(s), 0.0], t),
     constants: |s, _| constants(s, s.distance.enhanced_sigma, false),
     // A pixel in mm differs by 4e-6 between f32 and f64, a hundred times as much as one in 0..1.
@@ -42,7 +42,7 @@ pub(crate) const DISTANCE: Pass = Pass {
 pub const PICTURE: Pass = Pass {
     name: "enhanced_sigma_picture",
     shader: |_, _| "filter/enhanced_sigma.picture",
-    needed: |s| need(s.settings.post.enhanced_sigma),
+    needed: |s| need(s.settings.post.enhanced_sigma.map(|enhanced| enhanced.sigma)),
     params: |s, t| params(s.settings.post.enhanced_sigma, [LEAST, TIE], t),
     constants: |s, _| constants(s, s.settings.post.enhanced_sigma, false),
     tolerance: Tolerance::absolute(1e-3).relative(1e-3).outliers(1e-2).because(WHY),
@@ -76,15 +76,6 @@ pub const GROWTH: Pass = Pass {
     },
     ..Pass::OF_SLICES
 };
-
-/// A sigma of 0 keeps every pixel: no pass.
-fn need(enhanced: Option<EnhancedSigma>) -> Need {
-    match enhanced {
-        Some(e) if e.sigma > 0.0 => Ok("asked for"),
-        Some(_) => Err("a sigma of 0 changes nothing"),
-        None => Err("not asked for"),
-    }
-}
 
 /// How far the largest window, or the estimate of its centre, looks, texels.
 fn reach(scene: &Scene, enhanced: Option<EnhancedSigma>) -> u32 {

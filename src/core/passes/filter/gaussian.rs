@@ -98,7 +98,7 @@ const fn across_slices<const VOLUME: usize>(name: &'static str) -> Pass {
             let target = VOLUMES[VOLUME].chain.volume(s).into_iter();
             target.map(|slot| Bind { part: Part::Around(0), ..whole("target", slot) }).collect()
         },
-        extent: |s, t| in_runs_of(RUN, [s.grid.size[0], s.grid.size[1], t.slices], 2),
+        extent: |s, t| in_runs_of(RUN, slice_extent(s, t), 2),
         params: |s, t| params(VOLUME, s, 2, t),
         constants: |s, _| [constants(VOLUME, s, 2), vec![("LAYERED", 0)]].concat(),
         tolerance: TOLERANCE,
@@ -150,13 +150,10 @@ fn constants(volume: usize, scene: &Scene, axis: usize) -> Vec<(&'static str, i3
 /// passes 1 + w^2/6.
 fn sharpened(args: &DispatchArgs, reads: &Arrays, writes: &mut Arrays) {
     let source = reads.get("source");
-    let target = writes.get_mut("target");
-    for z in args.slice as usize..(args.slice + args.slices) as usize {
-        for (x, y) in source.pixels() {
-            let tap = |away: i64| source.clamped(x as i64, y as i64, z as i64 + away);
-            target.set([x, y, z], &[((8.0 * tap(0) - tap(-1) - tap(1)) / 6.0).clamp(0.0, 1.0)]);
-        }
-    }
+    writes.get_mut("target").fill_slices(args.written(), |[x, y, z]| {
+        let tap = |away: i64| source.clamped(x as i64, y as i64, z as i64 + away);
+        [((8.0 * tap(0) - tap(-1) - tap(1)) / 6.0).clamp(0.0, 1.0)]
+    });
 }
 
 fn reference(volume: usize, scene: &Scene, axis: usize, args: &DispatchArgs, reads: &Arrays, writes: &mut Arrays) {
@@ -164,7 +161,7 @@ fn reference(volume: usize, scene: &Scene, axis: usize, args: &DispatchArgs, rea
     let target = writes.get_mut("target");
     let deviation = (VOLUMES[volume].deviations)(scene)[axis];
     let radius = i64::from((VOLUMES[volume].radius)(scene)[axis]);
-    let slices = if axis < 2 { 0..1 } else { args.slice as usize..(args.slice + args.slices) as usize };
+    let slices = if axis < 2 { 0..1 } else { args.written() };
     for z in slices {
         for (x, y) in source.pixels() {
             let centre = [x, y, z];

@@ -39,10 +39,8 @@ fn reference(radius: u32, args: &DispatchArgs, reads: &Arrays, writes: &mut Arra
     let (source, target, z) = filtered(reads, writes, args);
     let radius = i64::from(radius);
     for (x, y) in source.pixels() {
-        let mut window = Vec::new();
-        for j in -radius..=radius {
-            window.extend((-radius..=radius).map(|i| source.clamped(x as i64 + i, y as i64 + j, 0)));
-        }
+        let around = (-radius..=radius).flat_map(|j| (-radius..=radius).map(move |i| (i, j)));
+        let mut window: Vec<f64> = around.map(|(i, j)| source.clamped(x as i64 + i, y as i64 + j, 0)).collect();
         let all = window.len();
         window.retain(|v| valid(*v));
         window.sort_by(f64::total_cmp);

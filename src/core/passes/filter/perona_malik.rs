@@ -82,32 +82,36 @@ pub(super) fn conductance(p: &PeronaMalik, a: &[f64], b: &[f64]) -> f64 {
 fn reference(p: Option<PeronaMalik>, args: &DispatchArgs, reads: &Arrays, writes: &mut Arrays, valid: fn(f64) -> bool) {
     let p = p.unwrap_or_default();
     let (source, target, z) = filtered(reads, writes, args);
-    let [width, height, _] = source.size;
-    let mut next = source.clone();
-    // What flows between two neighbours leaves the one and enters the other.
-    let mut exchange = |a: [usize; 3], b: [usize; 3]| {
-        let (from, to) = (source.get(a), source.get(b));
-        if !(valid(from[0]) && valid(to[0])) {
-            return;
+    let flows = flows(&p, source, valid);
+    target.fill_slices(z..z + 1, |[x, y, _]| {
+        let channels = source.get([x, y, 0]).iter().zip(flows.get([x, y, 0]));
+        channels.map(|(value, flow)| value + p.step * flow).collect::<Vec<f64>>()
+    });
+}
+
+/// What flows into each pixel per unit of time: what flows between two neighbours leaves the one and enters the other. Neighbours that are not `valid`
+/// exchange nothing.
+pub(super) fn flows(p: &PeronaMalik, u: &Texels, valid: fn(f64) -> bool) -> Texels {
+    let ([width, height, _], channels) = (u.size, u.channels);
+    let mut flows = Texels::from_fn(u.size, channels, |_, _| 0.0);
+    let mut exchange = |a: usize, b: usize| {
+        let [from, to] = [a, b].map(|n| &u.values[n * channels..(n + 1) * channels]);
+        if valid(from[0]) && valid(to[0]) {
+            let conductance = conductance(p, from, to);
+            for c in 0..channels {
+                let flow = conductance * (to[c] - from[c]);
+                flows.values[a * channels + c] += flow;
+                flows.values[b * channels + c] -= flow;
+            }
         }
-        let flow = p.step * conductance(&p, from, to);
-        let moved = |at, sign: f64| -> Vec<f64> {
-            let now: &[f64] = next.get(at);
-            now.iter().zip(to.iter().zip(from)).map(|(n, (t, f))| n + sign * flow * (t - f)).collect()
-        };
-        let (at_a, at_b) = (moved(a, 1.0), moved(b, -1.0));
-        next.set(a, &at_a);
-        next.set(b, &at_b);
     };
-    for (x, y) in pixels([width, height]) {
-        if x + 1 < width {
-            exchange([x, y, 0], [x + 1, y, 0]);
+    for n in 0..width * height {
+        if n % width + 1 < width {
+            exchange(n, n + 1);
         }
-        if y + 1 < height {
-            exchange([x, y, 0], [x, y + 1, 0]);
+        if n / width + 1 < height {
+            exchange(n, n + width);
         }
     }
-    for (x, y) in pixels([width, height]) {
-        target.set([x, y, z], next.get([x, y, 0]));
-    }
+    flows
 }

@@ -7,7 +7,7 @@
 //! time of 100.
 
 use super::estimator::storable_edge;
-use super::perona_malik::{conductance, constant, need};
+use super::perona_malik::{constant, flows, need};
 use crate::passes::pass::*;
 use crate::scene::{PeronaMalik, Scene, Scheme};
 
@@ -88,35 +88,14 @@ fn reference(scene: &Scene, dispatch: &Dispatch, reads: &Arrays, writes: &mut Ar
     let stage = stage_of(scene, dispatch);
     let c = Coefficients::of(stages(scene), stage);
     let last = reads.get("last");
-    let flows = flows(&p, last);
+    let flows = flows(&p, last, |_| true);
     let (target, z) = target_of(writes, dispatch);
     let width = last.size[0];
-    for (n, flow) in flows.iter().enumerate() {
+    for (n, flow) in flows.values.iter().enumerate() {
         let before = if stage > 1 { c.nu * reads.get("before").values[n] } else { 0.0 };
         let value = c.mu * last.values[n] + before + p.step * c.share * flow;
         target.set([n % width, n / width, z], &[value]);
     }
-}
-
-/// What flows into each pixel per unit of time: what flows between two neighbours leaves the one and enters the other.
-fn flows(p: &PeronaMalik, u: &Texels) -> Vec<f64> {
-    let [width, height, _] = u.size;
-    let mut flows = vec![0.0; width * height];
-    let mut exchange = |a: usize, b: usize| {
-        let (from, to) = (u.values[a], u.values[b]);
-        let flow = conductance(p, &[from], &[to]) * (to - from);
-        flows[a] += flow;
-        flows[b] -= flow;
-    };
-    for n in 0..width * height {
-        if n % width + 1 < width {
-            exchange(n, n + 1);
-        }
-        if n / width + 1 < height {
-            exchange(n, n + width);
-        }
-    }
-    flows
 }
 
 #[cfg(test)]

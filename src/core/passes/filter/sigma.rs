@@ -16,7 +16,7 @@ pub const SLICE: Pass = Pass {
     name: "sigma_slice",
     link: Link::Filter(Filter::of_slices(|s| Some([radius(s.slice_filters.sigma); 2]))),
     shader: |_, _| "filter/sigma.slice",
-    needed: |s| need(s.slice_filters.sigma),
+    needed: |s| need(s.slice_filters.sigma.map(|sigma| sigma.sigma)),
     extent: |s, t| in_runs(slice_extent(s, t), 1),
     repeat: |s| s.slice_filters.sigma.unwrap_or_default().repeat,
     params: |s, t| params(s.slice_filters.sigma, TIE, t),
@@ -33,7 +33,7 @@ pub const SLICE: Pass = Pass {
 pub(crate) const DISTANCE: Pass = Pass {
     name: "sigma_distance",
     shader: |_, _| "filter/sigma.distance",
-    needed: |s| need(s.distance.sigma),
+    needed: |s| need(s.distance.sigma.map(|sigma| sigma.sigma)),
     extent: |s, t| in_runs(ray_extent(s, t), 1),
     repeat: |s| s.distance.sigma.unwrap_or_default().repeat,
     params: |s, t| params(s.distance.sigma, 0.0, t),
@@ -46,7 +46,7 @@ pub(crate) const DISTANCE: Pass = Pass {
 pub const PICTURE: Pass = Pass {
     name: "sigma_picture",
     shader: |_, _| "filter/sigma.picture",
-    needed: |s| need(s.settings.post.sigma),
+    needed: |s| need(s.settings.post.sigma.map(|sigma| sigma.sigma)),
     extent: |s, t| in_runs_of(PICTURE_RUN, picture_extent(s, t), 1),
     repeat: |s| s.settings.post.sigma.unwrap_or_default().repeat,
     params: |s, t| params(s.settings.post.sigma, TIE, t),
@@ -60,9 +60,9 @@ pub const PICTURE: Pass = Pass {
 const PICTURE_RUN: u32 = 2;
 
 /// A sigma of 0 keeps every pixel: no pass.
-fn need(sigma: Option<scene::Sigma>) -> Need {
+pub(super) fn need(sigma: Option<f64>) -> Need {
     match sigma {
-        Some(s) if s.sigma > 0.0 => Ok("asked for"),
+        Some(sigma) if sigma > 0.0 => Ok("asked for"),
         Some(_) => Err("a sigma of 0 changes nothing"),
         None => Err("not asked for"),
     }

@@ -1,6 +1,6 @@
 //! Light that is propagated through the light volume, layer by layer: that of the key light, and of one behind.
 
-use super::{MATTER, cells, light_of, need};
+use super::{MATTER, count, light_of, need};
 use crate::passes::pass::*;
 use crate::passes::slots::Shape;
 use crate::scene::{Propagation, Scene};
@@ -58,7 +58,7 @@ impl Beam {
     }
 
     fn cells(&self, scene: &Scene) -> [u32; 3] {
-        cells(scene).map(|n| if self.is_back { n / 2 } else { n })
+        count(scene).map(|n| if self.is_back { n / 2 } else { n })
     }
 
     fn cell(&self, scene: &Scene) -> f64 {
@@ -203,9 +203,8 @@ impl Beam {
                     1 => [u, layer, v],
                     _ => [u, v, layer],
                 };
-                let mut light = [1.0; 3];
+                let mut light = [if front.is_some() { 0.0 } else { 1.0 }; 3];
                 if let Some(front) = &front {
-                    light = [0.0; 3];
                     for (i, j) in pixels([3, 3]) {
                         let tap = |at: usize, whole: f64, n: usize, size: usize| {
                             (at as i64 + whole as i64 + i64::from(stride) * (n as i64 - 1)).clamp(0, size as i64 - 1)
@@ -225,42 +224,35 @@ impl Beam {
             front = Some(next);
         }
         if let Some(front) = front {
-            let target = writes.get_mut("next_front");
-            for (u, v) in pixels([width, height]) {
-                target.set([u, v, 0], front.get([u, v, 0]));
-            }
+            writes.get_mut("next_front").set_layer(0, &front);
         }
     }
 }
 
 /// Propagates the light from `light.direction` through the lattice: one layer, or several, a dispatch.
-pub(crate) const PROPAGATE: Pass = Pass {
-    name: "light_propagate",
-    shader: |s, _| KEY.shader(s),
-    reads: |_, t| KEY.reads(t),
-    writes: |_, t| KEY.writes(t),
-    extent: |s, _| KEY.extent(s),
-    repeat: |s| KEY.dispatches(s),
-    params: |s, t| KEY.params(s, t),
-    constants: |s, t| KEY.constants(s, t),
-    tolerance: Tolerance::absolute(1e-6)
-        .relative(6e-4)
-        .because("nine terms in f32 a layer, none negative; then RGBA16F"),
-    reference: |s, t, reads, writes| KEY.reference(s, t, reads, writes),
-    ..MATTER
-};
+pub(crate) const PROPAGATE: Pass = propagate::<0>("light_propagate", need);
 
 /// Propagates the back light, in cells of twice the edge.
-pub(crate) const PROPAGATE_BACK: Pass = Pass {
-    name: "light_propagate_back",
-    needed: need_back,
-    reads: |_, t| BACK.reads(t),
-    writes: |_, t| BACK.writes(t),
-    extent: |s, _| BACK.extent(s),
-    shader: |s, _| BACK.shader(s),
-    repeat: |s| BACK.dispatches(s),
-    params: |s, t| BACK.params(s, t),
-    constants: |s, t| BACK.constants(s, t),
-    reference: |s, t, reads, writes| BACK.reference(s, t, reads, writes),
-    ..PROPAGATE
-};
+pub(crate) const PROPAGATE_BACK: Pass = propagate::<1>("light_propagate_back", need_back);
+
+/// The lights that the passes propagate. A pass refers to its light by number, because its functions can capture nothing but constants.
+const BEAMS: [Beam; 2] = [KEY, BACK];
+
+const fn propagate<const BEAM: usize>(name: &'static str, needed: fn(&Scene) -> Need) -> Pass {
+    Pass {
+        name,
+        needed,
+        shader: |s, _| BEAMS[BEAM].shader(s),
+        reads: |_, t| BEAMS[BEAM].reads(t),
+        writes: |_, t| BEAMS[BEAM].writes(t),
+        extent: |s, _| BEAMS[BEAM].extent(s),
+        repeat: |s| BEAMS[BEAM].dispatches(s),
+        params: |s, t| BEAMS[BEAM].params(s, t),
+        constants: |s, t| BEAMS[BEAM].constants(s, t),
+        tolerance: Tolerance::absolute(1e-6)
+            .relative(6e-4)
+            .because("nine terms in f32 a layer, none negative; then RGBA16F"),
+        reference: |s, t, reads, writes| BEAMS[BEAM].reference(s, t, reads, writes),
+        ..MATTER
+    }
+}

@@ -13,12 +13,12 @@ pub(in crate::passes) fn fade_density(scene: &Scene) -> f64 {
 /// The slots of the light volume that a pass that composites reads. Empty if the scene has no light volume.
 pub(in crate::passes) fn reads(scene: &Scene) -> Vec<Bind> {
     let filtered = scene.filters_in_hardware();
-    match scene.lit_by_volume() {
-        Some(_) => [("light_shade", Slot::LightShade), ("light_normals", Slot::LightNormals)]
-            .map(|(name, slot)| Bind { filtered, ..whole(name, slot) })
-            .to_vec(),
-        None => Vec::new(),
+    if scene.lit_by_volume().is_none() {
+        return Vec::new();
     }
+    [("light_shade", Slot::LightShade), ("light_normals", Slot::LightNormals)]
+        .map(|(name, slot)| Bind { filtered, ..whole(name, slot) })
+        .to_vec()
 }
 
 /// Adds the parameters of the light volume to those of a pass that composites.
@@ -124,41 +124,38 @@ impl<'a> Lit<'a> {
         })
     }
 
-    /// At a place: light and sheen, the normal, as long as it is certain, and the fourth channel of the normals.
-    fn at(&self, place: DVec3) -> ([f64; 4], DVec3, f64) {
+    /// At a place, seen along the unit vector `along`: the light that white matter scatters towards the viewer, sheen included, the normal, as long as it is certain, and the fourth channel of the normals.
+    fn at(&self, place: DVec3, along: DVec3) -> ([f64; 3], DVec3, f64) {
         let cells = (place - self.lattice.low) / self.lattice.cell - 0.5;
         let at = clamped(cells.to_array(), self.shade);
         let [x, y, z, rest] = self.normals.interpolated(at);
-        (self.shade.interpolated(at), DVec3::new(x, y, z), rest)
+        let (shade, direction) = (self.shade.interpolated(at), DVec3::new(x, y, z));
+        let grazing = match direction.length() {
+            certain if certain < 1e-4 => 0.0,
+            certain => 1.0 - (-direction.dot(along) / certain).max(0.0),
+        };
+        (std::array::from_fn(|c| shade[c] + shade[3] * SHEEN * grazing.powi(3)), direction, rest)
     }
 
     /// Light (red, green, blue) that white matter at a place in space, mm, scatters towards the viewer, without a highlight. `along`: unit direction
     /// of the ray.
     pub fn scattered(&self, place: DVec3, along: DVec3) -> [f64; 3] {
-        let (shade, direction, _) = self.at(place);
-        let grazing = match direction.length() {
-            certain if certain < 1e-4 => 0.0,
-            certain => 1.0 - (-direction.dot(along) / certain).max(0.0),
-        };
-        std::array::from_fn(|c| shade[c] + shade[3] * SHEEN * grazing.powi(3))
+        self.at(place, along).0
     }
 
     /// Light that matter of the colour `albedo` at a place, mm in space, sends towards the viewer, with its highlight. `along`: unit direction of the
     /// ray.
     pub fn light(&self, scene: &Scene, albedo: [f64; 3], place: DVec3, along: DVec3) -> [f64; 3] {
-        let (shade, direction, kept) = self.at(place);
+        let (scattered, direction, kept) = self.at(place, along);
         let certain = direction.length();
         if certain < 1e-4 {
-            return std::array::from_fn(|c| albedo[c] * shade[c]);
+            return std::array::from_fn(|c| albedo[c] * scattered[c]);
         }
         let normal = direction / certain;
         let halfway = (self.towards - along).try_normalize().unwrap_or(DVec3::ZERO);
         let gloss = if normal.dot(self.towards) > 0.0 { normal.dot(halfway).max(0.0) } else { 0.0 };
         let light = &scene.settings.light;
-        let grazing = 1.0 - (-normal.dot(along)).max(0.0);
         let highlight = light.specular * gloss.powf(light.shininess) * certain * kept;
-        std::array::from_fn(|c| {
-            albedo[c] * (shade[c] + shade[3] * SHEEN * grazing.powi(3)) + highlight * light.colour[c]
-        })
+        std::array::from_fn(|c| albedo[c] * scattered[c] + highlight * light.colour[c])
     }
 }

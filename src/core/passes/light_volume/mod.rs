@@ -42,8 +42,14 @@ fn density(scene: &Scene) -> f64 {
     if largest > 0.0 { 1.0 / largest } else { 0.0 }
 }
 
-fn cells(scene: &Scene) -> [u32; 3] {
+/// Cells of the light volume along each axis.
+fn count(scene: &Scene) -> [u32; 3] {
     scene.light_lattice().count
+}
+
+/// [`count`] as the size of an array.
+fn size(scene: &Scene) -> [usize; 3] {
+    count(scene).map(|n| n as usize)
 }
 
 /// Samples the density and the echo of each cell. Cells outside the rendered box take the values at its faces. `region.fade` is not applied here, so
@@ -52,13 +58,9 @@ pub(crate) const MATTER: Pass = Pass {
     name: "light_matter",
     shader: |_, _| "light_volume/matter",
     needed: need,
-    reads: |s, _| {
-        let mut reads = ray::reads(s);
-        reads.push(whole("transfer", Slot::Transfer));
-        reads
-    },
+    reads: |s, _| [ray::reads(s), vec![whole("transfer", Slot::Transfer)]].concat(),
     writes: |_, _| vec![whole("matter", Slot::LightMatter)],
-    extent: |s, _| cells(s),
+    extent: |s, _| count(s),
     params: |s, _| {
         let lattice = s.light_lattice();
         ray::unmoved_params(s, s.volume_view())
@@ -67,11 +69,8 @@ pub(crate) const MATTER: Pass = Pass {
             .f32("density", density(s))
     },
     constants: |s, _| {
-        let mut constants = ray::constants(s);
-        constants.retain(|(name, _)| !["SPREAD", "MIRRORED"].contains(name));
-        constants.push(("ENTRIES", s.transfer_entries() as i32));
-        constants.push(("TAPS", light_of(s).taps as i32));
-        constants
+        let with = [("ENTRIES", s.transfer_entries() as i32), ("TAPS", light_of(s).taps as i32)];
+        replaced(ray::constants(s), &["SPREAD", "MIRRORED"], with)
     },
     tolerance: Tolerance::absolute(4e-3).outliers(4e-3).because(
         "a place is off by 1e-5 mm in f32, so a sample by as much of a voxel's contrast, which the transfer function \
@@ -83,7 +82,7 @@ pub(crate) const MATTER: Pass = Pass {
         let (lattice, taps, view) = (scene.light_lattice(), light_of(scene).taps, scene.volume_view());
         let (density, parts) = (density(scene), f64::from(taps.pow(3)));
         let target = writes.get_mut("matter");
-        for_cells(lattice.count, |at| {
+        for at in cells(size(scene)) {
             let (mut dense, mut echo) = (0.0, 0.0);
             for n in 0..taps.pow(3) {
                 let tap =
@@ -94,12 +93,11 @@ pub(crate) const MATTER: Pass = Pass {
                 let value = ray::interpolated(scene, volume, texel);
                 let entry = windowed(view.window, value) * (table.len() - 1) as f64;
                 let n = (entry as usize).min(table.len() - 2);
-                let absorption = table[n][3] + (table[n + 1][3] - table[n][3]) * (entry - n as f64);
-                dense += absorption;
+                dense += table[n][3] + (table[n + 1][3] - table[n][3]) * (entry - n as f64);
                 echo += value;
             }
             target.set(at, &[(density * dense / parts).min(1.0), echo / parts]);
-        });
+        }
     },
     ..Pass::OF_RAYS
 };
@@ -110,7 +108,7 @@ pub(crate) const REDUCE: Pass = Pass {
     shader: |_, _| "light_volume/reduce",
     reads: |_, t| vec![whole("source", level(t.iteration))],
     writes: |_, t| vec![whole("target", level(t.iteration + 1))],
-    extent: |s, t| cells(s).map(|n| n.div_ceil(2 << t.iteration)),
+    extent: |s, t| count(s).map(|n| n.div_ceil(2 << t.iteration)),
     repeat: |s| s.ambient_cones().levels(),
     params: |_, _| Params::default(),
     constants: no_constants,
@@ -119,7 +117,7 @@ pub(crate) const REDUCE: Pass = Pass {
         let source = reads.get("source");
         let target = writes.get_mut("target");
         let taps = [(-1, 1.0), (0, 3.0), (1, 3.0), (2, 1.0)];
-        for_cells(target.size.map(|n| n as u32), |at| {
+        for at in cells(target.size) {
             let [x, y, z] = at.map(|n| 2 * n as i64);
             let mut sum = 0.0;
             for (k, down) in taps {
@@ -130,7 +128,7 @@ pub(crate) const REDUCE: Pass = Pass {
                 }
             }
             target.set(at, &[sum / 512.0]);
-        });
+        }
     },
     ..MATTER
 };
@@ -168,7 +166,7 @@ pub(crate) const DIFFUSE: Pass = Pass {
     },
     reads: |_, t| vec![whole("pyramid_1", Slot::LightPyramid1), whole("source", scattered(t.iteration))],
     writes: |_, t| vec![whole("target", scattered(t.iteration + 1))],
-    extent: |s, _| cells(s),
+    extent: |s, _| count(s),
     repeat: |_| 3,
     params: |s, _| Params::default().vec3("narrowness", scatter(s).map(|deviation| 0.5 / (deviation * deviation))),
     constants: |s, t| {
@@ -184,9 +182,8 @@ pub(crate) const DIFFUSE: Pass = Pass {
         let deviations = scatter(scene);
         let radius = (2.0 * deviations.into_iter().fold(0.0, f64::max)).ceil() as i64;
         let axis = t.iteration as usize;
-        for_cells(cells(scene), |at| {
-            let light = source.get(at);
-            let mut mean = [light[0], light[1], light[2], light[3]];
+        for at in cells(size(scene)) {
+            let mut mean: [f64; 4] = std::array::from_fn(|c| source.get(at)[c]);
             let [x, y, z] = at.map(|n| n / 2);
             if pyramid.one(x, y, z) > 0.0 {
                 for (c, deviation) in deviations.iter().enumerate() {
@@ -206,7 +203,7 @@ pub(crate) const DIFFUSE: Pass = Pass {
                 }
             }
             target.set(at, &mean);
-        });
+        }
     },
     ..MATTER
 };
@@ -239,7 +236,7 @@ pub(crate) const AMBIENT: Pass = Pass {
         reads
     },
     writes: |_, _| vec![whole("ambient_light", Slot::LightAmbient)],
-    extent: |s, _| cells(s).map(|n| n / 2),
+    extent: |s, _| count(s).map(|n| n / 2),
     repeat: once,
     params: |s, _| {
         let light = light_of(s);
@@ -271,7 +268,7 @@ pub(crate) const AMBIENT: Pass = Pass {
         let (pyramid, around, levels) =
             (PYRAMID.map(|name| reads.get(name)), reads.get("around"), scene.ambient_cones());
         let ambient = scene.settings.light.ambient;
-        for_cells(target.size.map(|n| n as u32), |at| {
+        for at in cells(target.size) {
             let coarse: [usize; 3] = std::array::from_fn(|a| (at[a] / 2).min(around.size[a] - 1));
             let mut open = 1.0;
             if around.get(coarse)[0] > 0.0 {
@@ -306,7 +303,7 @@ pub(crate) const AMBIENT: Pass = Pass {
                 }
             }
             target.set(at, &rgba);
-        });
+        }
     },
     ..MATTER
 };
@@ -345,7 +342,7 @@ pub const SHADE: Pass = Pass {
         ]
     },
     writes: |_, _| vec![whole("light_shade", Slot::LightShade), whole("light_normals", Slot::LightNormals)],
-    extent: |s, _| cells(s),
+    extent: |s, _| count(s),
     repeat: once,
     params: |s, _| {
         let (light, volume) = (&s.settings.light, light_of(s));
@@ -369,7 +366,7 @@ pub const SHADE: Pass = Pass {
         let wrap = wrap(volume.wrap);
         let (matter, pyramid) = (reads.get("matter"), reads.get("pyramid_1"));
         let ambient_light = reads.get("ambient_light");
-        for_cells(cells(scene), |at| {
+        for at in cells(size(scene)) {
             let (mut shade, mut oriented) = ([0.0; 4], [0.0; 4]);
             let [x, y, z] = at.map(|n| n / 2);
             if pyramid.one(x, y, z) > 0.0 {
@@ -391,7 +388,7 @@ pub const SHADE: Pass = Pass {
             }
             writes.get_mut("light_shade").set(at, &shade);
             writes.get_mut("light_normals").set(at, &oriented);
-        });
+        }
     },
     ..MATTER
 };
@@ -421,13 +418,4 @@ fn slope_at(matter: &Texels, at: [usize; 3]) -> DVec3 {
 /// A place in texels, moved to the nearest texel's centre where it is beyond them.
 fn clamped(place: [f64; 3], texels: &Texels) -> [f64; 3] {
     std::array::from_fn(|a| place[a].clamp(0.0, (texels.size[a] - 1) as f64))
-}
-
-fn for_cells(count: [u32; 3], mut of: impl FnMut([usize; 3])) {
-    let [width, height, depth] = count.map(|n| n as usize);
-    for z in 0..depth {
-        for y in 0..height {
-            (0..width).for_each(|x| of([x, y, z]));
-        }
-    }
 }

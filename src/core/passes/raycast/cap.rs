@@ -29,12 +29,7 @@ pub(crate) const PASS: Pass = Pass {
             .f32("radius", s.cap_radius())
             .f32("fade_density", s.region_fade().map_or(0.0, |fade| 1.0 / fade))
     },
-    constants: |s, _| {
-        let mut constants = ray::constants(s);
-        constants.retain(|(name, _)| *name != "SPREAD");
-        constants.push(("FADE", s.fades_caps() as i32));
-        constants
-    },
+    constants: |s, _| replaced(ray::constants(s), &["SPREAD"], [("FADE", s.fades_caps() as i32)]),
     tolerance: Tolerance::absolute(1e-3).outliers(1e-2).because(
         "a place is off by 1e-5 mm in f32, so a sample by as much of a voxel's contrast, and the device's filter may \
          round its weights; a place at the very border of the sector or the box, or a mean echo at the level itself, \
@@ -42,17 +37,14 @@ pub(crate) const PASS: Pass = Pass {
     ),
     reference: |scene, _, reads, writes| {
         let volume = reads.get("volume");
-        let cap = writes.get_mut("cap");
-        for (x, y) in cap.pixels() {
-            cap.set([x, y, 0], &reference_pixel(scene, volume, x, y).unwrap_or([0.0; 2]));
-        }
+        writes.get_mut("cap").fill(|x, y| reference_pixel(scene, volume, x, y).unwrap_or([0.0; 2]));
     },
     ..Pass::OF_RAYS
 };
 
-/// The slot of cut faces, for passes that end rays there. None if the scene has no cut faces.
-pub(in crate::passes) fn reads(scene: &Scene) -> Option<Bind> {
-    scene.has_caps().then_some(whole("cap", Slot::Cap))
+/// The slot of cut faces, for passes that end rays there. Empty if the scene has no cut faces.
+pub(in crate::passes) fn reads(scene: &Scene) -> Vec<Bind> {
+    whole_if(scene.has_caps(), "cap", Slot::Cap)
 }
 
 /// The specialization constant that tells a pass whether rays end at cut faces.
@@ -118,7 +110,7 @@ fn reference_pixel(scene: &Scene, volume: &Texels, x: usize, y: usize) -> Option
 }
 
 /// Axes of the plane with this unit normal (Duff et al. 2017, Building an orthonormal basis, revisited).
-fn axes(n: DVec3) -> [DVec3; 2] {
+pub(super) fn axes(n: DVec3) -> [DVec3; 2] {
     let side = if n.z < 0.0 { -1.0 } else { 1.0 };
     let scale = -1.0 / (side + n.z);
     let both = n.x * n.y * scale;

@@ -106,13 +106,9 @@ impl March {
             Rule::Riemann | Rule::Corrected | Rule::CorrectedLeft => (step, ends),
             Rule::PreIntegrated | Rule::PreIntegratedUnshaded | Rule::Exponential => {
                 let part = medium.part_inside(step)?;
-                (
-                    part,
-                    [
-                        if part[0] > step[0] { ends[1] } else { ends[0] },
-                        if part[1] < step[1] { ends[0] } else { ends[1] },
-                    ],
-                )
+                let front = if part[0] > step[0] { ends[1] } else { ends[0] };
+                let back = if part[1] < step[1] { ends[0] } else { ends[1] };
+                (part, [front, back])
             }
         };
         let length = (part[1] - part[0]) / self.reference_length;

@@ -7,7 +7,7 @@ use super::cap;
 use super::detector::{FOLLOW_LEVEL, Noise, polarity};
 use super::ray;
 use super::surface;
-use crate::passes::empty_space::{Skipping, surface_skipping};
+use crate::passes::empty_space::surface_skipping;
 use crate::passes::pass::*;
 use crate::scene::Scene;
 
@@ -33,11 +33,8 @@ const PATHS_OF: [(&str, Slot); 4] = [
 ];
 
 fn needed(scene: &Scene) -> Need {
-    if scene.chooses_surface() {
-        Ok("neighbouring rays choose the surface")
-    } else {
-        Err("each ray finds its own surface, or none is shown")
-    }
+    let why_not = "each ray finds its own surface, or none is shown";
+    scene.chooses_surface().then_some("neighbouring rays choose the surface").ok_or(why_not)
 }
 
 pub(crate) const CANDIDATES: Pass = Pass {
@@ -53,24 +50,20 @@ pub(crate) const CANDIDATES: Pass = Pass {
             .f32("weight_density", 1.0 / (SURE * threshold.max(1e-6)))
     },
     constants: |s, _| {
-        let mut constants = ray::marching_constants(s, surface_skipping(s));
-        let ring = s.ring;
-        let detector = [("ROUGH", 1), ("PLACE", 1), ("NUMBER", 1), ("DETECTOR", 1)];
-        constants.extend(detector);
-        constants.extend([("HALF", ring.half as i32), ("FOLLOW_LENGTH", ring.follow as i32)]);
-        constants
+        let detector = vec![("ROUGH", 1), ("PLACE", 1), ("NUMBER", 1), ("DETECTOR", 1)];
+        let ring = vec![("HALF", s.ring.half as i32), ("FOLLOW_LENGTH", s.ring.follow as i32)];
+        [ray::marching_constants(s, surface_skipping(s)), detector, ring].concat()
     },
     tolerance: Tolerance::absolute(4e-3).relative(1e-5).outliers(2e-2).because(
         "of places, that of raycast_surface; a weight is a contrast, off by 1e-6, over three thresholds; a difference \
          within that of the threshold or of 0.7 of the peak, or two edges of the same weight, may go either way",
     ),
     reference: |scene, _, reads, writes| {
-        let candidates = writes.get_mut("candidates");
-        for (x, y) in candidates.pixels() {
+        writes.get_mut("candidates").fill(|x, y| {
             let ray = ray::Ray::cast(scene, reads.get("volume"), scene.surface_view(), scene.ring.step, x, y);
             let [(first, weight), (second, other)] = candidates_of(scene, &ray);
-            candidates.set([x, y, 0], &[first, second, weight, other]);
-        }
+            [first, second, weight, other]
+        });
     },
     ..Pass::OF_RAYS
 };
@@ -119,7 +112,7 @@ pub(crate) const CHOICE: Pass = Pass {
     name: "choose_surface",
     shader: |_, _| "raycast/choose_surface",
     reads: |s, _| {
-        let mut reads = ray::marching_reads(s, Skipping::None);
+        let mut reads = ray::marching_reads(s, None);
         reads.push(whole("candidates", Slot::Candidates));
         reads.extend(PATHS_OF.map(|(name, slot)| whole(name, slot)));
         reads.extend(cap::reads(s));
@@ -128,11 +121,9 @@ pub(crate) const CHOICE: Pass = Pass {
     writes: |s, _| surface::writes(s),
     params: |s, _| ray::params(s, s.surface_view(), s.ring.step).f32("behind_step", s.step_behind()),
     constants: |s, _| {
-        let mut constants = ray::marching_constants(s, Skipping::None);
-        constants.retain(|(name, _)| !["SKIP", "SLIDING", "SPREAD"].contains(name));
-        constants.extend([("ECHO", s.lights_by_echo() as i32), ("BEHIND", s.samples_behind() as i32)]);
-        constants.extend([("HALF", s.ring.half as i32), cap::constant(s)]);
-        constants
+        let (echo, behind) = (("ECHO", s.lights_by_echo() as i32), ("BEHIND", s.samples_behind() as i32));
+        let with = [echo, behind, ("HALF", s.ring.half as i32), cap::constant(s)];
+        replaced(ray::marching_constants(s, None), &["SKIP", "SLIDING", "SPREAD"], with)
     },
     tolerance: Tolerance::absolute(2e-3).relative(1e-5).outliers(1e-2).because(
         "a place is copied; costs that differ by less than 1e-5 may choose either; a sample at the border of the \
@@ -155,11 +146,7 @@ pub(crate) const CHOICE: Pass = Pass {
                 echo = [sum / f64::from(half), 1.0, surface::behind(scene, &ray, distance), 0.0];
             }
             let distance = if is_capped { ray.enter_or_miss() } else { distance };
-            writes.get_mut("distance_map").set([x, y, 0], &[distance]);
-            if scene.lights_by_echo() {
-                let map = writes.get_mut("surface");
-                map.set([x, y, 0], &echo[..map.channels]);
-            }
+            surface::write(scene, writes, [x, y, 0], distance, echo);
         }
     },
     ..CANDIDATES
@@ -294,6 +281,9 @@ impl Kept {
         }
         let threshold = scene.settings.surface.threshold;
         let weight = ((edge.contrast - WEAK * threshold) / (SURE * threshold.max(1e-6))).clamp(0.0, 1.0);
+        if weight >= 1.0 {
+            self.certain_at = self.certain_at.min(edge.best_at);
+        }
         let new = (ray.enter + at, weight);
         let [first, second] = self.candidates;
         let last = if is_hit(second.0) { 1 } else { 0 };
@@ -307,16 +297,9 @@ impl Kept {
         } else if weight > first.1.min(second.1) {
             self.candidates = [if first.1 <= second.1 { second } else { first }, new];
         } else {
-            return self.note_certain(edge, weight);
+            return;
         }
         (self.best, self.at) = (edge.best, edge.best_at);
-        self.note_certain(edge, weight);
-    }
-
-    fn note_certain(&mut self, edge: &Edge, weight: f64) {
-        if weight >= 1.0 {
-            self.certain_at = self.certain_at.min(edge.best_at);
-        }
     }
 }
 

@@ -19,11 +19,7 @@ pub(crate) const PASS: Pass = Pass {
         Mode::Cube => Ok("the volume is a solid block"),
         _ => Err("no block in this mode"),
     },
-    reads: |s, _| {
-        let mut reads = ray::reads(s);
-        reads.push(whole("block", Slot::Block));
-        reads
-    },
+    reads: |s, _| [ray::reads(s), vec![whole("block", Slot::Block)]].concat(),
     writes: |s, _| vec![whole("picture", rendered(s))],
     params: |s, _| {
         ray::params(s, s.whole_view(s.settings.cube.window), s.step)
@@ -33,24 +29,16 @@ pub(crate) const PASS: Pass = Pass {
             .vec3("edge_colour", EDGE.0)
             .f32("slice_pitch", s.probe().map_or(0.0, |p| p.slices.pitch()))
     },
-    constants: |s, _| {
-        let mut constants = ray::constants(s);
-        // Clip planes are half-spaces of the block.
-        constants.retain(|(name, _)| !matches!(*name, "CLIPS" | "SPREAD"));
-        constants.push(("EDGES", s.settings.cube.edges as i32));
-        constants
-    },
+    // Clip planes are half-spaces of the block.
+    constants: |s, _| replaced(ray::constants(s), &["CLIPS", "SPREAD"], [("EDGES", s.settings.cube.edges as i32)]),
     tolerance: Tolerance::absolute(1e-2).outliers(2e-3).because(
         "the sector's border is found to 1/64 of half a slice pixel, the reference to the end: as much of a voxel's \
          contrast and of an edge line's rise; a ray that grazes a border may fall on either side",
     ),
     reference: |scene, _, reads, writes| {
         let volume = reads.get("volume");
-        let picture = writes.get_mut("picture");
         let block = scene.block();
-        for (x, y) in picture.pixels() {
-            picture.set([x, y, 0], &reference_pixel(scene, volume, &block, x as f64 + 0.5, y as f64 + 0.5));
-        }
+        writes.get_mut("picture").fill(|x, y| reference_pixel(scene, volume, &block, x as f64 + 0.5, y as f64 + 0.5));
     },
     ..Pass::OF_RAYS
 };

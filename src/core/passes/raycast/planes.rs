@@ -28,13 +28,11 @@ pub(crate) const PASS: Pass = Pass {
     ),
     reference: |scene, _, reads, writes| {
         let volume = reads.get("volume");
-        let picture = writes.get_mut("picture");
         let (cut, [left, top]) = (Cut::of(scene), scene.tile_area().corner);
-        for (x, y) in picture.pixels() {
-            let rgba =
-                value_at(scene, volume, &cut, x + left as usize, y + top as usize).map_or([0.0; 4], |v| [v, v, v, 1.0]);
-            picture.set([x, y, 0], &rgba);
-        }
+        writes.get_mut("picture").fill(|x, y| {
+            let value = value_at(scene, volume, &cut, x + left as usize, y + top as usize);
+            value.map_or([0.0; 4], |v| [v, v, v, 1.0])
+        });
     },
     ..Pass::OF_RAYS
 };
@@ -57,12 +55,11 @@ pub(crate) const TONED: Pass = Pass {
     ),
     reference: |scene, _, reads, writes| {
         let volume = reads.get("volume");
-        let screen = writes.get_mut("screen");
         let cut = Cut::of(scene);
-        for (x, y) in screen.pixels() {
+        writes.get_mut("screen").fill(|x, y| {
             let colour = value_at(scene, volume, &cut, x, y).map(|v| [v; 3]);
-            screen.set([x, y, 0], &postprocess::reference_pixel(scene, Some(&cut.tiling), colour, x, y));
-        }
+            postprocess::reference_pixel(scene, Some(&cut.tiling), colour, x, y)
+        });
     },
     ..PASS
 };
@@ -90,15 +87,15 @@ fn params(scene: &Scene) -> Params {
 }
 
 fn constants(scene: &Scene) -> Vec<(&'static str, i32)> {
-    let mut constants = ray::constants(scene);
-    constants.retain(|(name, _)| !["SPREAD", "CLIPS"].contains(name));
-    constants.push(("CLIPS", scene.planes_clips().count() as i32));
-    constants.push(("SAMPLES", scene.slab_samples() as i32));
-    constants.push(("SLAB", scene.settings.planes.slab.number()));
-    constants.push(("ONE_TILE", (scene.tile_count() == 1) as i32));
-    constants.push(("CURVED", scene.has_curve() as i32));
-    constants.push(("RUN", run(scene) as i32));
-    constants
+    let with = [
+        ("CLIPS", scene.planes_clips().count() as i32),
+        ("SAMPLES", scene.slab_samples() as i32),
+        ("SLAB", scene.settings.planes.slab.number()),
+        ("ONE_TILE", (scene.tile_count() == 1) as i32),
+        ("CURVED", scene.has_curve() as i32),
+        ("RUN", run(scene) as i32),
+    ];
+    replaced(ray::constants(scene), &["SPREAD", "CLIPS"], with)
 }
 
 /// Pixels of a column that an invocation makes. A CPU loads some sixty parameters for every eight invocations, which takes a fifth of the time of a pixel
@@ -152,26 +149,23 @@ fn unmoved(scene: &Scene) -> Scene {
 fn slab(scene: &Scene, volume: &Texels, place: DVec3, normal: DVec3) -> Option<f64> {
     let settings = &scene.settings.planes;
     let count = scene.slab_samples() as usize;
-    let values: Vec<f64> = (0..count)
-        .filter_map(|i| {
-            let through = if count > 1 { i as f64 / (count - 1) as f64 - 0.5 } else { 0.0 };
-            value(scene, volume, place + normal * (through * settings.thickness))
-        })
-        .collect();
-    if values.is_empty() {
-        return None;
+    let values = (0..count).filter_map(|i| {
+        let through = if count > 1 { i as f64 / (count - 1) as f64 - 0.5 } else { 0.0 };
+        value(scene, volume, place + normal * (through * settings.thickness))
+    });
+    let values: Vec<f64> = values.collect();
+    match settings.slab {
+        _ if values.is_empty() => None,
+        Slab::Mean => Some(values.iter().sum::<f64>() / values.len() as f64),
+        Slab::Max => values.into_iter().reduce(f64::max),
+        Slab::Min => values.into_iter().reduce(f64::min),
     }
-    Some(match settings.slab {
-        Slab::Mean => values.iter().sum::<f64>() / values.len() as f64,
-        Slab::Max => values.iter().copied().fold(0.0, f64::max),
-        Slab::Min => values.iter().copied().fold(1.0, f64::min),
-    })
 }
 
 /// The windowed sample at a place; none outside the region, beyond a clip plane, and outside the insonified region.
 fn value(scene: &Scene, volume: &Texels, place: DVec3) -> Option<f64> {
     let view = scene.planes_view();
-    let within = (0..3).all(|axis| place[axis] >= view.low[axis] && place[axis] <= view.high[axis]);
+    let within = place.cmpge(view.low).all() && place.cmple(view.high).all();
     if !within || scene.planes_clips().any(|(normal, limit)| normal.dot(place) > limit) {
         return None;
     }

@@ -16,23 +16,17 @@ pub(crate) const PASS: Pass = Pass {
     reads: |s, _| ray::marching_reads(s, empty_space::volume_skipping(s)),
     writes: |s, _| vec![whole("picture", rendered(s))],
     params: |s, _| ray::params(s, s.projection_view(), s.step),
-    constants: |s, _| {
-        let mut constants = ray::marching_constants(s, empty_space::volume_skipping(s));
-        constants.push(("KEPT", kept(s)));
-        constants
-    },
+    constants: |s, _| [ray::marching_constants(s, empty_space::volume_skipping(s)), vec![("KEPT", kept(s))]].concat(),
     tolerance: Tolerance::absolute(2e-3).outliers(5e-3).because(
         "places are off by 1e-5 mm in f32, and R16F stores 1 to 4.9e-4; a sample at the very border of the sector may \
          fall on either side, and with it the largest of all",
     ),
     reference: |scene, _, reads, writes| {
         let volume = reads.get("volume");
-        let picture = writes.get_mut("picture");
-        for (x, y) in picture.pixels() {
+        writes.get_mut("picture").fill(|x, y| {
             let ray = ray::Ray::cast(scene, volume, scene.projection_view(), scene.step, x, y);
-            let value = projected(scene, &ray);
-            picture.set([x, y, 0], &value.map_or([0.0; 4], |v| [v, v, v, 1.0]));
-        }
+            projected(scene, &ray).map_or([0.0; 4], |v| [v, v, v, 1.0])
+        });
     },
     ..Pass::OF_RAYS
 };
@@ -49,13 +43,12 @@ fn kept(scene: &Scene) -> i32 {
 /// its step is long, the last one's being what is left.
 fn projected(scene: &Scene, ray: &ray::Ray) -> Option<f64> {
     let steps = ray.steps_to(ray.path().max(0.0)).ceil() as u64;
-    let samples: Vec<(f64, f64)> = (0..steps)
-        .filter_map(|i| {
-            let from = ray.offset(i as f64);
-            let length = ray.length(i as f64).min(ray.path() - from);
-            Some((ray.sample(from + length / 2.0, i as f64 + 0.5).filter(|_| length > 0.0)?, length))
-        })
-        .collect();
+    let samples = (0..steps).filter_map(|i| {
+        let from = ray.offset(i as f64);
+        let length = ray.length(i as f64).min(ray.path() - from);
+        Some((ray.sample(from + length / 2.0, i as f64 + 0.5).filter(|_| length > 0.0)?, length))
+    });
+    let samples: Vec<(f64, f64)> = samples.collect();
     let values = samples.iter().map(|s| s.0);
     match scene.settings.mode {
         _ if samples.is_empty() => None,

@@ -1,12 +1,12 @@
 //! Shared by the ray casters: the parameters of rays and sweep map, and in f64 the march of a ray through the volume.
 
-use crate::passes::empty_space::Skipping;
-use crate::passes::lookup_tables::{is_non_uniform, line_parameter, sweep_border, sweep_span};
+use crate::passes::empty_space::skip_constant;
+use crate::passes::lookup_tables::{is_non_uniform, line_span, sweep_border, sweep_span};
 use crate::passes::pass::*;
 use crate::passes::preprocess::packed_sampling;
-use crate::probe::{Advance, Array, Geometry, Motion, Probe};
+use crate::probe::{Advance, Array, Geometry, Indices, Motion, Probe};
 use crate::scene::cube::HalfSpace;
-use crate::scene::{MAX_CLIPS, Scene, View, windowed};
+use crate::scene::{MAX_CLIPS, Rays, Scene, View, windowed};
 use glam::DVec3;
 
 /// Whether the sweep look-up table, the table of slices (non-uniform sweep), and the line look-up table (intra-frame motion) are
@@ -30,11 +30,11 @@ pub(in crate::passes) fn reads(scene: &Scene) -> Vec<Bind> {
     reads
 }
 
-/// The slots that passes with samples along rays read, including those for empty-space skipping.
-pub(super) fn marching_reads(scene: &Scene, skipping: Skipping) -> Vec<Bind> {
+/// The slots that passes with samples along rays read, including the one that they skip empty space by.
+pub(super) fn marching_reads(scene: &Scene, skipping: Option<Slot>) -> Vec<Bind> {
     let mut reads = reads(scene);
     reads.extend(scene.packs().then_some(whole("packed_neighbours", Slot::PackedNeighbours)));
-    reads.extend(skipping.slot().map(|slot| whole("bricks", slot)));
+    reads.extend(skipping.map(|slot| whole("bricks", slot)));
     reads
 }
 
@@ -69,14 +69,12 @@ pub(in crate::passes) fn constants(scene: &Scene) -> Vec<(&'static str, i32)> {
 }
 
 /// Specialization constants of passes that take samples along rays.
-pub(super) fn marching_constants(scene: &Scene, skipping: Skipping) -> Vec<(&'static str, i32)> {
+pub(super) fn marching_constants(scene: &Scene, skipping: Option<Slot>) -> Vec<(&'static str, i32)> {
     let mut constants = constants(scene);
     if scene.packs() {
-        constants.retain(|(name, _)| *name != "SAMPLING");
-        constants.push(("SAMPLING", packed_sampling(scene)));
+        constants = replaced(constants, &["SAMPLING"], [("SAMPLING", packed_sampling(scene))]);
     }
-    constants.push(skipping.constant());
-    constants.push(("SLIDING", scene.settings.ray.sliding as i32));
+    constants.extend([skip_constant(skipping), ("SLIDING", scene.settings.ray.sliding as i32)]);
     constants
 }
 
@@ -87,16 +85,8 @@ pub(in crate::passes) fn unmoved_params(scene: &Scene, view: View) -> Params {
 
 /// The scene with another set of parallel rays (`origin`, its change per pixel to the right and down, and `direction`), and without the rays' step.
 pub(super) fn unmoved(scene: &Scene, [origin, origin_dx, origin_dy, direction]: [DVec3; 4]) -> Scene {
-    let zero = DVec3::ZERO;
-    let rays = crate::scene::Rays {
-        origin,
-        origin_dx,
-        origin_dy,
-        direction,
-        direction_dx: zero,
-        direction_dy: zero,
-        ..scene.rays
-    };
+    let [direction_dx, direction_dy] = [DVec3::ZERO; 2];
+    let rays = Rays { origin, origin_dx, origin_dy, direction, direction_dx, direction_dy, ..scene.rays };
     Scene { rays, step: 1.0, ..scene.clone() }
 }
 
@@ -105,12 +95,23 @@ pub(super) fn params(scene: &Scene, view: View, step: f64) -> Params {
     let (grid, local) = (&scene.grid, scene.local_origin());
     let mut clips = [[0.0; 4]; MAX_CLIPS];
     for (clip, (normal, limit)) in clips.iter_mut().zip(scene.clips()) {
-        *clip = [normal.x, normal.y, normal.z, scene.limit_to_local(normal, limit)];
+        *clip = normal.extend(scene.limit_to_local(normal, limit)).to_array();
     }
     let [clip_0, clip_1, clip_2, clip_3] = clips;
     let (bricks, stored) = (scene.bricks(), scene.stored_bounds());
     let last_stored = stored.high.map(|end| end - 1);
-    let params = sweep_params(ray_params(scene), scene)
+    let probe = scene.probe();
+    let [range_low, range_high] = probe.map_or([0.0; 2], |probe| [probe.first_range(), probe.last_range()]);
+    let (line_low, line_high) = probe.map_or((0.0, 0.0), line_span);
+    let (slice_origin, slice_density) = match &scene.geometry {
+        Geometry::Cartesian(volume) => (volume.origin[2] - local.z, 1.0 / volume.spacing[2]),
+        Geometry::Sweep(_) => (0.0, 0.0),
+    };
+    let advance = match probe {
+        Some(Probe { advance: Advance::Same(advance), slices, .. }) if tables(scene).0 => advance / slices.pitch(),
+        _ => 0.0,
+    };
+    sweep_params(ray_params(scene), scene)
         .vec3("brick_low", scene.to_local(bricks.low))
         .vec3("brick_density", bricks.edge.recip())
         .vec3("last_brick", bricks.count.map(|n| f64::from(n) - 1.0))
@@ -133,31 +134,18 @@ pub(super) fn params(scene: &Scene, view: View, step: f64) -> Params {
         .f32("window_low", window_low)
         .f32("window_scale", 1.0 / (window_high - window_low))
         .vec2("grid_origin", [grid.origin[0] - local.x, grid.origin[1] - local.y])
-        .vec2("grid_density", grid.pitch.map(|p| 1.0 / p));
-    match &scene.geometry {
-        Geometry::Cartesian(volume) => sector(params, [0.0; 4])
-            .f32("slice_origin", volume.origin[2] - local.z)
-            .f32("slice_density", 1.0 / volume.spacing[2])
-            .f32("axis_depth", 0.0)
-            .f32("line_density", 0.0)
-            .f32("advance", 0.0),
-        Geometry::Sweep(probe) => {
-            let low = line_parameter(probe, probe.lines.first());
-            let high = line_parameter(probe, probe.lines.last());
-            let entries = f64::from(scene.settings.ray.entries - 1);
-            let advance = match &probe.advance {
-                Advance::Same(a) => a / probe.slices.pitch(),
-                _ => 0.0,
-            };
-            let swept = tables(scene).0;
-            sector(params, [probe.first_range(), probe.last_range(), low, high])
-                .f32("slice_origin", 0.0)
-                .f32("slice_density", 0.0)
-                .f32("axis_depth", probe.axis_depth())
-                .f32("line_density", entries / (high - low))
-                .f32("advance", if swept { advance } else { 0.0 })
-        }
-    }
+        .vec2("grid_density", grid.pitch.map(|p| 1.0 / p))
+        .f32("range_low", range_low)
+        .f32("range_high", range_high)
+        .f32("range_low_squared", f64::from(range_low as f32 * range_low as f32))
+        .f32("range_high_squared", f64::from(range_high as f32 * range_high as f32))
+        .f32("line_low", line_low)
+        .f32("line_high", line_high)
+        .f32("slice_origin", slice_origin)
+        .f32("slice_density", slice_density)
+        .f32("axis_depth", probe.map_or(0.0, |probe| probe.axis_depth()))
+        .f32("line_density", probe.map_or(0.0, |_| f64::from(scene.settings.ray.entries - 1) / (line_high - line_low)))
+        .f32("advance", advance)
 }
 
 /// From the position in a sweep to the slice index, and the borders of the lines.
@@ -205,16 +193,6 @@ fn mirrored(probe: &Probe) -> i32 {
     i32::from(first_x == -last_x && first_y == last_y && last_x < 0.0) + 2 * i32::from(low == -high)
 }
 
-fn sector(params: Params, [range_low, range_high, line_low, line_high]: [f64; 4]) -> Params {
-    params
-        .f32("range_low", range_low)
-        .f32("range_high", range_high)
-        .f32("range_low_squared", f64::from(range_low as f32 * range_low as f32))
-        .f32("range_high_squared", f64::from(range_high as f32 * range_high as f32))
-        .f32("line_low", line_low)
-        .f32("line_high", line_high)
-}
-
 /// The position in the picture, in rays from its upper left corner, that the ray (x, y) goes through: the middle of its cell.
 pub(super) fn middle_of(x: usize, y: usize) -> [f64; 2] {
     [x as f64 + 0.5, y as f64 + 0.5]
@@ -228,7 +206,8 @@ pub(super) struct Ray<'a> {
     step: f64,
     window: [f64; 2],
     origin: DVec3,
-    direction: DVec3,
+    /// Unit length, away from the eye.
+    pub direction: DVec3,
     /// Across the ray, unit length.
     across: [DVec3; 2],
     /// Distances along the ray, mm, between which it is in the box and on the kept side of all clip planes: it enters at `enter` and leaves at
@@ -296,11 +275,6 @@ impl<'a> Ray<'a> {
     /// The place in space, mm, at an offset in mm behind the entry.
     pub fn place(&self, offset: f64) -> DVec3 {
         self.origin + self.direction * (self.enter + offset)
-    }
-
-    /// Unit direction, away from the eye.
-    pub fn direction(&self) -> DVec3 {
-        self.direction
     }
 
     /// True if the place at an offset in mm behind the entry is in the insonified region.
@@ -410,38 +384,36 @@ pub(in crate::passes) fn texel_beyond_sweep(scene: &Scene, place: DVec3) -> Opti
     let (x, y, position) = probe.inverse_sweep_map(place);
     let at = probe.to_indices(place);
     // The shader's table ends with the sweep.
-    let (low, high) = sweep_span(probe);
-    let (low, high) = match probe.motion {
-        Motion::Fan { .. } => (2.0 * low.atan(), 2.0 * high.atan()),
-        Motion::Translated | Motion::Still { .. } => (low, high),
-    };
+    let (low, high) = probe.slice_bounds();
     let slice = probe.slice_index(position.clamp(low, high), at.line);
+    let [i, j] = pixel(scene, x, y);
+    inside(probe, Indices { slice: 0.0, ..at }).then_some([i, j, slice])
+}
+
+/// Fractional column and row of a place in the plane of the slices, mm.
+fn pixel(scene: &Scene, x: f64, y: f64) -> [f64; 2] {
     let grid = &scene.grid;
-    let pixel = [(x - grid.origin[0]) / grid.pitch[0], (y - grid.origin[1]) / grid.pitch[1]];
-    let in_plane = crate::probe::Indices { slice: 0.0, ..at };
-    inside(probe, in_plane).then_some([pixel[0], pixel[1], slice])
+    [(x - grid.origin[0]) / grid.pitch[0], (y - grid.origin[1]) / grid.pitch[1]]
 }
 
 /// Fractional texel indices, whole at the centres of texels, of a place in space, mm. None outside the insonified region of a sweep; a Cartesian
 /// volume has indices everywhere. It uses the exact inverse of the probe's maps, not the tables that the shader reads.
 pub fn texel(scene: &Scene, place: DVec3) -> Option<[f64; 3]> {
-    let grid = &scene.grid;
-    let column = |x: f64, y: f64| [(x - grid.origin[0]) / grid.pitch[0], (y - grid.origin[1]) / grid.pitch[1]];
     match &scene.geometry {
         Geometry::Cartesian(volume) => {
-            let [i, j] = column(place.x, place.y);
+            let [i, j] = pixel(scene, place.x, place.y);
             Some([i, j, (place.z - volume.origin[2]) / volume.spacing[2]])
         }
         Geometry::Sweep(probe) => {
             let (x, y, _) = probe.inverse_sweep_map(place);
             let at = probe.to_indices(place);
-            let [i, j] = column(x, y);
+            let [i, j] = pixel(scene, x, y);
             inside(probe, at).then_some([i, j, at.slice])
         }
     }
 }
 
-fn inside(probe: &Probe, at: crate::probe::Indices) -> bool {
+fn inside(probe: &Probe, at: Indices) -> bool {
     let within = |index: f64, count: usize| index >= 0.0 && index <= (count - 1) as f64;
     within(at.sample, probe.samples) && within(at.line, probe.lines.len()) && within(at.slice, probe.slices.len())
 }

@@ -5,19 +5,22 @@
 //! difference of one at most.
 
 use crate::passes::pass::*;
-use crate::passes::postprocess::{tone_constants, tone_params, toned};
+use crate::passes::postprocess::{on_screen, tone_constants, tone_params};
+use crate::scene::Scene;
 
 /// Second difference of a pixel's colour on the screen beyond which it has all rays: two levels of the screen.
 const THRESHOLD: f64 = 2.0 / 255.0;
+
+/// The need of a pass of adaptive supersampling, with the reason why.
+pub(super) fn need(scene: &Scene, why: &'static str) -> Need {
+    scene.adapts_rays().then_some(why).ok_or("no pixel has more rays than another")
+}
 
 /// Marks the pixels at edges, which get all rays of adaptive supersampling.
 pub(crate) const MARK_EDGES: Pass = Pass {
     name: "mark_edges",
     shader: |_, _| "raycast/mark_edges",
-    needed: |s| match s.adapts_rays() {
-        true => Ok("only pixels at edges have several rays"),
-        false => Err("no pixel has more rays than another"),
-    },
+    needed: |s| need(s, "only pixels at edges have several rays"),
     reads: |_, _| vec![whole("picture", Slot::PixelRays)],
     writes: |_, _| vec![whole("marks", Slot::EdgeMarks)],
     extent: rendering_extent,
@@ -30,19 +33,18 @@ pub(crate) const MARK_EDGES: Pass = Pass {
         let picture = reads.get("picture");
         let marks = writes.get_mut("marks");
         let [width, height, _] = marks.size;
-        for (x, y) in pixels([width, height]) {
+        marks.fill(|x, y| {
             let at = |dx: i64, dy: i64| {
                 let inside = |n: usize, by: i64, size: usize| (n as i64 + by).clamp(0, size as i64 - 1) as usize;
-                let rgba = picture.get([inside(x, dx, width), inside(y, dy, height), 0]);
-                if rgba[3] > 0.0 { toned(scene, [rgba[0], rgba[1], rgba[2]]) } else { [0.0; 3] }
+                on_screen(scene, picture.get([inside(x, dx, width), inside(y, dy, height), 0]))
             };
             let bends = |(dx, dy): (i64, i64)| {
                 let (before, here, after) = (at(-dx, -dy), at(0, 0), at(dx, dy));
                 (0..3).any(|c| (before[c] + after[c] - 2.0 * here[c]).abs() > THRESHOLD)
             };
             let is_marked = [(1, 0), (0, 1), (1, 1), (1, -1)].into_iter().any(bends);
-            marks.set([x, y, 0], &[f64::from(u8::from(is_marked))]);
-        }
+            [f64::from(u8::from(is_marked))]
+        });
     },
     ..Pass::OF_RAYS
 };

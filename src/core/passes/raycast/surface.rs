@@ -16,11 +16,7 @@ pub(crate) const PASS: Pass = Pass {
         (true, Ok(_)) => Err("found in the march that composites"),
         (true, Err(_)) => Ok("the mode shows a surface"),
     },
-    reads: |s, _| {
-        let mut reads = ray::marching_reads(s, empty_space::surface_skipping(s));
-        reads.extend(cap::reads(s));
-        reads
-    },
+    reads: |s, _| [ray::marching_reads(s, empty_space::surface_skipping(s)), cap::reads(s)].concat(),
     writes: |s, _| writes(s),
     params: |s, _| params(s),
     constants: |s, _| constants(s),
@@ -39,9 +35,7 @@ pub(crate) const PASS: Pass = Pass {
 
 /// The slots that the surface detector writes: the distance map, and the echo at the surface where light depends on it.
 pub(super) fn writes(scene: &Scene) -> Vec<Bind> {
-    let mut writes = vec![whole("distance_map", Slot::Distance)];
-    writes.extend(scene.lights_by_echo().then_some(whole("surface", Slot::Surface)));
-    writes
+    [vec![whole("distance_map", Slot::Distance)], whole_if(scene.lights_by_echo(), "surface", Slot::Surface)].concat()
 }
 
 /// Parameters of the surface detector and its rays.
@@ -106,10 +100,15 @@ pub(super) fn reference_ray(scene: &Scene, reads: &Arrays, writes: &mut Arrays, 
         }
         None => (MISS, [0.0; 4]),
     };
-    writes.get_mut("distance_map").set([x, y, 0], &[distance]);
+    write(scene, writes, [x, y, 0], distance, surface);
+}
+
+/// Writes the surface of a ray: its distance, and `surface` (the echo and what follows it) where the scene stores it.
+pub(super) fn write(scene: &Scene, writes: &mut Arrays, at: [usize; 3], distance: f64, surface: [f64; 4]) {
+    writes.get_mut("distance_map").set(at, &[distance]);
     if scene.lights_by_echo() {
         let map = writes.get_mut("surface");
-        map.set([x, y, 0], &surface[..map.channels]);
+        map.set(at, &surface[..map.channels]);
     }
 }
 

@@ -14,28 +14,20 @@ pub(crate) const PASS: Pass = Pass {
     reads: |s, _| {
         let mut reads = ray::marching_reads(s, empty_space::surface_skipping(s));
         // What either of the two need not see is left out of that one.
-        reads.extend(empty_space::volume_skipping(s).slot().map(|slot| whole("volume_bricks", slot)));
+        reads.extend(empty_space::volume_skipping(s).map(|slot| whole("volume_bricks", slot)));
         reads.push(whole("transfer", Slot::Transfer));
         reads.extend(light_volume::reads(s));
         reads.extend(cap::reads(s));
         reads
     },
-    writes: |s, _| {
-        let mut writes = surface::writes(s);
-        writes.push(whole("picture", composited_beside_surface(s)));
-        writes
-    },
+    writes: |s, _| [surface::writes(s), vec![whole("picture", composited_beside_surface(s))]].concat(),
     params: |s, _| {
         let [low, high] = s.volume_view().window;
         volume::compositing_params(s, surface::params(s), s.ring.step)
             .f32("volume_window_low", low)
             .f32("volume_window_scale", 1.0 / (high - low))
     },
-    constants: |s, _| {
-        let mut constants = surface::constants(s);
-        constants.extend(volume::compositing_constants(s, false));
-        constants
-    },
+    constants: |s, _| [surface::constants(s), volume::compositing_constants(s, false)].concat(),
     tolerance: Tolerance::absolute(4e-3).relative(1e-5).outliers(2e-2).because(
         "of distances, the tolerance of raycast_surface; of colours, that of raycast_volume, on the same samples",
     ),

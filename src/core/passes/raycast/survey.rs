@@ -38,11 +38,8 @@ pub fn view(scene: &Scene) -> View {
 /// bounds are read.
 pub fn survey(scene: &Scene, volume: &Texels) -> Survey {
     let mut survey = Survey::default();
-    if scene.is_flat() {
-        planes(scene, volume, &mut survey);
-    } else {
-        rays(scene, volume, &mut survey);
-    }
+    let take = if scene.is_flat() { planes } else { rays };
+    take(scene, volume, &mut survey);
     survey
 }
 
@@ -92,7 +89,7 @@ fn planes(scene: &Scene, volume: &Texels, survey: &mut Survey) {
     for (x, y) in pixels([width, height]) {
         let Some(tile) = tiling.tile_at(x, y) else { continue };
         let place = tiling.point(tile, [x, y].map(|n| n as f64 + 0.5));
-        let within = (0..3).all(|axis| place[axis] >= scene.low[axis] && place[axis] <= scene.high[axis]);
+        let within = place.cmpge(scene.low).all() && place.cmple(scene.high).all();
         if !within || scene.clips().any(|(normal, limit)| normal.dot(place) > limit) {
             continue;
         }

@@ -14,10 +14,10 @@ use super::cap;
 use super::ray::{self, Ray};
 use super::volume::{self, RayMedium, Tables};
 use crate::passes::empty_space;
-use crate::passes::light_volume::{self, Lit};
+use crate::passes::light_volume;
 use crate::passes::lookup_tables::transfer_integral_within;
 use crate::passes::pass::*;
-use crate::passes::postprocess::{tone_constants, tone_params, toned};
+use crate::passes::postprocess::{on_screen, tone_constants, tone_params};
 use crate::scene::{Scene, transfer};
 use glam::DVec3;
 
@@ -37,10 +37,7 @@ const SAME_VALUE: f64 = 1e-3;
 const LEAST: f64 = 1e-6;
 
 fn need(scene: &Scene) -> Need {
-    match scene.tolerance() {
-        Some(_) => Ok("each pixel has the steps that keep its error"),
-        None => Err("no error is asked for"),
-    }
+    scene.tolerance().map(|_| "each pixel has the steps that keep its error").ok_or("no error is asked for")
 }
 
 /// The error that is allowed, 0..1 of the screen.
@@ -50,7 +47,7 @@ fn allowed(scene: &Scene) -> f64 {
 
 /// The step of all rays, mm: no longer than a slice pixel, so that no sample of a ray is missed by all of its neighbours'.
 fn first_step(scene: &Scene) -> f64 {
-    scene.step.min(volume::reference_length(scene))
+    scene.step.min(scene.reference_length())
 }
 
 /// Light that is left where a ray ends early: what it can add is to be little beside the error.
@@ -76,10 +73,7 @@ fn sized(scene: &Scene, params: Params) -> Params {
 /// Light of matter, at most: what is not yet seen of a ray that was left early.
 fn brightest(scene: &Scene) -> f64 {
     let light = &scene.settings.light;
-    match scene.lit_by_volume() {
-        Some(_) => light.diffuse + light.ambient + light.specular,
-        None => 1.0,
-    }
+    if scene.lit_by_volume().is_some() { light.diffuse + light.ambient + light.specular } else { 1.0 }
 }
 
 /// Casts a ray through every other pixel of every other row. It begins with the scene's step, at most a slice pixel, and repeats a ray with shorter
@@ -108,15 +102,11 @@ pub const FIRST: Pass = Pass {
         sized(s, params.f32("allowed", allowed(s)).f32("brightest", brightest(s)).i32("finest", FINEST))
     },
     constants: |s, _| {
-        let mut constants = ray::marching_constants(s, empty_space::volume_skipping(s));
-        constants.extend(volume::compositing_constants(s, true));
-        constants.push(cap::constant(s));
-        constants.extend(tone_constants(s));
+        let marching = ray::marching_constants(s, empty_space::volume_skipping(s));
+        let all = [marching, volume::compositing_constants(s, true), vec![cap::constant(s)], tone_constants(s)];
         // Each step has its own light, opacities follow from integrals, nothing is filtered along the ray, and where the sector ends is asked of both its sides.
         let others = ["LIT_STEPS", "SLIDING", "CROSSING", "COMPOSITING", "MIRRORED"];
-        constants.retain(|(name, _)| !others.contains(name));
-        constants.push(("COMPOSITING", 1));
-        constants
+        replaced(all.concat(), &others, [("COMPOSITING", 1)])
     },
     tolerance: Tolerance::absolute(4e-3).outliers(2e-2).because(
         "as raycast_volume; a ray whose error is close to what is allowed may take other steps, which change it by as \
@@ -127,7 +117,7 @@ pub const FIRST: Pass = Pass {
         let medium = Cast::new(scene, reads);
         for (x, y) in writes.get("lattice").pixels() {
             let (rgba, error) = medium.settled([2 * x, 2 * y], 0);
-            let [r, g, b] = on_screen(scene, rgba);
+            let [r, g, b] = on_screen(scene, &rgba);
             writes.get_mut("lattice").set([x, y, 0], &rgba);
             writes.get_mut("lattice_errors").set([x, y, 0], &[r, g, b, error]);
         }
@@ -266,11 +256,6 @@ pub(crate) const REFINE: Pass = Pass {
     ..FIRST
 };
 
-/// A colour as the screen shows it.
-fn on_screen(scene: &Scene, [r, g, b, opacity]: [f64; 4]) -> [f64; 3] {
-    if opacity > 0.0 { toned(scene, [r, g, b]) } else { [0.0; 3] }
-}
-
 /// What the passes cast, in f64.
 struct Cast<'a> {
     scene: &'a Scene,
@@ -309,8 +294,7 @@ impl Sum {
 
 impl<'a> Cast<'a> {
     fn new(scene: &'a Scene, reads: &'a Arrays) -> Cast<'a> {
-        let tables = Tables { of_steps: reads.get("transfer"), curve: Vec::new(), lit: Lit::new(scene, reads) };
-        Cast { scene, reads, tables }
+        Cast { scene, reads, tables: Tables::of_transfer(scene, reads) }
     }
 
     /// The colour of a pixel with steps halved at least so many times, and as short as its error needs; the error that is left, 0..1 of the screen.
@@ -335,13 +319,10 @@ impl<'a> Cast<'a> {
         let cut = cap::cut_at(scene, self.reads, x, y);
         let shows = |sum: [f64; 4]| {
             let rgba = light_volume::developed(scene, true, sum, at);
-            match &cut {
-                Some(cut) => cut.over(rgba),
-                None => rgba,
-            }
+            cut.map_or(rgba, |cut| cut.over(rgba))
         };
-        let on_screen = |rgba| on_screen(scene, rgba);
-        let is_cut = cut.as_ref().is_some_and(|cut| cut.ends_ray());
+        let on_screen = |rgba: [f64; 4]| on_screen(scene, &rgba);
+        let is_cut = cut.is_some_and(|cut| cut.ends_ray());
         let (sums, doubt) = if is_cut { Default::default() } else { self.march(&ray) };
         let [fine, even, odd] = sums.map(|sum| shows(sum.0));
         if ray.path() <= 0.0 || is_cut {
@@ -380,10 +361,7 @@ impl<'a> Cast<'a> {
             let [short, long] = [last, before].map(|from| self.between(&medium, ray, [from, next]));
             let is_lit = [&short, &long].into_iter().flatten().any(|found| found.opacity > 0.0);
             if let Some(found) = short {
-                let light = match &self.tables.lit {
-                    Some(lit) => lit.scattered(middle, ray.direction()),
-                    None => [1.0; 3],
-                };
+                let light = self.tables.lit.as_ref().map_or([1.0; 3], |lit| lit.scattered(middle, ray.direction));
                 let seen = (1.0 - fine.0[3]) * found.opacity;
                 (0..3).for_each(|c| doubt[c] += seen * found.unsure[c] * light[c]);
                 fine.add(medium.tinted_at(found.rgb, found.place, middle), found.opacity);
@@ -399,16 +377,12 @@ impl<'a> Cast<'a> {
             (i, before, last) = (i + 1.0, last, next);
         }
         if !self.ends(&[fine, here, behind]) {
-            self.catch_up(&medium, ray, [before, last], &mut behind);
+            // What is left of the long step (`catch_up` of cast.comp), under the light of its middle.
+            if let Some(found) = self.between(&medium, ray, [before, last]) {
+                behind.add(medium.tinted_at(found.rgb, found.place, found.place), found.opacity);
+            }
         }
         ([fine, here, behind], doubt)
-    }
-
-    /// Adds a long step, under the light of its middle.
-    fn catch_up(&self, medium: &RayMedium, ray: &Ray, step: [f64; 2], sum: &mut Sum) {
-        if let Some(found) = self.between(medium, ray, step) {
-            sum.add(medium.tinted_at(found.rgb, found.place, found.place), found.opacity);
-        }
     }
 
     /// What is between two samples, offsets behind the ray's entry; nothing where both are outside.
@@ -417,11 +391,10 @@ impl<'a> Cast<'a> {
         let ends = step.map(|offset| ray.sample(offset, 0.0));
         let (front, back) = (ends[0].or(ends[1])?, ends[1].or(ends[0])?);
         let looked_up = |value| volume::looked_up(self.tables.of_steps, self.scene.transfer_entries(), value);
+        let [low, high] = [front, back].map(looked_up);
+        let apart: [f64; 3] = std::array::from_fn(|c| (high[c] - low[c]).abs());
         let [r, g, bl, kappa] = match (back - front).abs() < SAME_VALUE {
-            true => {
-                let [low, high] = [front, back].map(looked_up);
-                std::array::from_fn(|c| (low[c] + high[c]) / 2.0)
-            }
+            true => std::array::from_fn(|c| (low[c] + high[c]) / 2.0),
             false => {
                 let [low, high] = [front, back].map(|value| self.integral(value));
                 let [r, g, bl, kappa]: [f64; 4] = std::array::from_fn(|c| (high[c] - low[c]) / (back - front));
@@ -430,9 +403,8 @@ impl<'a> Cast<'a> {
             }
         };
         let place = ray.place((step[0] + step[1]) / 2.0);
-        let depth = kappa * self.scene.faded(place) * (b - a) / volume::reference_length(self.scene);
-        let [low, high] = [front, back].map(looked_up);
-        let unsure = std::array::from_fn(|c| self_shade(depth) * (high[c] - low[c]).abs());
+        let depth = kappa * self.scene.faded(place) * (b - a) / self.scene.reference_length();
+        let unsure = apart.map(|apart| self_shade(depth) * apart);
         Some(Between { rgb: [r, g, bl], opacity: transfer::opacity(depth), place, unsure })
     }
 

@@ -2,7 +2,7 @@
 
 use super::cap;
 use super::composite::{March, Medium, Place};
-use super::ray;
+use super::{ray, refine};
 use crate::passes::empty_space;
 use crate::passes::light_volume::{self, Lit};
 use crate::passes::pass::*;
@@ -77,18 +77,13 @@ pub(crate) const PASS: Pass = Pass {
 /// Casts all rays of the pixels that adaptive supersampling has marked.
 pub(crate) const REFINED: Pass = Pass {
     name: "raycast_refined",
-    needed: |s| match s.adapts_rays() {
-        true => Ok("pixels at edges have several rays"),
-        false => Err("no pixel has more rays than another"),
-    },
+    needed: |s| refine::need(s, "pixels at edges have several rays"),
     reads: |s, dispatch| [(PASS.reads)(s, dispatch), vec![whole("marks", Slot::EdgeMarks)]].concat(),
     writes: |s, _| vec![whole("picture", rendered(s))],
     extent: ray_extent,
     constants: |s, dispatch| {
-        let mut constants = (PASS.constants)(s, dispatch);
-        constants.retain(|(name, _)| !matches!(*name, "MIDDLE_OF" | "REFINED"));
-        constants.extend([("MIDDLE_OF", 1), ("REFINED", s.settings.ray.rays as i32)]);
-        constants
+        let with = [("MIDDLE_OF", 1), ("REFINED", s.settings.ray.rays as i32)];
+        replaced((PASS.constants)(s, dispatch), &["MIDDLE_OF", "REFINED"], with)
     },
     reference: |scene, _, reads, writes| {
         let (marks, rays) = (reads.get("marks"), scene.settings.ray.rays as usize);
@@ -130,10 +125,7 @@ fn reference_rays(
             }
         };
         // What is lit later is lit without its face.
-        let colour = match cut.filter(|_| kind(scene) != Kind::Hit) {
-            Some(cut) => cut.over(colour),
-            None => colour,
-        };
+        let colour = cut.filter(|_| kind(scene) != Kind::Hit).map_or(colour, |cut| cut.over(colour));
         writes.get_mut("picture").set([x, y, 0], &colour);
         if kind(scene) == Kind::Hit {
             writes.get_mut("hit_distance").set([x, y, 0], &[hit]);
@@ -146,7 +138,7 @@ pub(super) fn compositing_params(scene: &Scene, params: Params, step: f64) -> Pa
     let volume = &scene.settings.volume;
     let (axis, near) = depth_axis(scene);
     let params = params
-        .f32("absorption_scale", step / reference_length(scene))
+        .f32("absorption_scale", step / scene.reference_length())
         .f32("opaque_enough", 1.0 - scene.settings.ray.early_end)
         .vec3("near_tint", volume.near_tint)
         .vec3("far_tint", volume.far_tint)
@@ -163,20 +155,19 @@ pub(super) fn compositing_constants(scene: &Scene, is_alone: bool) -> Vec<(&'sta
         Compositing::PreIntegrated => 2,
         Compositing::Exponential => 3,
     };
-    let mut constants = vec![
+    let constants = vec![
         ("EARLY_END", (scene.settings.ray.early_end > 0.0) as i32),
         ("COMPOSITING", compositing),
         ("DEPTH_CODED", (scene.settings.volume.shading == Shading::DepthCoded) as i32),
         ("ENTRIES", scene.transfer_entries() as i32),
     ];
-    constants.extend(light_volume::constants(scene, is_alone));
-    constants
+    [constants, light_volume::constants(scene, is_alone).to_vec()].concat()
 }
 
 /// Red, green, blue and opacity of the whole ray of pixel (x, y) with a step of `step` mm, through the transfer function.
 pub(super) fn composited(scene: &Scene, reads: &Arrays, step: f64, [x, y]: [usize; 2]) -> [f64; 4] {
     let ray = ray::Ray::cast(scene, reads.get("volume"), scene.volume_view(), step, x, y);
-    let tables = Tables { of_steps: reads.get("transfer"), curve: Vec::new(), lit: Lit::new(scene, reads) };
+    let tables = Tables::of_transfer(scene, reads);
     light_volume::developed(scene, false, composite(scene, &ray, &tables).0, ray::middle_of(x, y))
 }
 
@@ -209,10 +200,6 @@ pub fn reference_length(scene: &Scene) -> f64 {
     scene.reference_length()
 }
 
-fn is_exponential(scene: &Scene) -> bool {
-    scene.settings.volume.compositing == Compositing::Exponential
-}
-
 /// What compositing looks up: the transfer function and the light volume.
 pub(super) struct Tables<'a> {
     /// The table by which a step is looked up: the transfer function over the sample value or, with `volume.compositing` pre-integrated or
@@ -224,15 +211,18 @@ pub(super) struct Tables<'a> {
     pub lit: Option<Lit<'a>>,
 }
 
-fn curve(scene: &Scene, table: &Texels) -> Vec<[f64; 4]> {
-    match is_exponential(scene) {
-        // It follows the table of steps.
-        true => {
-            let entries = scene.transfer_entries();
-            (0..entries).map(|n| entry(table, entries * entries + n)).collect()
-        }
-        false => Vec::new(),
+impl<'a> Tables<'a> {
+    /// Of a pass whose steps are looked up in the transfer function itself.
+    pub(crate) fn of_transfer(scene: &Scene, reads: &'a Arrays) -> Tables<'a> {
+        Tables { of_steps: reads.get("transfer"), curve: Vec::new(), lit: Lit::new(scene, reads) }
     }
+}
+
+/// The transfer function behind the table of steps, if `volume.compositing` is exponential.
+fn curve(scene: &Scene, table: &Texels) -> Vec<[f64; 4]> {
+    let is_exponential = scene.settings.volume.compositing == Compositing::Exponential;
+    let entries = if is_exponential { scene.transfer_entries() } else { 0 };
+    (0..entries).map(|n| entry(table, entries * entries + n)).collect()
 }
 
 /// A vector and a number: the vector's dot product with a place, less the number, is the depth along the view, 0 at the box's nearest corner and 1 at
@@ -274,10 +264,8 @@ impl<'a> RayMedium<'a> {
     /// The colour `rgb` at `place` after the light of the light volume at `lit_at` and the tint by depth.
     pub(crate) fn tinted_at(&self, rgb: [f64; 3], place: DVec3, lit_at: DVec3) -> [f64; 3] {
         let settings = &self.scene.settings.volume;
-        let rgb = match &self.tables.lit {
-            Some(lit) => lit.light(self.scene, rgb, lit_at, self.ray.direction()),
-            None => rgb,
-        };
+        let lit = self.tables.lit.as_ref();
+        let rgb = lit.map_or(rgb, |lit| lit.light(self.scene, rgb, lit_at, self.ray.direction));
         if settings.shading != Shading::DepthCoded {
             return rgb;
         }
@@ -333,7 +321,7 @@ fn composite(scene: &Scene, ray: &ray::Ray, tables: &Tables) -> ([f64; 4], f64) 
     let march = March {
         rule: scene.settings.volume.compositing.into(),
         path: ray.path(),
-        reference_length: reference_length(scene),
+        reference_length: scene.reference_length(),
         early_end: scene.settings.ray.early_end,
         hit: scene.settings.volume.hit,
     };

@@ -134,6 +134,16 @@ impl Descriptor {
         Descriptor { meaning: Meaning { channels: GREY, unit, miss: Some(MISS) }, ..self }
     }
 
+    /// An image of the volume. Each volume image has its own copy; texels that no pass writes are read as 0.
+    const fn volume(name: &'static str) -> Descriptor {
+        Descriptor::image(name, volume, volume_format).multibuffered().clear().of(GREY, SHARE_OF_RANGE)
+    }
+
+    /// A table of vectors of four floats, as many bytes as `shape` has.
+    const fn vectors(name: &'static str, shape: fn(&Scene) -> Shape, make: fn(&Scene) -> Vec<f32>) -> Descriptor {
+        Descriptor::table(name, shape, make, Differs::ByContent).of(VECTOR, AS_THE_SHADER)
+    }
+
     const fn by_frames(self) -> Descriptor {
         Descriptor { initializer: Initializer::ByFrames, ..self }
     }
@@ -212,18 +222,16 @@ slots! {
     SliceStageB = D::image("slice_stage_b", slices, |_| Format::R32f).across_queues().of(GREY, SHARE_OF_RANGE);
     SliceStageC = D::image("slice_stage_c", slices, |_| Format::R32f).across_queues().of(GREY, SHARE_OF_RANGE);
     /// The volume before it is smoothed across slices.
-    SharpVolume = D::image("sharp_volume", volume, volume_format).multibuffered().clear().across_queues()
-        .of(GREY, SHARE_OF_RANGE);
+    SharpVolume = D::volume("sharp_volume").across_queues();
     /// The volume before floating parts are dropped.
-    WholeVolume = D::image("whole_volume", volume, volume_format).multibuffered().clear().across_queues()
-        .of(GREY, SHARE_OF_RANGE);
+    WholeVolume = D::volume("whole_volume").across_queues();
     /// 1 in texels of floating parts of the volume, otherwise 0.
     Floating = D::image("floating", volume, |_| Format::R8).by_volume(floating::SEARCH,
         |a, b| a.floating_basis() != b.floating_basis()).of(GREY, "1 in parts of the volume that float");
     /// The volume that rays are cast through, unless parts of it are removed ([`Slot::CutVolume`]).
-    Volume = D::image("volume", volume, volume_format).multibuffered().clear().across_queues().of(GREY, SHARE_OF_RANGE);
+    Volume = D::volume("volume").across_queues();
     /// The volume without what cuts or the render start remove. Rays are cast through it in place of [`Slot::Volume`].
-    CutVolume = D::image("cut_volume", volume, volume_format).multibuffered().clear().of(GREY, SHARE_OF_RANGE);
+    CutVolume = D::volume("cut_volume");
     /// The start surface: the row at which rendering starts, for each column and slice of the volume.
     StartSurface = D::image("start_surface", |s| Shape::Two([s.grid.size[0], s.slices()]), |_| Format::R32f)
         .by_volume(unveil::SEARCH, |a, b| a.unveil_basis() != b.unveil_basis())
@@ -232,19 +240,15 @@ slots! {
     StartCurve = D::image("start_curve", |s| Shape::Two([s.grid.size[0], s.slices()]), |_| Format::R32f)
         .by_scene(cut::start_curve, By(|a, b| a.start_curve_differs(b))).of(GREY, "row of the volume, by column and slice");
     /// The cuts: the axes of their views, and the edges of their contours or the points of their brushes.
-    Cuts = D::table("cuts", |s| Shape::Buffer(16 * cut::table_length(s) as u32), cut::table, ByContent)
-        .of(VECTOR, AS_THE_SHADER);
+    Cuts = D::vectors("cuts", |s| Shape::Buffer(16 * cut::table_length(s) as u32), cut::table);
     /// The place of each slice in space: its angle or position, and how far the motor moves during its frame.
-    SlicePlaces = D::table("slice_places", |s| Shape::Buffer(16 * s.slices()), cut::slice_places, ByContent)
-        .of(VECTOR, AS_THE_SHADER);
+    SlicePlaces = D::vectors("slice_places", |s| Shape::Buffer(16 * s.slices()), cut::slice_places);
     /// For each texel of a slice, the share (0..1) of the frame's lines that fired before the line through it.
     LineShares = D::image("line_shares", one_slice, |_| Format::R32f).by_scene(cut::line_shares, By(lattice_differs))
         .of(GREY, "share of the frame's lines that fired before");
     /// The section volume before it is smoothed across slices. `SectionVolume` is the smoothed one, which planes beside a rendering are cut from.
-    SharpSectionVolume = D::image("sharp_section_volume", volume, volume_format).multibuffered().clear().across_queues()
-        .of(GREY, SHARE_OF_RANGE);
-    SectionVolume = D::image("section_volume", volume, volume_format).multibuffered().clear().across_queues()
-        .of(GREY, SHARE_OF_RANGE);
+    SharpSectionVolume = D::volume("sharp_section_volume").across_queues();
+    SectionVolume = D::volume("section_volume").across_queues();
     /// The bits of each texel of the volume together with those of its neighbours one column and one row on.
     PackedNeighbours = D::image("packed_neighbours", volume, |_| Format::Rg32u).multibuffered()
         .of(&["bits", "more_bits"], "bits of a texel and of its neighbours one column on, one row on, and both");
@@ -305,16 +309,13 @@ slots! {
         By(|a, b| Slot::Transfer.differs(a, b) || a.optical_step() != b.optical_step()),
     ).of(&["red", "green", "blue", "opacity"], "premultiplied colour and opacity of a step, 0..1");
     /// The tiles of a picture of planes: what each shows, and its lines.
-    Tiles = D::table("tiles", |s| Shape::Buffer(16 * TILE_VECTORS * s.tile_count()), lookup_tables::tile_table,
-        ByContent).of(VECTOR, AS_THE_SHADER);
+    Tiles = D::vectors("tiles", |s| Shape::Buffer(16 * TILE_VECTORS * s.tile_count()), lookup_tables::tile_table);
     /// The columns of a curved plane: the place of each, and the vector through its slab.
-    CurveColumns = D::table("curve_columns", curve_columns, lookup_tables::curve_table, ByContent)
-        .of(VECTOR, AS_THE_SHADER);
+    CurveColumns = D::vectors("curve_columns", curve_columns, lookup_tables::curve_table);
     /// The half-spaces that bound the block of mode cube.
-    Block = D::table("block", |s| Shape::Buffer(16 * s.block().len() as u32), lookup_tables::block_table, ByContent)
-        .of(VECTOR, AS_THE_SHADER);
+    Block = D::vectors("block", |s| Shape::Buffer(16 * s.block().len() as u32), lookup_tables::block_table);
     /// The light volume: density and echo of the matter in each cell.
-    LightMatter = D::image("light_matter", |s| Shape::Three(s.light_lattice().count), |_| Format::Rg16f)
+    LightMatter = D::image("light_matter", |s| light_level(s, 0), |_| Format::Rg16f)
         .of(&["density", "echo"], "share of the densest matter; share of the range of the recording's samples");
     /// The Gaussian pyramid of the light volume's density. At each level cells have twice the edge of the level before.
     LightPyramid1 = D::image("light_pyramid_1", |s| light_level(s, 1), |_| Format::R16f).of(GREY, DENSITY);
@@ -331,12 +332,9 @@ slots! {
     LightFrontB = D::image("light_front_b", |s| light_layer(s, false), |_| Format::Rgba32f).of(COLOUR, LIGHT);
     /// Light that arrives in each cell, and the density of its matter. The passes that scatter it alternate between `LightScattered` and
     /// `LightScatteredB`, so that this one stays.
-    LightArriving = D::image("light_arriving", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f)
-        .of(LIT, ARRIVED);
-    LightScattered = D::image("light_scattered", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f)
-        .of(LIT, ARRIVED);
-    LightScatteredB = D::image("light_scattered_b", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f)
-        .of(LIT, ARRIVED);
+    LightArriving = D::image("light_arriving", |s| light_level(s, 0), |_| Format::Rgba16f).of(LIT, ARRIVED);
+    LightScattered = D::image("light_scattered", |s| light_level(s, 0), |_| Format::Rgba16f).of(LIT, ARRIVED);
+    LightScatteredB = D::image("light_scattered_b", |s| light_level(s, 0), |_| Format::Rgba16f).of(LIT, ARRIVED);
     /// Back light, in cells of twice the edge: what leaves the last layer of cells that a dispatch lit. Dispatches alternate between `BackFrontA` and
     /// `BackFrontB`. `BackLight` is the back light that arrives in each of these cells, and the density of its matter.
     BackFrontA = D::image("back_front_a", |s| light_layer(s, true), |_| Format::Rgba32f).of(COLOUR, LIGHT);
@@ -346,10 +344,9 @@ slots! {
     /// ambient light alone (alpha).
     LightAmbient = D::image("light_ambient", |s| light_level(s, 1), |_| Format::Rgba16f).of(COLOUR, LIGHT);
     /// Light that white matter in each cell scatters towards the viewer, by colour, and the ambient light that arrives there.
-    LightShade = D::image("light_shade", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f)
-        .of(COLOUR, LIGHT);
+    LightShade = D::image("light_shade", |s| light_level(s, 0), |_| Format::Rgba16f).of(COLOUR, LIGHT);
     /// For each cell the direction towards weaker echoes, whose length (0..1) is its certainty, and the light for a highlight.
-    LightNormals = D::image("light_normals", |s| Shape::Three(s.light_lattice().count), |_| Format::Rgba16f)
+    LightNormals = D::image("light_normals", |s| light_level(s, 0), |_| Format::Rgba16f)
         .of(&["x", "y", "z", "highlight"], "direction, as long as it is certain; light");
     /// The medium of a still at the entries of the transfer function: albedo and extinction.
     StillMedium = D::table("still_medium", |s| Shape::Buffer(16 * s.transfer_entries() as u32),
@@ -463,10 +460,7 @@ impl Slot {
 
     /// The search by which the CPU computes the content of this slot. None for slots that are filled otherwise.
     pub fn search(self) -> Option<Search> {
-        match self.initializer() {
-            Initializer::ByVolume(search) => Some(search),
-            _ => None,
-        }
+        if let Initializer::ByVolume(search) = self.initializer() { Some(search) } else { None }
     }
 
     pub(crate) fn meaning(self) -> Meaning {
@@ -544,20 +538,14 @@ impl Slot {
 
     /// The texel of the volume (column, row, slice) that is texel (0, 0, 0) of the slot's image. Three zeros for slots without texels of the volume.
     pub fn first_texel(self, scene: &Scene) -> [u32; 3] {
-        match self {
-            Slot::PackedNeighbours => scene.stored_bounds().low,
-            _ if self.is_volume() => scene.stored_bounds().low,
-            _ => [0; 3],
-        }
+        let is_stored_part = self.is_volume() || self == Slot::PackedNeighbours;
+        if is_stored_part { scene.stored_bounds().low } else { [0; 3] }
     }
 
     /// Size of the slot's array in references and readbacks. For a volume it is the whole volume, not only what the device stores, so that indices
     /// are texel coordinates of the volume.
     pub fn array_size(self, scene: &Scene) -> [usize; 3] {
-        match self {
-            _ if self.is_volume() => scene.volume_size().map(|n| n as usize),
-            _ => self.shape(scene).size(),
-        }
+        if self.is_volume() { scene.volume_size().map(|n| n as usize) } else { self.shape(scene).size() }
     }
 
     /// Size of the slot in bytes. Of a slot that each volume image has its own copy of, it is the size of one copy.

@@ -80,7 +80,7 @@ pub(super) fn per_brick(scene: &Scene) -> Shape {
     Shape::Three(scene.bricks().count)
 }
 
-/// Cells of a level of the light volume's pyramid.
+/// Cells of a level of the light volume's pyramid; level 0 is the light volume itself.
 pub(super) fn light_level(scene: &Scene, level: u32) -> Shape {
     Shape::Three(scene.light_lattice().count.map(|n| n.div_ceil(1 << level)))
 }
@@ -119,7 +119,7 @@ pub(super) fn per_pixel(scene: &Scene) -> Shape {
 
 /// A voxel where there are no labels.
 pub(super) fn per_label(scene: &Scene) -> Shape {
-    Shape::Three(scene.labels().map_or([1; 3], |labels| labels.size().map(|n| n as u32)))
+    Shape::Three(scene.labels().map_or([1; 3], |labels| labels.size.map(|n| n as u32)))
 }
 
 #[cfg(test)]

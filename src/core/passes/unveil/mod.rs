@@ -14,12 +14,13 @@ mod reference;
 pub use lines::{StartLine, lines};
 pub use reference::reference;
 
-use super::components::Lattice;
+use super::components::{Lattice, stretches};
 use super::pass::*;
 use crate::scene::Scene;
 use crate::scene::unveil::FluidLattice;
 use rayon::prelude::*;
 use std::fmt;
+use std::ops::Range;
 
 /// Levels of a cell's mean: 1 is so many.
 const LEVELS: u32 = 1024;
@@ -83,21 +84,17 @@ impl Outcome {
 impl fmt::Display for Outcome {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let level = |levels: u32| f64::from(levels) / f64::from(LEVELS);
+        let echoes =
+            |e: &Evidence| format!("echoes of {:.2} in it and {:.2} around it", level(e.pocket), level(e.tissue));
         match self {
-            Outcome::Found(e) => write!(
-                f,
-                "rendering starts at the fluid: echoes of {:.2} in it and {:.2} around it, found in {} % of the view",
-                level(e.pocket),
-                level(e.tissue),
-                e.share
-            ),
+            Outcome::Found(e) => {
+                let (echoes, share) = (echoes(e), e.share);
+                write!(f, "rendering starts at the fluid: {echoes}, found in {share} % of the view")
+            }
             Outcome::NoPocket => write!(f, "no fluid is found in front of tissue, so the start line stays"),
-            Outcome::NoContrast(e) => write!(
-                f,
-                "the fluid cannot be told from tissue (echoes of {:.2} in it and {:.2} around it), so the start line stays",
-                level(e.pocket),
-                level(e.tissue)
-            ),
+            Outcome::NoContrast(e) => {
+                write!(f, "the fluid cannot be told from tissue ({}), so the start line stays", echoes(e))
+            }
             Outcome::TooSmall(e) => write!(
                 f,
                 "fluid is found in {} % of the view only (at least {LEAST_SHARE}), so the start line stays",
@@ -122,19 +119,18 @@ pub fn find(scene: &Scene, bytes: &[u8]) -> Unveiled {
     let lattice = scene.fluid_lattice();
     let cells = smoothed_cells(&lattice, cells(scene, &lattice, bytes));
     let in_view = scene.columns_in_view(&lattice);
-    let surface = near_face(&lattice, &cells, &in_view);
-    let [columns, _] = scene.grid.size.map(|n| n as usize);
-    match surface {
-        // Nothing lies in front of the fluid.
-        Ok((heights, evidence)) if heights.iter().all(Option::is_none) => {
-            Unveiled { outcome: Outcome::Found(evidence), rows: vec![0.0; columns * lattice.size[2]] }
-        }
-        Ok((heights, evidence)) => {
-            let heights = smoothed(&lattice, spanned(&lattice, &heights), scene.settings.unveil.smoothing);
-            Unveiled { outcome: Outcome::Found(evidence), rows: start_rows(scene, &lattice, &heights) }
-        }
-        Err(outcome) => Unveiled { outcome, rows: vec![0.0; columns * lattice.size[2]] },
-    }
+    let (heights, outcome) = match near_face(&lattice, &cells, &in_view) {
+        Ok((heights, evidence)) => (heights, Outcome::Found(evidence)),
+        Err(outcome) => (Vec::new(), outcome),
+    };
+    let rows = if heights.iter().any(Option::is_some) {
+        let heights = smoothed(&lattice, spanned(&lattice, &heights), scene.settings.unveil.smoothing);
+        start_rows(scene, &lattice, &heights)
+    } else {
+        // The pocket was not recognised, or nothing lies in front of it.
+        vec![0.0; scene.grid.size[0] as usize * lattice.size[2]]
+    };
+    Unveiled { outcome, rows }
 }
 
 /// The mean of each cell's texels within the sector, in levels; [`OUTSIDE`] where less than half of them are.
@@ -240,23 +236,12 @@ fn near_face(lattice: &FluidLattice, cells: &[u16], in_view: &[bool]) -> Result<
     let parts = parts.numbers(cells.len());
     let of_column = |n: usize| -> Vec<Entry> {
         let at = |row: usize| (n / columns * rows + row) * columns + n % columns;
-        let mut entries = Vec::new();
-        let mut row = 0;
-        while row < rows {
-            if parts[at(row)] == 0 {
-                row += 1;
-                continue;
-            }
-            let first = row;
-            while row < rows && parts[at(row)] != 0 {
-                row += 1;
-            }
-            if row - first >= THICKNESS {
-                let is_covering = row < rows && cells[at(row)] != OUTSIDE;
-                entries.push(Entry { part: parts[at(first)], first, end: row, is_covering });
-            }
-        }
-        entries
+        let runs = stretches(rows, |row| parts[at(row)] != 0).filter(|run| run.len() >= THICKNESS);
+        let entry = |Range { start: first, end }: Range<usize>| {
+            let is_covering = end < rows && cells[at(end)] != OUTSIDE;
+            Entry { part: parts[at(first)], first, end, is_covering }
+        };
+        runs.map(entry).collect()
     };
     let entries: Vec<Vec<Entry>> = (0..columns * slices).into_par_iter().map(of_column).collect();
     let mut votes = vec![0u32; parts.iter().copied().max().unwrap_or(0) as usize + 1];
@@ -379,11 +364,8 @@ fn spanned(lattice: &FluidLattice, heights: &Heights) -> Vec<i64> {
     while filled.iter().any(Option::is_none) && filled.iter().any(Option::is_some) {
         let before = filled.clone();
         for n in (0..before.len()).filter(|n| before[*n].is_none()) {
-            let (sum, count) = neighbours(n)
-                .into_iter()
-                .filter_map(|other| before[other])
-                .fold((0, 0), |(sum, count), height| (sum + height, count + 1));
-            filled[n] = (count > 0).then(|| i64::div_euclid(sum, count.max(1)));
+            let known: Vec<i64> = neighbours(n).into_iter().filter_map(|other| before[other]).collect();
+            filled[n] = (!known.is_empty()).then(|| known.iter().sum::<i64>().div_euclid(known.len() as i64));
         }
     }
     let mut spanned: Vec<i64> = filled.into_iter().map(|height| height.unwrap_or(0)).collect();

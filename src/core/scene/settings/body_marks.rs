@@ -77,8 +77,8 @@ impl Body {
 }
 
 pub(super) const NUMBERS: &[Number] = &[
-    number!(body_marks => at, "", SHARE),
-    number!(body_marks => size, "", Range(BODY_MARK_SIZES[0], BODY_MARK_SIZES[1])),
-    number!(body_marks => probe, "", Range(-1.0, 1.0)),
-    number!(body_marks => angle, "°", ANGLE),
+    number!([drawn] body_marks => at, "", SHARE),
+    number!([drawn] body_marks => size, "", Range(BODY_MARK_SIZES[0], BODY_MARK_SIZES[1])),
+    number!([drawn] body_marks => probe, "", Range(-1.0, 1.0)),
+    number!([drawn] body_marks => angle, "°", ANGLE),
 ];

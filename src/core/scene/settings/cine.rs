@@ -40,7 +40,7 @@ impl Cine {
     }
 }
 
-pub(super) const NUMBERS: &[Number] = &[number!(cine.speed, "", Range(0.1, 8.0))];
+pub(super) const NUMBERS: &[Number] = &[number!([drawn] cine.speed, "", Range(0.1, 8.0))];
 
 #[cfg(test)]
 mod tests {

@@ -151,10 +151,10 @@ impl MeasureKind {
 }
 
 pub(super) const NUMBERS: &[Number] = &[
-    number!(measure => points, "mm", Range(-1e6, 1e6)),
-    number!(measure => contours, "mm", Range(-1e6, 1e6)),
-    number!(measure => threshold, "", SHARE),
-    number!(measure => made => time, "s", Range(-1e15, 1e15)),
-    number!(measure => counted, "mm^3", Range(0.0, 1e18)),
-    number!(measure => interval, "mm^3", Range(0.0, 1e18)),
+    number!([drawn] measure => points, "mm", Range(-1e6, 1e6)),
+    number!([drawn] measure => contours, "mm", Range(-1e6, 1e6)),
+    number!([drawn] measure => threshold, "", SHARE),
+    number!([drawn] measure => made => time, "s", Range(-1e15, 1e15)),
+    number!([drawn] measure => counted, "mm^3", Range(0.0, 1e18)),
+    number!([drawn] measure => interval, "mm^3", Range(0.0, 1e18)),
 ];

@@ -31,7 +31,7 @@ pub use unveil::*;
 use super::MAX_PICTURE;
 use super::number::Allowed::{Any, Range};
 use super::number::{Group, LARGEST, LENGTH_OR_0, Number, PLACE, SHARE, number};
-use crate::tree::{Defaults, FromNode, Name, ToNode};
+use crate::tree::{Defaults, FromNode, Name, Part, Slot, ToNode};
 
 /// Fewest points of a curved render start (`region.start_curve`).
 pub const MIN_START_POINTS: usize = 3;
@@ -92,6 +92,14 @@ pub struct Settings {
     pub post: Post,
     /// Stage 4: the labels of a segmentation, over the picture.
     pub labels: Labels,
+    /// What no pass reads.
+    #[tree(flatten)]
+    pub drawn: Drawings,
+}
+
+/// The settings that no pass reads: what is drawn over a picture, and the cine loop. Their keys are keys of [`Settings`].
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Drawings {
     /// Marks beside the picture.
     pub marks: Marks,
     /// Measurements and annotations, at most 64. The viewer makes them; `render` draws them.
@@ -100,6 +108,18 @@ pub struct Settings {
     pub body_marks: Vec<BodyMark>,
     /// The cine loop.
     pub cine: Cine,
+}
+
+impl Part for Drawings {
+    fn slots(&mut self) -> Vec<(&'static str, &mut dyn Slot)> {
+        let Drawings { marks, measure, body_marks, cine } = self;
+        vec![("marks", marks), ("measure", measure), ("body_marks", body_marks), ("cine", cine)]
+    }
+
+    fn entries(&self) -> Vec<(&'static str, Option<&dyn ToNode>)> {
+        let Drawings { marks, measure, body_marks, cine } = self;
+        vec![("marks", Some(marks)), ("measure", Some(measure)), ("body_marks", Some(body_marks)), ("cine", Some(cine))]
+    }
 }
 
 impl Settings {
@@ -112,8 +132,7 @@ impl Settings {
     /// These settings with those of `other` that no pass reads: measurements, annotations, body marks and marks, which are drawn over the
     /// picture, and the settings of the cine loop.
     pub fn with_drawings_of(self, other: &Settings) -> Settings {
-        let (measure, body_marks) = (other.measure.clone(), other.body_marks.clone());
-        Settings { measure, body_marks, marks: other.marks.clone(), cine: other.cine, ..self }
+        Settings { drawn: other.drawn.clone(), ..self }
     }
 
     /// These settings without measurements, annotations and body marks, with the default [`Marks`], and with the cine loop of a whole recording.

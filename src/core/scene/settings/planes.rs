@@ -84,11 +84,11 @@ pub const MAX_CURVE_POINTS: usize = 64;
 pub enum Slab {
     /// Mean: less speckle, contrast of soft tissue.
     #[default]
-    Mean,
+    Mean = 0,
     /// Maximum: bright structures such as bone.
-    Max,
+    Max = 1,
     /// Minimum: dark structures such as vessels and cysts.
-    Min,
+    Min = 2,
 }
 
 /// The three orthogonal planes.

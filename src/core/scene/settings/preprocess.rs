@@ -89,6 +89,7 @@ pub struct Slices {
     pub smooth: Option<Smooth>,
     /// Slight Gaussian blur of 3x3 against wood grain, the trace of the pixel lattice on a tilted surface (thesis Fig. 32, 33); `rendered`: in modes that
     /// cast rays, and not in planes. Has no effect where `smooth` blurs slices already.
+    #[value(Blur::Always(false))]
     pub blur: Blur,
     /// Texel format of the volume.
     pub format: VolumeFormat,
@@ -398,12 +399,6 @@ pub enum Blur {
 pub enum BlurName {
     /// In modes that cast rays, and not in modes of planes.
     Rendered,
-}
-
-impl Default for Blur {
-    fn default() -> Blur {
-        Blur::Always(false)
-    }
 }
 
 impl Blur {

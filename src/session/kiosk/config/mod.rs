@@ -255,9 +255,7 @@ impl Config {
         }
         Ok(())
     }
-}
 
-impl Config {
     /// True if the source is a recording.
     fn is_file(&self) -> bool {
         self.source != PHANTOM && !self.source.contains("://")
@@ -306,8 +304,7 @@ impl Config {
                 .map_err(|e| self.locations.parse_error(&e))?;
         }
         for preset in &self.preset {
-            let known = crate::scene::load::Layers::default().preset(preset);
-            known.map_err(|e| self.locations.error_at("preset", &e.to_string()))?;
+            Layers::default().preset(preset).map_err(|e| self.locations.error_at("preset", &e.to_string()))?;
         }
         let settings = self.layers().and_then(|layers| layers.finish());
         let settings = settings.map_err(|e| self.locations.error_at("scene", &e.to_string()))?;

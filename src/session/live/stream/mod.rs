@@ -457,10 +457,11 @@ impl Stream {
             self.asked = self.asked.with_look(settings);
             self.found = found;
         }
-        // Freed before the new one is created: both may not fit into device memory.
-        if let Some(Session { pool, .. }) = session {
+        // Freed before the new one is created: both may not fit into device memory. The compiled pipelines are kept for the new one.
+        let _pipelines = session.map(|Session { pool, renderer, .. }| {
             self.previous_pool = Some(pool);
-        }
+            renderer.into_pipelines()
+        });
         let views = views(&header, &self.asked, &self.options)?;
         if let Some(cut) = views.first().probe().and_then(Probe::folded) {
             tracing::warn!("{cut}");

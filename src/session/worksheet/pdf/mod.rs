@@ -66,10 +66,8 @@ impl Report {
         }
     }
 
+    /// The last page: there always is one.
     fn page(&mut self) -> &mut Content {
-        if self.pages.is_empty() {
-            self.pages.push(Content::new());
-        }
         let last = self.pages.len() - 1;
         &mut self.pages[last]
     }

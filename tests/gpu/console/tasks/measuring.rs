@@ -201,7 +201,7 @@ pub(super) fn sides(user: &mut User) -> String {
     user.click_on(Role::Tab, "Marks");
     user.click_on(Role::Button, "right to left");
     let scene = user.scene();
-    let tiles = scene.marks_with(&user.console.controls().settings().marks);
+    let tiles = scene.marks_with(&user.console.controls().settings().drawn.marks);
     assert_eq!(tiles[0].letters.iter().map(|(_, letter)| *letter).collect::<Vec<_>>(), ["R", "L"]);
     user.count()
 }

@@ -17,10 +17,7 @@ use crate::passes::preprocess::packed_sampling;
 use crate::scene::{Scene, Side, Still, windowed};
 
 fn need(scene: &Scene) -> Need {
-    match scene.still() {
-        Some(_) => Ok("a still is asked for"),
-        None => Err("no still is asked for"),
-    }
+    scene.still().map(|_| "a still is asked for").ok_or("no still is asked for")
 }
 
 fn still(scene: &Scene) -> Still {
@@ -50,11 +47,7 @@ pub(crate) const MAJORANTS: Pass = Pass {
         (Ok(_), false) => Err("paths take the largest extinction of all: there are no bricks"),
         (not, _) => not,
     },
-    reads: |_, _| {
-        let mut reads = empty_space::ranges();
-        reads.push(whole("medium", Slot::StillMedium));
-        reads
-    },
+    reads: |_, _| [empty_space::ranges(), vec![whole("medium", Slot::StillMedium)]].concat(),
     writes: |_, _| vec![whole("majorants", Slot::StillMajorants)],
     extent: |s, _| s.bricks().count,
     params: |s, _| empty_space::window(s, s.volume_view()),
@@ -143,15 +136,13 @@ pub(crate) const PATHS: Pass = Pass {
             .vec3("environment", lights.environment)
     },
     constants: |s, _| {
-        let mut constants = ray::constants(s);
-        constants.retain(|(name, _)| !matches!(*name, "SAMPLING" | "SPREAD"));
-        constants.extend([
+        let with = [
             ("SAMPLING", if s.packs() { packed_sampling(s) } else { 1 }),
             ("FADE", s.region_fade().is_some() as i32),
             ("BRICKS", s.skips() as i32),
             ("ENTRIES", s.transfer_entries() as i32),
-        ]);
-        constants
+        ];
+        replaced(ray::constants(s), &["SAMPLING", "SPREAD"], with)
     },
     tolerance: Tolerance::absolute(4e-3).relative(4e-3).outliers(4e-2).because(
         "places along a path are off by 1e-5 mm in f32, so extinctions by as much of a voxel's contrast; where a \
@@ -208,14 +199,13 @@ pub(crate) const RESOLVE: Pass = Pass {
     tolerance: Tolerance::absolute(1e-3).because("a response curve and a power in f32; R16F stores 1 to 4.9e-4"),
     reference: |scene, _, reads, writes| {
         let sums = reads.get("sums");
-        let picture = writes.get_mut("picture");
         let (volume, samples) = (scene.settings.light.volume, f64::from(still(scene).samples));
         let (exposure, ground) = (volume.unwrap_or_default().exposure, volume.and_then(|volume| volume.ground));
-        for (x, y) in sums.pixels() {
+        writes.get_mut("picture").fill(|x, y| {
             let mut mean: [f64; 4] = std::array::from_fn(|c| sums.get([x, y, 0])[c] / samples);
             mean[3] = mean[3].min(1.0);
-            picture.set([x, y, 0], &light_volume::on_film(scene, exposure, ground, mean, ray::middle_of(x, y)));
-        }
+            light_volume::on_film(scene, exposure, ground, mean, ray::middle_of(x, y))
+        });
     },
     ..MAJORANTS
 };

@@ -2,7 +2,7 @@
 
 use super::Stream;
 use crate::passes::pass::*;
-use crate::passes::raycast::{ray, volume};
+use crate::passes::raycast::{cap, ray, volume};
 use crate::scene::{Scene, StillLights, windowed};
 use glam::DVec3;
 use std::f64::consts::PI;
@@ -189,12 +189,7 @@ fn scattered(g: f64, along: DVec3, [u, v]: [f64; 2]) -> DVec3 {
     };
     let cosine = cosine.clamp(-1.0, 1.0);
     let (sine, turn) = ((1.0 - cosine * cosine).sqrt(), 2.0 * PI * v);
-    // The basis of Duff et al. 2017.
-    let side = if along.z >= 0.0 { 1.0 } else { -1.0 };
-    let a = -1.0 / (side + along.z);
-    let b = along.x * along.y * a;
-    let right = DVec3::new(1.0 + side * along.x * along.x * a, side * b, -side * along.x);
-    let up = DVec3::new(b, side + along.y * along.y * a, -along.y);
+    let [right, up] = cap::axes(along);
     (sine * (turn.cos() * right + turn.sin() * up) + cosine * along).normalize()
 }
 
